@@ -1,4 +1,4 @@
-//! What is called in the tick allocates nothing, in any state of the drive.
+//! The calls of a tick do not allocate, in any state of the drive.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -19,16 +19,16 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier};
 #[global_allocator]
 static ALLOCATOR: AllocDisabler = AllocDisabler;
 
-/// A host_in_memory whose endpoints can be made to discard what is sent: the bus in memory itself allocates, a socket does not.
+/// A host whose endpoints can discard sent frames, because the bus in memory allocates for each frame. A socket does not.
 struct DiscardingHost {
-    host_in_memory: SimulatedHost,
+    inner: SimulatedHost,
     discard: Arc<AtomicBool>,
 }
 
 impl Port for DiscardingHost {
     fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
         Ok(Box::new(DiscardingEndpoint {
-            inner: self.host_in_memory.endpoint(ids)?,
+            inner: self.inner.endpoint(ids)?,
             discard: Arc::clone(&self.discard),
         }))
     }
@@ -36,13 +36,13 @@ impl Port for DiscardingHost {
 
 impl Host for DiscardingHost {
     fn now_ns(&self) -> u64 {
-        self.host_in_memory.now_ns()
+        self.inner.now_ns()
     }
     fn sleep(&self, time: Duration) {
-        self.host_in_memory.sleep(time);
+        self.inner.sleep(time);
     }
     fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
-        self.host_in_memory.start(name, task)
+        self.inner.start(name, task)
     }
 }
 
@@ -64,7 +64,7 @@ impl CanBus for DiscardingEndpoint {
     }
 }
 
-/// All calls of a tick, without a frame leaving.
+/// All calls of a tick, without sending a frame.
 fn tick(drive: &mut CanopenDrive, discard: &AtomicBool) {
     discard.store(true, Ordering::Release);
     assert_no_alloc(|| {
@@ -83,14 +83,13 @@ fn command_status_and_disable_do_not_allocate() {
         Exchange::Asynchronous { status_hz: 500.0 },
         Exchange::Synchronous { status_every: 1 },
     ] {
-        let (host_in_memory, discard) =
-            (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
+        let (simulated, discard) = (SimulatedHost::default(), Arc::new(AtomicBool::new(false)));
         let device = Arc::new(Mutex::new(EmulatedDrive::new(
             EmulatedDriveSettings::default(),
         )));
-        let _running = AmplifierTask::start(&host_in_memory, Arc::clone(&device)).unwrap();
+        let _running = AmplifierTask::start(&simulated, Arc::clone(&device)).unwrap();
         let host = DiscardingHost {
-            host_in_memory: host_in_memory.clone(),
+            inner: simulated.clone(),
             discard: Arc::clone(&discard),
         };
         let settings = DriveSettings {
@@ -102,7 +101,7 @@ fn command_status_and_disable_do_not_allocate() {
         drive.enable().unwrap();
         tick(&mut drive, &discard); // on
         device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
-        host_in_memory.sleep(Duration::from_millis(10));
+        simulated.sleep(Duration::from_millis(10));
         assert_eq!(drive.status(), AmplifierStatus::Fault(0x0001_2310));
         tick(&mut drive, &discard); // in fault
         discard.store(true, Ordering::Release);

@@ -1,4 +1,4 @@
-//! The file of a calibration: made by the program, used by it, refused where it does not fit.
+//! The calibration file: written and used by the program, and rejected if it does not match.
 use std::path::Path;
 
 use assert_cmd::Command;
@@ -42,7 +42,7 @@ fn calibration_file_has_date_devices_and_delay_and_is_not_overwritten() {
             .as_str()
             .is_some_and(|made| made.starts_with("20") && made.ends_with('Z'))
     );
-    // 0.2 ms of computing delay; the fit of the phases knows it within a microsecond.
+    // The computing delay is 0.2 ms; the fit of the phase estimates it within 2 us.
     let delay_s = calibration["chain"]["delay_s"].as_f64().expect("measured");
     assert!((delay_s - 2e-4).abs() < 2e-6, "{delay_s}");
     assert!(
@@ -80,7 +80,7 @@ fn run_records_its_calibration_and_replays() {
     assert_eq!(code, 0, "{errors}");
     let path = report["recording"].as_str().expect("a path");
     let recording = Recording::open(&folder.path().join(path)).expect("a recording");
-    let attached = recording.attachment("calibration.toml").expect("carried");
+    let attached = recording.attachment("calibration.toml").expect("attached");
     assert!(String::from_utf8_lossy(&attached.data).contains("compliance_m_per_a"));
     assert_eq!(
         recording.metadata().get("amplifier").map(String::as_str),

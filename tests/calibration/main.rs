@@ -1,4 +1,4 @@
-//! What `bench calibrate` finds, and what a calibration does to a run.
+//! `bench calibrate`: its estimates, its file, and the effect of a calibration on a run.
 mod files;
 mod skewed_rig;
 mod steps;

@@ -1,8 +1,8 @@
-//! A simulated stage behind an amplifier and a probe that are not what they say.
+//! A simulated stage with systematic errors of amplifier and probe.
 use bench::rig::simulated::SimulatedRig;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
-/// What is wrong with the devices: current = gain (command) + offset; reading = gain (position) + offset.
+/// Errors of the devices: current = gain (command) + offset; reading = gain (position) + offset.
 #[derive(Clone, Copy, Debug)]
 pub struct Skew {
     pub current_gain: f64,
@@ -10,9 +10,9 @@ pub struct Skew {
     pub measures_current: bool,
     pub probe_gain: f64,
     pub probe_offset_m: f64,
-    /// The reading hangs back by so much in the direction of motion.
+    /// The reading lags by this distance against the direction of motion.
     pub backlash_m: f64,
-    /// The reading bends: position + bend position^2.
+    /// Quadratic error: reading = position + quadratic position^2.
     pub quadratic_per_m: f64,
 }
 
@@ -34,7 +34,7 @@ pub struct SkewedRig {
     pub inner: SimulatedRig,
     pub skew: Skew,
     actual_a: f64,
-    play_m: f64,
+    play_output_m: f64,
 }
 
 impl SkewedRig {
@@ -43,17 +43,17 @@ impl SkewedRig {
             inner,
             skew,
             actual_a: 0.0,
-            play_m: 0.0,
+            play_output_m: 0.0,
         }
     }
 
-    /// What a hand that drags something behind it reads (play of twice the backlash).
+    /// Backlash: output of the play operator with a width of twice `backlash_m`.
     fn after_play_m(&mut self, position_m: f64) -> f64 {
-        self.play_m = self.play_m.clamp(
+        self.play_output_m = self.play_output_m.clamp(
             position_m - self.skew.backlash_m,
             position_m + self.skew.backlash_m,
         );
-        self.play_m
+        self.play_output_m
     }
 }
 

@@ -1,4 +1,4 @@
-//! The static steps: what was put into the rig comes out of the fit.
+//! The static steps: the fit estimates the errors of the rig.
 use std::path::Path;
 
 use bench::config::{Config, ScaleBy, Source, load};
@@ -53,7 +53,7 @@ fn static_compliance_is_estimated_with_sign_and_sigma() {
         )
         .expect("a fit");
         let expected = probe_gain * COMPLIANCE_M_PER_A;
-        // The modes that the model leaves out add 0.04 % to the static compliance.
+        // The unmodelled modes add 0.04 % to the static compliance.
         assert!(
             (fit.compliance_m_per_a / expected - 1.0).abs() < 1e-3,
             "{fit:?}"
@@ -64,7 +64,7 @@ fn static_compliance_is_estimated_with_sign_and_sigma() {
             fit.nonlinearity_ratio < 2e-4 && fit.hysteresis_ratio < 2e-4,
             "{fit:?}"
         );
-        // 40 nm of the probe, its quantisation, and the floor.
+        // Probe noise of 40 nm, quantisation, and floor vibration.
         assert!((40e-9..100e-9).contains(&fit.noise_rms_m), "{fit:?}");
         assert_eq!(fit.current, None);
     }
@@ -90,7 +90,7 @@ fn gain_and_offset_of_amplifier_and_probe_are_estimated() {
         (fit.compliance_m_per_a / (-0.97 * 1.04 * COMPLIANCE_M_PER_A) - 1.0).abs() < 1e-3,
         "{fit:?}"
     );
-    // At the command zero 6 mA flow: the stage rests 0.93 um off, and the probe adds its 12 um.
+    // At a command of zero 6 mA flow: the stage is at 0.93 um, and the probe adds its offset of 12 um.
     let rest_m = 12e-6 - 0.97 * 0.006 * COMPLIANCE_M_PER_A;
     assert!(
         (fit.rest_m - rest_m).abs() < 2e-8,
@@ -104,7 +104,8 @@ fn gain_and_offset_of_amplifier_and_probe_are_estimated() {
 #[test]
 fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     let config = config();
-    // The travel is 2 x 0.4 A x 154 um/A = 124 um; a play of 2 x 2 um is 3 % of it, a bend of 1 % of 62 um shows as one.
+    // The travel is 2 x 0.4 A x 154 um/A = 124 um. A play of 2 x 2 um is 3 % of it. The quadratic error is 6 % of 62 um at the
+    // ends of the travel.
     let hysteresis = fitted(
         Skew {
             backlash_m: 2e-6,
@@ -130,7 +131,7 @@ fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
         &generous,
     )
     .expect("allowed");
-    // 4 um less what the floor shakes out of the play, of 123.6 um.
+    // At most 4 um of 123.6 um; floor vibration reduces the play.
     assert!((0.025..0.0325).contains(&fit.hysteresis_ratio), "{fit:?}");
     let curved = fitted(
         Skew {
@@ -150,7 +151,7 @@ fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
 #[test]
 fn rejects_a_stage_that_does_not_move() {
     let mut config = config();
-    // Noise alone: the interlock against a stuck probe sees it move.
+    // The noise alone prevents a trip of the interlock against a stuck probe.
     let still = fitted(
         Skew {
             current_gain: 0.0,
@@ -161,13 +162,13 @@ fn rejects_a_stage_that_does_not_move() {
     .expect_err("nothing moves")
     .to_string();
     assert!(still.contains("does not follow the current"), "{still}");
-    config.calibrate.amplitude_a = 3e-5; // 9 nm of travel, a mean of 5000 readings of 70 nm knows 1 nm
+    config.calibrate.amplitude_a = 3e-5; // 9 nm of travel; the mean of 5000 readings with 70 nm noise has a sigma of 1 nm
     assert!(
         matches!(
             fitted(Skew::default(), &config),
             Err(StaircaseError::NoMotion { .. })
         ),
-        "lost in the noise"
+        "the motion is below the noise"
     );
 }
 
@@ -219,12 +220,12 @@ fn calibrated_rig_has_unit_gain_and_no_offset() {
         "{second:?}"
     );
     let (gain, offset_a) = second.current.expect("the amplifier measures");
-    // What the loop is told to flow is what flows.
+    // The calibrated command equals the actual current.
     assert!(
         (gain - 1.0).abs() < 1e-9 && offset_a.abs() < 1e-9,
         "{gain} {offset_a}"
     );
-    // The zero is where the stage rested at the command zero, that is at -4 mA.
+    // The zero is the rest position at a command of zero, that is at -4 mA.
     assert!(
         (second.rest_m - 0.004 * COMPLIANCE_M_PER_A).abs() < 3e-8,
         "{second:?}"

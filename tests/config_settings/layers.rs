@@ -40,12 +40,12 @@ fn converts_units_of_set_values() {
 #[test]
 fn config_show_output_reads_back_unchanged() {
     let bench = Bench::new();
-    let others = [
+    let options = [
         "--config chapter2 --operating-point 3.3% --seed 17",
         "--set loop.cpu=1 --set sim.floor=[] --set chirp.sweep=linear --set control.reference.kind=hold",
         "--set plant.damping={kind=\"rayleigh\",mass_per_s=3.0,stiffness_s=1e-6} --asymmetry -0.123456789012345678",
     ];
-    for options in std::iter::once("").chain(others) {
+    for options in std::iter::once("").chain(options) {
         let shown = bench.run(&format!("config show {options}"));
         assert_eq!(shown.code, 0, "{options}: {}", shown.err);
         bench.write("shown.toml", &shown.out);
@@ -127,7 +127,7 @@ fn operating_point_accepts_percent_of_l_millimetres_and_metres() {
         );
     }
     program::near("-8%", metres("--operating-point -8%"), -0.0038, 1e-17);
-    // Per cent of the length of this bench's beams, wherever the length comes from.
+    // A percentage refers to the configured length of the beams.
     program::near(
         "of 60 mm",
         metres("--operating-point 5% --set plant.beam_length_m=0.06"),
@@ -158,7 +158,7 @@ fn json_output_is_a_single_object() {
     run(&format!("identify {chirp}"));
     run(&format!("replay {control}"));
     run(&format!("recover {control}"));
-    // Of a run that trips as well.
+    // The same for a run that trips.
     let tripped = bench.run("control --fast --asymmetry -10% --json");
     assert_eq!(
         (tripped.code, &tripped.json()["outcome"]),

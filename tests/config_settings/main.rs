@@ -1,4 +1,4 @@
-//! Settings: three layers of TOML, one schema, and messages that say where, what, the limit and the remedy.
+//! Settings: three layers of TOML, one schema, and messages with place, value, limit and remedy.
 mod controller_files;
 mod layers;
 mod rejected;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use bench_test_support::program;
 
-/// Everything that `bench` is told to do with a setting before it uses it.
+/// Commands that check all settings before they use them.
 const COMMANDS: [&str; 5] = ["config check", "model modes", "margins", "chirp", "control"];
 
 fn bench_config() -> PathBuf {

@@ -2,8 +2,8 @@
 use crate::COMMANDS;
 use crate::program::Bench;
 
-/// Every command refuses the file, with all of the words, and leaves nothing behind.
-fn refused_file(text: &str, words: &[&str]) {
+/// Asserts that every command rejects the file with all of the words, and creates no file.
+fn assert_file_rejected(text: &str, words: &[&str]) {
     for command in COMMANDS {
         let bench = Bench::new();
         bench.write("mine.toml", text);
@@ -14,8 +14,8 @@ fn refused_file(text: &str, words: &[&str]) {
     }
 }
 
-/// Every command refuses the setting, with all of the words, and leaves nothing behind.
-fn refused_set(set: &str, words: &[&str]) {
+/// Asserts that every command rejects the setting with all of the words, and creates no file.
+fn assert_set_rejected(set: &str, words: &[&str]) {
     for command in COMMANDS {
         let bench = Bench::new();
         let arguments = command.split(' ').chain(["--set", set, "--json"]);
@@ -28,7 +28,7 @@ fn refused_set(set: &str, words: &[&str]) {
 
 #[test]
 fn rejects_unknown_key_with_line_and_nearest_name() {
-    refused_file(
+    assert_file_rejected(
         "[plant]\nmass_asymetry = 0.1\n",
         &[
             "mine.toml line 2",
@@ -36,15 +36,15 @@ fn rejects_unknown_key_with_line_and_nearest_name() {
             "`mass_asymmetry`",
         ],
     );
-    refused_file(
+    assert_file_rejected(
         "\n[interlok]\nsoft_limit_m = 1e-4\n",
         &["mine.toml line 2", "`interlok`", "`interlock`"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.mass_asymetry=0.1",
         &["`plant.mass_asymetry`", "`mass_asymmetry`"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.damping.ratoi=0.1",
         &["`plant.damping.ratoi`", "nearest is"],
     );
@@ -53,14 +53,14 @@ fn rejects_unknown_key_with_line_and_nearest_name() {
 #[test]
 fn rejects_measured_damping_ratios_without_positive_damping() {
     let second = "plant.damping.second.omega_rad_s";
-    // Two ratios at one frequency: the equations of the two Rayleigh coefficients have no solution.
-    refused_set(
+    // Two ratios at the same frequency: the equations of the two Rayleigh coefficients have no solution.
+    assert_set_rejected(
         &format!("{second}=179"),
         &["plant.damping.second.omega_rad_s", "179 rad/s", "uniform"],
     );
     // Negative damping below z1 w1/w2 = 0.009 x 179/520 or above z1 w2/w1 = 0.009 x 520/179.
     for ratio in ["0.003", "0.03"] {
-        refused_set(
+        assert_set_rejected(
             &format!("plant.damping.second.ratio={ratio}"),
             &["179 rad/s", "520 rad/s", ratio, "3.0981e-3", "2.6145e-2"],
         );
@@ -76,7 +76,7 @@ fn rejects_measured_damping_ratios_without_positive_damping() {
 
 #[test]
 fn rejects_wrong_type_with_value_and_expected_type() {
-    refused_file(
+    assert_file_rejected(
         "[loop]\nrate_hz = true\n",
         &[
             "mine.toml line 2",
@@ -85,7 +85,7 @@ fn rejects_wrong_type_with_value_and_expected_type() {
             "a number is expected",
         ],
     );
-    refused_file(
+    assert_file_rejected(
         "title = 3\n",
         &[
             "mine.toml line 1",
@@ -94,15 +94,15 @@ fn rejects_wrong_type_with_value_and_expected_type() {
             "a string is expected",
         ],
     );
-    refused_set(
+    assert_set_rejected(
         "loop.computing_delay_periods=1.5",
         &["is 1.5", "an integer is expected"],
     );
-    refused_set(
+    assert_set_rejected(
         "chirp.amplitude=3",
         &["`chirp.amplitude`", "is 3", "an array is expected"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.mass_asymmetry=yes",
         &["\"yes\"", "a number is expected"],
     );
@@ -110,7 +110,7 @@ fn rejects_wrong_type_with_value_and_expected_type() {
 
 #[test]
 fn rejects_unit_in_file_and_suggests_si_value() {
-    refused_file(
+    assert_file_rejected(
         "[plant]\noperating_point_m = \"3.8mm\"\n",
         &["mine.toml line 2", "\"3.8mm\"", "SI units", "write 0.0038"],
     );
@@ -118,15 +118,15 @@ fn rejects_unit_in_file_and_suggests_si_value() {
 
 #[test]
 fn rejects_unit_of_another_quantity() {
-    refused_set(
+    assert_set_rejected(
         "plant.operating_point_m=4s",
         &["`4s` is a time in s", "50um"],
     );
-    refused_set(
+    assert_set_rejected(
         "interlock.soft_limit_m=4%",
         &["`4%` is a percentage", "a length"],
     );
-    refused_set(
+    assert_set_rejected(
         "loop.rate_hz=5mm",
         &["`loop.rate_hz`", "`5mm` is a length in m"],
     );
@@ -134,24 +134,24 @@ fn rejects_unit_of_another_quantity() {
 
 #[test]
 fn rejects_value_out_of_range_with_limits() {
-    refused_file(
+    assert_file_rejected(
         "[loop]\nrate_hz = 0\n",
         &["mine.toml line 2", "`loop.rate_hz` is 0", "1 to 100000"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.motion_stage_mass_kg=-1",
         &["`plant.motion_stage_mass_kg` is -1", "0.000001 to 1000"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.mass_asymmetry=nan",
         &["`plant.mass_asymmetry` is NaN", "-0.9 to 9"],
     );
-    refused_set("plant.mass_asymmetry=inf", &["is inf", "-0.9 to 9"]);
-    refused_set("chirp.amplitude=[]", &["has 0 entries", "1 to 64"]);
+    assert_set_rejected("plant.mass_asymmetry=inf", &["is inf", "-0.9 to 9"]);
+    assert_set_rejected("chirp.amplitude=[]", &["has 0 entries", "1 to 64"]);
 }
 
-/// What concerns the excitation alone stands in the way of a chirp and of a full check, and of nothing else.
-fn refused_chirp(set: &str, words: &[&str]) {
+/// Asserts that `chirp` and `config check` reject a setting of the excitation, and that `margins` accepts it.
+fn assert_chirp_rejected(set: &str, words: &[&str]) {
     for command in ["chirp", "config check"] {
         let bench = Bench::new();
         bench
@@ -160,28 +160,32 @@ fn refused_chirp(set: &str, words: &[&str]) {
         assert_eq!(bench.files(), [""; 0], "bench {command}");
     }
     let answer = Bench::new().run_with(["margins", "--set", set]);
-    assert_eq!(answer.code, 0, "margins know no chirp: {}", answer.err);
+    assert_eq!(
+        answer.code, 0,
+        "margins do not depend on the chirp: {}",
+        answer.err
+    );
 }
 
 #[test]
 fn rejects_conflicting_settings_with_both_values() {
-    refused_chirp(
+    assert_chirp_rejected(
         "chirp.stop_hz=2500",
         &["`chirp.stop_hz`", "2500 Hz", "half the servo rate"],
     );
-    refused_chirp(
+    assert_chirp_rejected(
         "loop.rate_hz=1000",
         &["`chirp.stop_hz`", "500 Hz", "half the servo rate"],
     );
-    refused_chirp(
+    assert_chirp_rejected(
         "chirp.stop_hz=0.1",
         &["`chirp.stop_hz` is 0.1 Hz", "starts at 0.1 Hz"],
     );
-    refused_set(
+    assert_set_rejected(
         "interlock.soft_limit_m=0.001",
         &["`interlock.soft_limit_m`", "0.001 m", "inside the stop"],
     );
-    refused_file(
+    assert_file_rejected(
         "[interlock]\nsoft_limit_m = 0.0009\n[probe]\nrange_m = 0.0017\n",
         &[
             "mine.toml line 2: `interlock.soft_limit_m`",
@@ -190,16 +194,16 @@ fn rejects_conflicting_settings_with_both_values() {
             "probe.range_m",
         ],
     );
-    refused_set("motor.continuous_force_n=112", &["112 N", "111 N"]);
-    refused_chirp(
+    assert_set_rejected("motor.continuous_force_n=112", &["112 N", "111 N"]);
+    assert_chirp_rejected(
         "chirp.duration_s=5.4",
         &["`chirp.duration_s`", "5.4 s", "5.5 s"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.operating_point_m=-0.05",
         &["`plant.operating_point_m`", "-0.05 m", "0.0475 m"],
     );
-    refused_chirp(
+    assert_chirp_rejected(
         "chirp.duration_s=4000",
         &[
             "`chirp.duration_s`",
@@ -209,7 +213,7 @@ fn rejects_conflicting_settings_with_both_values() {
             "shorten",
         ],
     );
-    refused_set(
+    assert_set_rejected(
         "interlock.probe_stale_s=1e-4",
         &[
             "`interlock.probe_stale_s`",
@@ -239,11 +243,11 @@ fn accepts_settings_just_inside_the_limits() {
 
 #[test]
 fn rejects_unknown_kind_and_lists_valid_kinds() {
-    refused_file(
+    assert_file_rejected(
         "[plant]\nmodel = \"sr5dof\"\n",
         &["mine.toml line 2", "`plant.model`", "\"sr5dof\"", "sr4dof"],
     );
-    refused_set(
+    assert_set_rejected(
         "plant.damping.kind=foo",
         &[
             "`plant.damping.kind`",
@@ -251,27 +255,27 @@ fn rejects_unknown_kind_and_lists_valid_kinds() {
             "measured, rayleigh, uniform",
         ],
     );
-    refused_set("chirp.sweep=up", &["`chirp.sweep`", "linear, logarithmic"]);
-    refused_set(
+    assert_set_rejected("chirp.sweep=up", &["`chirp.sweep`", "linear, logarithmic"]);
+    assert_set_rejected(
         "control.reference.kind=foo",
         &["hold, step, ramp, sine, chirp, file"],
     );
-    refused_set("plant=3", &["`plant.model` is missing", "sr4dof"]);
+    assert_set_rejected("plant=3", &["`plant.model` is missing", "sr4dof"]);
 }
 
 #[test]
 fn missing_key_is_reported_at_line_of_its_table() {
     let file = "title = \"x\"\n[plant.damping]\nkind = \"uniform\"\n";
-    refused_file(
+    assert_file_rejected(
         file,
         &["mine.toml line 2", "`plant.damping.ratio` is missing"],
     );
-    refused_set(
+    assert_set_rejected(
         "control.reference.kind=ramp",
         &["  --set: `control.reference.speed_m_per_s` is missing"],
     );
-    // The list takes the place of the profile's: it is the one that lacks the key.
-    refused_set(
+    // The list replaces that of the profile, so the key is missing in `--set`.
+    assert_set_rejected(
         "sim.unmodelled=[{frequency_hz=200}]",
         &["  --set: `sim.unmodelled.0.damping_ratio` is missing"],
     );
@@ -280,7 +284,7 @@ fn missing_key_is_reported_at_line_of_its_table() {
 #[test]
 fn reports_all_errors_together() {
     let text = "[plant]\nmass_asymmetry = \"10%\"\n[loop]\nrate_hz = 0\n[plat]\n";
-    refused_file(
+    assert_file_rejected(
         text,
         &[
             "line 2: `plant.mass_asymmetry`",
@@ -292,11 +296,11 @@ fn reports_all_errors_together() {
 
 #[test]
 fn rejects_invalid_toml_with_line_and_column() {
-    refused_file("[plant]\nmodel = [\n", &["mine.toml", "line 2, column 10"]);
-    refused_file("[plant\n", &["mine.toml", "line 1, column 7"]);
-    refused_set("no equals sign", &["no equals sign", "KEY=VALUE"]);
-    refused_set("=3", &["empty part"]);
-    refused_set("plant..model=3", &["plant..model", "empty part"]);
+    assert_file_rejected("[plant]\nmodel = [\n", &["mine.toml", "line 2, column 10"]);
+    assert_file_rejected("[plant\n", &["mine.toml", "line 1, column 7"]);
+    assert_set_rejected("no equals sign", &["no equals sign", "KEY=VALUE"]);
+    assert_set_rejected("=3", &["empty part"]);
+    assert_set_rejected("plant..model=3", &["plant..model", "empty part"]);
 }
 
 #[test]

@@ -48,10 +48,10 @@ fn json_schema_accepts_and_rejects_as_the_program_does() {
     let mut unknown = documents[0].clone();
     unknown["plant"]["mass_asymetry"] = json!(0.1);
     documents.push(unknown);
-    let Some(findings) = validated(&bench.run("config schema").json(), &documents) else {
+    let Some(errors) = validated(&bench.run("config schema").json(), &documents) else {
         return;
     };
-    for (index, found) in findings.iter().enumerate() {
+    for (index, found) in errors.iter().enumerate() {
         assert_eq!(
             found.as_array().expect("a list").is_empty(),
             index < good,
@@ -60,7 +60,7 @@ fn json_schema_accepts_and_rejects_as_the_program_does() {
     }
 }
 
-/// What Python's `jsonschema` finds in each document; `None`, and why on standard error, where it is not there.
+/// The errors of Python's `jsonschema` in each document. Without the package: `None`, with the reason on standard error.
 fn validated(schema: &Value, documents: &[Value]) -> Option<Vec<Value>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python)

@@ -87,7 +87,7 @@ impl Device {
     }
 
     fn signal(&mut self, signal: i32) {
-        // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
+        // SAFETY: a child of ours that was not waited for yet, so its id is not reused.
         let result = unsafe { libc::kill(self.child().id() as libc::pid_t, signal) };
         assert_eq!(result, 0);
     }

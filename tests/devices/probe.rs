@@ -38,7 +38,7 @@ fn ascii(folder: &std::path::Path) -> String {
 
 /// The profile `lab` with a slow loop and long time limits.
 fn config(folder: &std::path::Path, stale_s: f64) -> Config {
-    // A test of one interlock must not reach the other one.
+    // The test of one interlock must not trigger the other one.
     let stuck_s = if stale_s < LONG_STALE_S {
         2.0 * stale_s
     } else {
@@ -102,7 +102,7 @@ impl CurrentAmplifier for IdealAmplifier {
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         assert!(
             self.is_on,
-            "the loop commands an amplifier that it has switched off"
+            "the loop commands an amplifier that is switched off"
         );
         self.set_current(current_a);
         Ok(current_a)
@@ -271,7 +271,7 @@ impl ProbeRig {
         }
     }
 
-    /// An operator who has not noticed the fault goes on to the next state, in which current would flow.
+    /// Requests the next states up to a run, as an operator who has not noticed the fault.
     fn continue_to_run(&mut self, state: LoopState) {
         if state == LoopState::Disarmed {
             self.bench.request(Request::Arm);
@@ -288,7 +288,7 @@ impl ProbeRig {
         f64::from_bits(self.current_a.load(Ordering::Relaxed))
     }
 
-    /// Waits for the trip, and proves what it promises.
+    /// Waits for the trip and checks its effect.
     fn assert_trips(&mut self, reason: &str) {
         for _ in 0..TICKS {
             self.tick();
@@ -324,11 +324,11 @@ impl ProbeRig {
         self.bench.assert_recording_complete(trip.tick, reason);
     }
 
-    /// The cause is removed, the operator clears the trip, and the next run continues without a trip.
+    /// Removes the fault, clears the trip, and asserts that the next run has no trip.
     fn assert_next_run_has_no_trip(&mut self) {
         self.inject("probe.none");
         self.pace = Pace::Readings;
-        self.run(50); // of these the first may be of the time before
+        self.run(50); // the first readings may be from before the end of the fault
         if self.bench.state() == State::Tripped {
             self.bench.request(Request::Clear);
             self.run(1);
@@ -338,7 +338,10 @@ impl ProbeRig {
 
     fn assert_run_has_no_trip(&mut self) {
         let trips = self.bench.trips().len();
-        assert!(!self.bench.amplifier_is_on(), "cleared is not armed");
+        assert!(
+            !self.bench.amplifier_is_on(),
+            "the amplifier is off after clear"
+        );
         self.enter(LoopState::Control);
         self.run(50);
         assert_eq!(
@@ -372,7 +375,7 @@ const STALE_S: f64 = 3.0;
 const LONG_STALE_S: f64 = 10.0;
 /// A delay longer than the permitted age of a reading.
 const LATE_ANSWERS: &str = "probe.late=9s";
-/// Not a fault of the probe: its cable.
+/// Not a fault of the probe but of its cable.
 const TERMINAL_CLOSED: &str = "the terminal is closed";
 
 /// Runs the test in each state, concurrently because it mostly waits.
@@ -443,7 +446,7 @@ fn probe_restart_causes_no_trip() {
         rig.run(50);
         assert_eq!(rig.bench.trips(), []);
         let damaged = rig.statistics.statistics().damaged_bytes;
-        assert!(damaged > 0, "the line that it was in is cut off");
+        assert!(damaged > 0, "the line at the restart is truncated");
         rig.continue_to_run(state);
         rig.run(50);
         assert_eq!(

@@ -41,7 +41,7 @@ fn problems(report: &Report) -> Vec<&Finding> {
         .collect()
 }
 
-/// All frames that were sent on the bus of a host, with an listener that was there before.
+/// All frames on the bus, received at an endpoint opened beforehand.
 fn received_frames(listener: &mut dyn CanBus) -> Vec<CanFrame> {
     let next = || listener.receive(Duration::ZERO).unwrap();
     let frames = std::iter::from_fn(next).map(|event| match event {
@@ -66,7 +66,7 @@ fn healthy_drive_is_ok_and_examined_by_uploads_only() {
     assert_eq!(
         format!("{:?}", device.objects()),
         objects,
-        "no object was written"
+        "an object was written"
     );
     assert_eq!(
         (device.power_state(), device.nmt_state()),
@@ -87,7 +87,7 @@ fn running_drive_is_not_changed() {
     bench_hal::CurrentAmplifier::enable(&mut drive).unwrap();
     bench_hal::CurrentAmplifier::command(&mut drive, 0.0).unwrap();
     let mut report = Report::default();
-    // A bus in memory knows no claims: this is how a drive of another program looks.
+    // A bus in memory has no claims, so this drive looks like one of another program without a claim.
     examine_canopen_drive(&host, &DriveSettings::default(), 1.5, &mut report);
     assert!(
         report
@@ -119,7 +119,7 @@ fn drive_fault_is_a_failure_with_the_emergency_text() {
     assert_eq!(
         device.lock().unwrap().power_state(),
         State::Fault,
-        "nobody acknowledged it"
+        "the examination must not clear the fault"
     );
 }
 
@@ -183,11 +183,11 @@ fn stopped_node_is_recognised_by_its_heartbeat() {
     assert_eq!(
         device.lock().unwrap().nmt_state(),
         nmt::State::Stopped,
-        "it was left as it was"
+        "the examination must not change the NMT state"
     );
 }
 
-/// A host in which another process has every node.
+/// A host in which another process holds every node.
 struct OccupiedHost(SimulatedHost);
 
 impl Port for OccupiedHost {

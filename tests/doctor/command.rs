@@ -1,13 +1,13 @@
-//! The command: exit codes, text and JSON.
+//! `bench doctor`: exit codes, text and JSON.
 
 use serde_json::Value;
 
 use crate::program::{Answer, Bench};
 
-/// So many ticks may be missed here: what is tested is not this machine's timing.
+/// No effective limit of missed ticks: the timing of the machine is not tested.
 const NO_TIMING_LIMIT: &str = "--set interlock.overruns_per_s=1000000";
 
-/// Asserts the shape of the JSON object and that its parts agree, and returns it.
+/// Checks structure and consistency of the JSON object, and returns it.
 pub fn checked_report(answer: &Answer) -> Value {
     let report = answer.json();
     let findings = report["findings"].as_array().expect("a list of findings");

@@ -1,8 +1,8 @@
-//! `bench doctor` from outside, and on a bus in memory: what it finds, what it says, and that nothing moves.
+//! `bench doctor` as a process, and its CAN examination on a bus in memory: findings, output, and no motion.
 
 use bench_test_support::program;
 #[path = "../../hal/tests/serial/support/rehearsal.rs"]
-#[allow(dead_code, reason = "this test binary takes what it needs")]
+#[allow(dead_code, reason = "this test binary uses a part of it")]
 mod rehearsal;
 
 mod can;

@@ -1,4 +1,4 @@
-//! The port of the probe: emulated probes on pseudo terminals, examined by the program.
+//! `bench doctor` with emulated probes on pseudo terminals.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::command::{checked_report, findings_on};
 use crate::program::{Bench, number};
 use crate::rehearsal::Rehearsal;
 
-/// The lab's capaNCDT, with limits that a busy machine does not meet: what is tested is not its timing.
+/// The profile `lab` with time limits that a loaded machine does not reach: timing is not tested.
 const NO_TIMING_LIMIT: [&str; 3] = [
     "interlock.overruns_per_s=1000000",
     "interlock.probe_stale_s=10",
@@ -46,7 +46,7 @@ fn protocol() -> Arc<dyn Protocol> {
     config(vec![]).probe.device.serial().unwrap().protocol
 }
 
-/// A probe that makes 650 readings a second of a stage 10 um beside its zero, which is the middle of the range of 2 mm.
+/// A probe with 650 readings per second. The stage is 10 um from zero, which is the middle of the range of 2 mm.
 fn rehearsal() -> Rehearsal {
     Rehearsal::new(&protocol(), 650.0, |_| 1.01e-3)
 }

@@ -1,4 +1,4 @@
-//! The chain by its closed form: the sum over the aliases that sampling makes.
+//! Closed form of the sampled signal chain: the sum over its aliases.
 //!
 //! With s_k = j (w + 2 pi k/T), G(w) = sum over k of P(s_k) (1 - exp(-s_k T))/(s_k T) exp(-s_k d), where P is motor, amplifier and
 //! modes and d the delay; a free-running probe multiplies each term by (1 - exp(-s_k Tp))/(s_k Tp).
@@ -26,7 +26,7 @@ fn hold(s: Complex<f64>, span_s: f64) -> Complex<f64> {
     (Complex::new(1.0, 0.0) - (-s * span_s).exp()) / (s * span_s)
 }
 
-/// The response in metres per ampere; `with_mean_age` leaves out the roll-off of the probe's rate.
+/// The response in metres per ampere; `with_mean_age` omits the roll-off by the rate of the probe.
 pub fn response(
     config: &Config,
     modes: &[Mode],

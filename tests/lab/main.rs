@@ -1,4 +1,4 @@
-//! The profile `lab`: rates and delays of real devices, in the margins and in what is measured.
+//! The profile `lab`: rates and delays of real devices, in the margins and in measured responses.
 mod aliases;
 mod margins;
 mod measured;

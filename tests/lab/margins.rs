@@ -1,4 +1,4 @@
-//! Margins at 1 kHz with a slow probe, and who is refused there.
+//! Margins at 1 kHz with a slow probe, and rejected configurations.
 use std::path::Path;
 
 use assert_cmd::Command;
@@ -48,7 +48,7 @@ fn margins_of_the_slow_controller_match_the_closed_form() {
         .map(|k| (open(f64::from(k) * 0.1) + 1.0).norm())
         .fold(f64::INFINITY, f64::min);
     let modulus_margin = ours["modulus_margin"].as_f64().expect("a number");
-    // A grid of 0.1 rad/s against mode R of 184 x 0.009 = 1.7 rad/s half-width: (0.05/1.7)^2/2 of a dip at worst.
+    // The grid is 0.1 rad/s, the half-width of mode R is 184 x 0.009 = 1.7 rad/s: the relative error is at most (0.05/1.7)^2/2.
     assert!(
         (modulus_margin / closest - 1.0).abs() < 2e-3,
         "{modulus_margin} for {closest}"
@@ -88,14 +88,14 @@ fn each_delay_reduces_the_phase_margin_and_the_sum_is_reported() {
     ] {
         let (deg, _, later_s) = phase(&["--set", set]);
         assert!((later_s - delay_s - 0.002).abs() < 1e-12, "{set}");
-        // 2 ms at the crossover, which moves by less than a percent.
+        // 2 ms at the crossover frequency, which changes by less than 1 %.
         let cost_deg = (crossover_rad_s * 0.002).to_degrees();
         assert!(
             (base_deg - deg - cost_deg).abs() < 0.02 * cost_deg + 0.02,
             "{set}: {deg} from {base_deg}"
         );
     }
-    // Half the probe's rate: half a period, 0.77 ms, more.
+    // At half the rate of the probe the mean age increases by half a period, 0.77 ms.
     let (deg, _, _) = phase(&["--set", "probe.rate_hz=325"]);
     assert!(
         (base_deg - deg - (crossover_rad_s * 0.5 / 650.0).to_degrees()).abs() < 0.05,
@@ -130,7 +130,7 @@ fn rejects_controller_below_the_modulus_margin_limit() {
     }
     assert!(
         !folder.path().join("recordings").exists(),
-        "nothing was begun"
+        "no recording is created"
     );
     for chosen in [&["--slow"][..], &[]] {
         let (code, report, errors) = control(chosen);
@@ -146,7 +146,7 @@ fn rejects_controller_below_the_modulus_margin_limit() {
         code == 2 && errors.contains("0.69") && errors.contains("0.75"),
         "{errors}"
     );
-    // Who knows better is let through, and the interlocks stand below.
+    // With min_modulus_margin = 0 the run starts; the interlocks still trip.
     let (code, report, _) = control(&["--fast", "--set", "control.min_modulus_margin=0"]);
     assert_eq!((code, report["outcome"].as_str()), (1, Some("tripped")));
 }

@@ -19,8 +19,7 @@ fn measured(config: &Config, assumed: &Config) -> Analysis {
     simulated::analysed(&Plan::chirp(config.clone()), assumed).expect("an analysis")
 }
 
-/// Ratios of measured to exact response, between two frequencies; around the zeros, where little answers, the error is
-/// taken against the static compliance instead.
+/// Ratios of the measured to the exact response between two frequencies.
 fn ratios(
     analysis: &Analysis,
     config: &Config,
@@ -53,8 +52,8 @@ fn slow_free_running_probe_does_not_bias_the_response() {
     );
     let all = ratios(&analysis, &config, &modes, (0.5, 140.0));
     assert!(all.len() > 1000);
-    // A step of the current is 2 mA of 0.1 to 1.5 A: half a percent of a bin's noise. Taken as of one age, the readings would
-    // be off by a third.
+    // A current step of 2 mA of 0.1 to 1.5 A gives 0.5 % of noise in a bin. With a constant age for all readings the error would
+    // be about 30 %.
     assert!(
         share_beyond(&all, 1.0, 1.0) < 0.01,
         "{}",
@@ -79,8 +78,8 @@ fn phase_gives_the_delay_of_amplifier_or_probe() {
         let mut assumed = lab(&QUIET);
         assumed.amplifier.latency_s = 0.0004;
         let analysis = measured(&config, &assumed);
-        let beyond = analysis.excess_delay.expect("enough frequencies");
-        // Modes that the model leaves out turn the phase by 0.1 degree at 100 Hz: 3 us.
-        assert!((beyond.value - extra_s).abs() < 6e-6, "{set}: {beyond:?}");
+        let excess = analysis.excess_delay.expect("enough frequencies");
+        // The unmodelled modes shift the phase by 0.1 degree at 100 Hz, that is 3 us.
+        assert!((excess.value - extra_s).abs() < 6e-6, "{set}: {excess:?}");
     }
 }

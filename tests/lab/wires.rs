@@ -1,4 +1,4 @@
-//! A chirp over wires: commands that go out at times that differ from tick to tick, readings of any age.
+//! A chirp with transmission delays: the time of a command varies from tick to tick, and so does the age of a reading.
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -14,10 +14,10 @@ use bench_hal::Validity;
 
 use crate::aliases::{lab, response};
 
-/// From a tick to the moment it is served, in seconds.
+/// Time from a scheduled tick to its start, in seconds.
 const WOKE_S: f64 = 10e-6;
 
-/// Numbers from 0 to 1, the same ones each time.
+/// Repeatable random numbers from 0 to 1.
 fn random(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed
@@ -27,19 +27,19 @@ fn random(mut seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// What the two ends of the wires do to time.
+/// Delays of commands and readings.
 struct Wires {
-    /// From a tick to its command, in seconds, and how much that varies.
+    /// Time from a tick to its command, and its variation, in seconds.
     command_s: (f64, f64),
-    /// From one measurement to the next, and when the first one is, in seconds.
+    /// Period of the measurements, and time of the first one, in seconds.
     probe_s: (f64, f64),
-    /// From a measurement to its arrival, in seconds, and how much that varies.
+    /// Time from a measurement to its arrival, and its variation, in seconds.
     arrival_s: (f64, f64),
-    /// How long the first tick takes: the amplifier is enabled in it, and the schedule begins anew after it.
+    /// Duration of the first tick in seconds: it enables the amplifier, and the schedule restarts after it.
     enabling_s: f64,
 }
 
-/// The run of a chirp over `wires`, recorded as the loop would; and the mean age of its readings in seconds.
+/// A chirp over `wires`, recorded as by the loop, and the mean age of its readings in seconds.
 fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
     let mut stage = LiveStage::new(config).expect("a stage");
     let (chirp, period_s) = (
@@ -63,7 +63,7 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
     )
     .expect("a new file");
     let (mut random, mut ages_s) = (random(5), 0.0);
-    // The stage's clock begins a second before the loop's.
+    // The clock of the stage starts 1 s before that of the loop.
     let begin_s = 1.0;
     for tick in 0..chirp.ticks() {
         let scheduled_s = tick as f64 * period_s;
@@ -109,15 +109,15 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
     )
 }
 
-/// Largest distances in percent and degrees from the closed form of the chain with the mean delays, 0.5 to 120 Hz, and the
-/// share of frequencies beyond one of either.
+/// Largest deviations in percent and degrees from the closed form with the mean delays, 0.5 to 120 Hz, and the share of
+/// frequencies with a deviation above 1 % or 1 degree.
 fn deviation(config: &Config, wires: &Wires) -> (f64, f64, f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (recording, age_s) = recorded(config, wires, folder.path());
     let analysis = analyse(&recording, config).expect("an analysis");
     let mut mean = config.clone();
     mean.amplifier.latency_s = wires.command_s.0 + 0.5 * wires.command_s.1;
-    // Readings are taken when the tick is served.
+    // Readings are taken at the start of the tick.
     (
         mean.probe.rate_hz,
         mean.probe.latency_s,
@@ -125,7 +125,7 @@ fn deviation(config: &Config, wires: &Wires) -> (f64, f64, f64) {
     ) = (None, age_s - WOKE_S, 0.0);
     let modes: Vec<Mode> = simulated::modes(&config.plant, &config.sim).expect("modes");
     let points = analysis.frf.frequency_hz.iter().zip(&analysis.frf.response);
-    // Around a resonance the estimator's own resolution counts, whatever the wires do.
+    // Around a resonance the resolution of the estimator dominates, so these bands are left out.
     let narrow = [(27.0, 32.0), (80.0, 88.0)];
     let inside = |f: f64| {
         (0.5..120.0).contains(&f) && !narrow.iter().any(|(low, high)| (*low..*high).contains(&f))
@@ -165,7 +165,7 @@ fn quiet(more: &[&str]) -> Config {
     lab(&[&sets[..], more].concat())
 }
 
-/// How far a run may be off: percent, degrees, and the share of its frequencies beyond one of either.
+/// Permitted deviation: percent, degrees, and the share of frequencies above 1 % or 1 degree.
 struct Bound(f64, f64, f64);
 
 fn assert_within(wires: &Wires, bound: &Bound) {
@@ -183,7 +183,7 @@ const STEADY: Wires = Wires {
     enabling_s: 0.0,
 };
 
-// The estimator by itself: a chirp of 24 s resolves the slopes of the resonances to 0.2 %.
+// Deviation of the estimator alone: a chirp of 24 s resolves the slopes of the resonances to 0.2 %.
 const ESTIMATOR_ALONE: Bound = Bound(0.3, 0.05, 0.0);
 
 #[test]
@@ -204,7 +204,7 @@ fn slow_enable_in_the_first_tick_has_no_effect() {
 
 #[test]
 fn varying_arrival_around_the_tick_has_no_effect() {
-    // Now and then the reading of a millisecond earlier is the newest: 36 degrees at 100 Hz.
+    // In some ticks the newest reading is 1 ms older: 36 degrees at 100 Hz.
     assert_within(
         &Wires {
             probe_s: (1e-3, 1.1e-4),
@@ -215,13 +215,13 @@ fn varying_arrival_around_the_tick_has_no_effect() {
     );
 }
 
-// What is held at 500 Hz has an image of 100 Hz at 400 Hz, a quarter as high, of which the stage shows a sixteenth: 1.6 %
-// that sampling at one age folds back as the closed form says, and sampling at ages of all kinds spreads as noise. The
-// average over a neighbourhood of 16 bins leaves a part of it, most where little answers, at the zero near 112 Hz.
+// A signal of 100 Hz held at 500 Hz has an image at 400 Hz with 1/4 of its amplitude; the stage attenuates it by 16, to 1.6 %.
+// With a constant age sampling folds the image back as in the closed form. With varying ages it becomes noise. The average over
+// 16 bins leaves a part of this noise, mainly at the zero near 112 Hz, where the response is small.
 
 #[test]
 fn command_jitter_of_a_fifth_of_a_period_is_corrected() {
-    // Taken at the ticks they would be off by 40 % and 25 degrees.
+    // Without the correction the deviation would be 40 % and 25 degrees.
     assert_within(
         &Wires {
             command_s: (4e-5, 4e-4),
@@ -244,7 +244,7 @@ fn varying_age_of_a_fast_free_running_probe_is_corrected() {
 
 #[test]
 fn varying_age_of_a_slow_free_running_probe_is_corrected() {
-    // Ages of 1.3 to 2.9 ms: taken as of one age, 29 degrees at 100 Hz.
+    // Ages of 1.3 to 2.9 ms: with a constant age the deviation would be 29 degrees at 100 Hz.
     let probe = Wires {
         command_s: (4e-5, 2e-5),
         probe_s: (1.54e-3 * 0.999_37, 0.0),

@@ -254,7 +254,7 @@ fn full_output_device_causes_no_panic() {
 #[test]
 fn calibrate_and_linearity_print_the_plan_before_the_first_run() {
     let bench = Bench::new();
-    // A file in place of the folder: the run cannot begin.
+    // A file instead of the folder prevents the run.
     std::fs::write(bench.path("taken"), "").expect("a file");
     for (command, words) in [
         (

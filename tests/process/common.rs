@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 use bench::recording::Recording;
 use bench::rt::record::TickRecord;
 
-/// Largest time that a test waits for an event. It only prevents endless waiting; it is no requirement.
+/// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(120);
 
-/// More late ticks are allowed than a loaded machine has: timing is not tested here.
+/// No effective limit of missed ticks: timing is not tested.
 pub const NO_OVERRUN_LIMIT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
 /// The chirp's last frequency must lie below half the rate in any configuration.
 pub const AT_1_KHZ: [&str; 6] = [
@@ -112,7 +112,7 @@ impl Running {
             .expect("a child of ours")
             .is_none()
         {
-            assert!(Instant::now() < deadline, "it goes on and on");
+            assert!(Instant::now() < deadline, "the program does not end");
             std::thread::sleep(Duration::from_millis(20));
         }
     }

@@ -40,7 +40,7 @@ fn disk_full_stops_the_run_and_keeps_the_written_part() {
         let path = recording_in(folder.path());
         assert!(
             message.contains(path.to_str().expect("text")) && message.contains("File too large"),
-            "what and where: {message}"
+            "reason and file: {message}"
         );
         assert!(message.contains("bench recover"), "the remedy: {message}");
         assert!(
@@ -109,7 +109,7 @@ fn unwritable_folder_is_reported_before_any_motion() {
     // No user, not even root, can create a file in /proc.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");
-    std::fs::write(&file, "in the way").expect("a file");
+    std::fs::write(&file, "a file instead of a folder").expect("a file");
     for out in [
         Path::new("/proc"),
         Path::new("/proc/recordings"),
@@ -141,6 +141,6 @@ fn unwritable_folder_is_reported_before_any_motion() {
     }
     assert_eq!(
         std::fs::read_to_string(&file).expect("still there"),
-        "in the way"
+        "a file instead of a folder"
     );
 }

@@ -30,7 +30,7 @@ fn killed_run_is_recovered_except_for_the_last_second() {
         );
         assert!(
             report["cut"].is_object(),
-            "it says where the file ends: {report}"
+            "the end of the file is reported: {report}"
         );
         assert_eq!(
             std::fs::read(&path).expect("still there"),
@@ -42,8 +42,8 @@ fn killed_run_is_recovered_except_for_the_last_second() {
             .expect("whole again");
         assert!(!recovered.truncated());
         assert_eq!(report["ticks"].as_u64(), Some(recovered.tick_count()));
-        // At the kill the loop had slept so often, once for each tick at the most: at least as many ticks had begun (some
-        // ten sleeps are of its start). Half a second is on its way to a chunk, half a second is in the open chunk.
+        // The loop sleeps at most once per tick, and about ten times at its start, so at least `begun` ticks had begun at the
+        // kill. Up to 0.5 s of ticks are on the way to the recorder, and up to 0.5 s are in the open chunk.
         let begun = sleeps - 10;
         assert!(
             recovered.last_tick() + RATE_HZ >= begun,
@@ -58,7 +58,7 @@ fn killed_run_is_recovered_except_for_the_last_second() {
         assert_eq!(
             replay.status.code(),
             Some(0),
-            "what is left replays: {}",
+            "the readable part replays: {}",
             stderr(&replay)
         );
     }

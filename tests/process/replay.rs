@@ -30,7 +30,7 @@ fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     .concat();
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
-    // The process is paused for at least 50 ms: some fifty ticks at 1 kHz are not served.
+    // The process is paused for about 50 ms: about 50 ticks at 1 kHz are missed.
     running.signal(libc::SIGSTOP);
     std::thread::sleep(Duration::from_millis(50));
     running.signal(libc::SIGCONT);

@@ -30,7 +30,7 @@ fn stopped_by(signal: i32, what: &str) {
     let results: serde_json::Value = serde_json::from_slice(&results.data).expect("JSON");
     assert_eq!(
         results, report,
-        "the recording says what the program report"
+        "the recording has the results of the program"
     );
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
@@ -38,7 +38,7 @@ fn stopped_by(signal: i32, what: &str) {
         .events()
         .iter()
         .find(|e| e.kind == EventKind::Request(RequestKind::Stop))
-        .expect("an order");
+        .expect("a stop request");
     let off = EventKind::State {
         from: State::Running,
         to: State::Disarmed,
@@ -56,11 +56,11 @@ fn stopped_by(signal: i32, what: &str) {
         ticks.into_iter().partition(|r| r.tick < stop.tick);
     assert!(
         before.iter().any(|record| record.command_a != 0.0),
-        "there was a current to stop"
+        "a current flowed before the stop"
     );
     assert!(
         after.iter().all(|record| record.command_a.to_bits() == 0),
-        "none from the order's tick on"
+        "no current from the tick of the request on"
     );
     // A tenth of a second is recorded after the stop, including late ticks.
     let after_stop = recording.last_tick() - stop.tick;

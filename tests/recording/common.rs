@@ -1,4 +1,4 @@
-//! Runs to record, and short ways to write and read them.
+//! Synthetic runs, and functions that write and read them.
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,8 +25,8 @@ pub fn header() -> Header {
     }
 }
 
-/// A tick as the simulator gives it: a moving stage, a noisy probe, a command; all from the number, so every run is the
-/// same.
+/// A tick similar to one of the simulator: a moving stage, a noisy probe, a command. All values are functions of the number,
+/// so every run is the same.
 pub fn tick(number: u64) -> TickRecord {
     let t = number as f64 * 2e-4;
     let noise = (number.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11) as f64 / 2f64.powi(53) - 0.5;
@@ -50,7 +50,7 @@ pub fn tick(number: u64) -> TickRecord {
     }
 }
 
-/// A whole run of `ticks` ticks: order, state and end as events among them.
+/// A run of `ticks` ticks with three events: arm request, change of state, and trip.
 pub fn run(ticks: u64) -> Vec<LoopMessage> {
     let event = |tick, kind| LoopMessage::Event(Event { tick, kind });
     let mut run = vec![
@@ -88,7 +88,7 @@ pub fn write(path: &Path, run: &[LoopMessage]) -> Totals {
         .expect("a good disk")
 }
 
-/// All bits of a tick: `==` takes -0.0 for 0.0 and no NaN for itself.
+/// All bits of a tick, because -0.0 == 0.0 and NaN != NaN.
 pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], Option<u64>) {
     let floats = [t.reference_m, t.position_m, t.requested_a, t.command_a].map(f64::to_bits);
     let rest = TickRecord {

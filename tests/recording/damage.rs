@@ -1,4 +1,4 @@
-//! Whatever bytes a file holds, reading it ends in what was recorded or in an error.
+//! Damaged files: reading returns recorded data or an error, for any bytes.
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
 
-/// 100 ms a tick: few ticks make many chunks, so that much of the file is structure.
+/// 100 ms per tick: few ticks make many chunks, so that a large part of the file is structure.
 fn slow_run(ticks: u64) -> Vec<LoopMessage> {
     let slow = |p: LoopMessage| match p {
         LoopMessage::Tick(t) => LoopMessage::Tick(TickRecord {
@@ -39,7 +39,7 @@ static ORIGINAL: LazyLock<Original> = LazyLock::new(|| {
     }
 });
 
-/// Reads `bytes` in both ways; what is handed out must have been recorded, all of it if the file claims to be complete.
+/// Opens and salvages `bytes`. The returned data must be recorded data, and all of it if the file is not reported as truncated.
 fn check(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
     std::fs::write(path, bytes).expect("temporary file");
     let opened = Recording::open(path);
@@ -47,11 +47,14 @@ fn check(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
         check_contents(recording, bytes.len())?;
         let all = recording.tick_count() == ORIGINAL.ticks.len() as u64
             && *recording.events() == ORIGINAL.events;
-        prop_assert!(all || recording.truncated(), "incomplete without saying so");
+        prop_assert!(
+            all || recording.truncated(),
+            "incomplete but not reported as truncated"
+        );
     }
     match Recording::salvage(path) {
         Ok(recording) => check_contents(&recording, bytes.len())?,
-        Err(error) => prop_assert!(opened.is_err(), "opens, but is not salvaged: {error}"),
+        Err(error) => prop_assert!(opened.is_err(), "opened, but not salvaged: {error}"),
     }
     Ok(())
 }
@@ -91,11 +94,12 @@ fn file_truncated_at_any_byte_gives_its_readable_part_or_an_error() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("cut.mcap");
     for length in 0..ORIGINAL.bytes.len() {
-        check(&ORIGINAL.bytes[..length], &path).unwrap_or_else(|e| panic!("cut at {length}: {e}"));
+        check(&ORIGINAL.bytes[..length], &path)
+            .unwrap_or_else(|e| panic!("truncated at {length}: {e}"));
         let opened = Recording::open(&path);
         assert!(
             opened.is_err_and(|e| !e.to_string().is_empty()) || opened_truncated(&path),
-            "cut at {length}"
+            "truncated at {length}"
         );
     }
 }
@@ -145,7 +149,7 @@ proptest! {
         let dir = tempfile::tempdir().expect("temporary directory");
         let path = dir.path().join("any.mcap");
         std::fs::write(&path, &bytes).expect("temporary file");
-        prop_assert!(Recording::open(&path).is_err() && Recording::salvage(&path).is_err(), "there is no tick in it");
+        prop_assert!(Recording::open(&path).is_err() && Recording::salvage(&path).is_err(), "the file has no tick");
     }
 }
 
@@ -153,7 +157,7 @@ fn record(opcode: u8, body: &[u8]) -> Vec<u8> {
     [&[opcode][..], &(body.len() as u64).to_le_bytes(), body].concat()
 }
 
-/// (offset, length with its head, opcode) of each record of the data section.
+/// (offset, length including the record header, opcode) of each record of the data section.
 fn records(bytes: &[u8]) -> Vec<(usize, usize, u8)> {
     let mut found = Vec::new();
     let mut at = mcap::MAGIC.len();
@@ -211,15 +215,15 @@ fn detects_a_missing_chunk_in_a_truncated_file() {
     );
     assert!(
         open(&ORIGINAL.bytes[..end]).is_ok_and(|r| r.truncated()),
-        "the same with that chunk"
+        "the same file with that chunk is readable"
     );
 }
 
 #[test]
 fn rejects_chunk_without_crc() {
     let chunks = chunks(&ORIGINAL.bytes);
-    let mut bytes = ORIGINAL.bytes[..chunks[4].0].to_vec(); // cut, so no CRC of the whole stands above
-    let crc = chunks[2].0 + 9 + 8 + 8 + 8; // behind opcode, length, two times and a size
+    let mut bytes = ORIGINAL.bytes[..chunks[4].0].to_vec(); // truncated, so there is no CRC of the whole file
+    let crc = chunks[2].0 + 9 + 8 + 8 + 8; // after opcode, length, two times and a size
     bytes[crc..crc + 4].fill(0);
     let refused = open(&bytes).expect_err("refused");
     assert!(

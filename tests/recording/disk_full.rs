@@ -1,4 +1,4 @@
-//! A full disk: `/dev/full` answers every write with the system's own "no space left".
+//! A full disk: every write to `/dev/full` fails with "No space left on device".
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
@@ -17,7 +17,7 @@ fn dev_full() -> File {
         .expect("Linux has /dev/full")
 }
 
-/// A disk with room for so many bytes.
+/// A disk with a limited number of free bytes.
 struct SmallDisk {
     file: File,
     room: usize,
@@ -71,16 +71,16 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     let handle = spawn(recorder, consumer).expect("a thread");
     let health = handle.health();
 
-    // 40,000 ticks of some 90 bytes are more than three times the room.
+    // 40,000 ticks of about 90 bytes are more than three times the free space.
     let mut failed_after = None;
     for n in 0..40_000 {
         push(&mut ring, LoopMessage::Tick(tick(n)));
         failed_after = failed_after.or(health.failed().then_some(n));
     }
-    let failed_after = failed_after.expect("the failure shows while the loop still runs");
+    let failed_after = failed_after.expect("the failure is reported while the loop still runs");
     assert!(
         (5_000..25_000).contains(&failed_after),
-        "1 MiB are some 11,000 ticks; told at {failed_after}"
+        "1 MiB is about 11,000 ticks; reported at {failed_after}"
     );
     drop(ring);
 
@@ -96,13 +96,13 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     assert_written_part_readable(&path, health.written());
 }
 
-/// The loop's end: never waits for the recorder, so a full ring here means that the thread stopped draining.
+/// Pushes a message, waiting for a free slot. If the ring stays full, the thread of the recorder has stopped reading it.
 fn push(ring: &mut rtrb::Producer<LoopMessage>, published: LoopMessage) {
     let deadline = Instant::now() + Duration::from_secs(10);
     while ring.is_full() {
         assert!(
             Instant::now() < deadline,
-            "the ring is not emptied any more"
+            "the recorder no longer reads the ring"
         );
         std::thread::sleep(Duration::from_micros(100));
     }

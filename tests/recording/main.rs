@@ -1,4 +1,4 @@
-//! What a recording promises, as tests.
+//! Recordings: writing, reading, damaged files, full disks.
 mod common;
 mod damage;
 mod disk_full;

@@ -1,4 +1,4 @@
-//! What goes in comes out; what is missing is counted.
+//! Recorded data are read back unchanged; missing data are counted.
 use std::path::PathBuf;
 
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
@@ -145,7 +145,7 @@ fn events_of_every_kind_round_trip_in_order() {
     published.insert(3, LoopMessage::Tick(tick(0)));
     let (recording, _) = read_back(&published);
     assert_eq!(recording.events(), put);
-    // Debug prints -0.0 as such, which == would let pass for 0.0.
+    // Compare Debug texts, because -0.0 == 0.0.
     assert_eq!(format!("{:?}", recording.events()), format!("{put:?}"));
 }
 
@@ -224,13 +224,13 @@ fn missing_ticks_count_as_overruns_if_flagged_and_as_lost_otherwise() {
     let overrun = TickRecord {
         missed_ticks: 2,
         ..tick(13)
-    }; // 11 and 12 passed unserved
+    }; // 11 and 12 are missed ticks
     let mut published: Vec<_> = (0..=10)
         .map(tick)
         .chain([overrun])
         .map(LoopMessage::Tick)
         .collect();
-    published.extend((20..25).map(tick).map(LoopMessage::Tick)); // 14..=19: nobody answers for six ticks
+    published.extend((20..25).map(tick).map(LoopMessage::Tick)); // 14..=19 are lost: six ticks without a flag
     let (_dir, path) = fresh();
     let totals = write(&path, &published);
     assert_eq!(
@@ -298,8 +298,8 @@ fn timing_is_summarised_per_second_and_per_run() {
         (5000, 50_000)
     );
     assert_eq!((first.compute_p50_ns, second.compute_max_ns), (700, 700));
-    // Of 10,000 ticks the 9900th smallest lateness is number 4800 and something of the second second: the first has
-    // 5000 below 5000 ns; in the second 10 k <= x, so rank 9900 solves min(x, 5000) + x / 10 = 9900: x = 49,000.
+    // Rank 9900 of 10,000: in the first second all 5000 values are at most 5000 ns; in the second second, x / 10 values are at
+    // most x. So min(x, 5000) + x / 10 = 9900, that is x = 49,000.
     assert!(
         within(totals.lateness.p99_ns, 49_000),
         "{:?}",
@@ -319,7 +319,7 @@ fn killed_process_loses_at_most_half_a_second() {
     published
         .iter()
         .for_each(|p| recorder.record(p).expect("good disk"));
-    std::mem::forget(recorder); // as a killed process leaves it: nothing more is written
+    std::mem::forget(recorder); // like a killed process: nothing more is written
 
     let recording = Recording::open(&path).expect("readable up to the cut");
     assert!(recording.truncated());
@@ -379,7 +379,7 @@ fn recovered_file_is_complete_and_reports_the_truncation() {
     assert_eq!(
         whole.events(),
         &events_of(&published)[..2],
-        "the last event stood behind the cut"
+        "the last event is after the cut"
     );
     assert_eq!(
         (whole.config_toml(), whole.period_ns()),

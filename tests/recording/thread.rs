@@ -1,4 +1,4 @@
-//! Between ring and disk.
+//! The thread that writes messages from the ring to the disk.
 use bench::recording::{Recorder, Recording, spawn};
 use bench::rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
@@ -45,7 +45,7 @@ fn messages_beyond_the_ring_capacity_are_counted_as_lost() {
     let dir = tempfile::tempdir().expect("temporary directory");
     let path = dir.path().join("lossy.mcap");
     let (mut ring, consumer) = RingBuffer::new(100);
-    // The recorder begins after the loop: of 150 ticks the ring takes 100, then one event tells of the other 50.
+    // The recorder starts after the loop: of 150 ticks the ring holds 100, and one event reports the other 50.
     let refused = (0..150)
         .filter(|n| ring.push(LoopMessage::Tick(tick(*n))).is_err())
         .count() as u64;

@@ -43,10 +43,10 @@ def recording(name):
     path = folder / report(name)["recording"]
     with open(path, "rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        seen = {"/loop": [], "/event": [], "/timing": []}
+        messages = {"/loop": [], "/event": [], "/timing": []}
         for _, channel, _, message in reader.iter_decoded_messages():
-            seen[channel.topic].append(message)
-    return seen["/loop"], seen["/event"]
+            messages[channel.topic].append(message)
+    return messages["/loop"], messages["/event"]
 
 
 def frf(path):
@@ -160,7 +160,7 @@ goes_on("control", "completes")
 whole("control", "completed")
 current_off("well")
 print("SIGKILL")
-must(code("killed") == 137, "the process died")
+must(code("killed") == 137, "the process was killed")
 current_off("killed")
 goes_on("after_kill", "the next run starts cleanly and completes")
 print("SIGTERM")

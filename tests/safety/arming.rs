@@ -1,4 +1,4 @@
-//! The diagram of the arming machine, arrow by arrow, in the loop itself.
+//! The arming state machine, transition by transition, in the loop.
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,8 +27,8 @@ const STATES: [State; 4] = [
     State::Tripped,
 ];
 
-/// Where each change leads, column by column: the diagram in `rt/arming.rs` and nothing else.
-const ARROWS: [(Transition, [State; 4]); 5] = {
+/// The state after each transition, by initial state: the diagram in `rt/arming.rs`.
+const TRANSITIONS: [(Transition, [State; 4]); 5] = {
     use State::{Armed, Disarmed, Running, Tripped};
     [
         // from:          Disarmed  Armed     Running   Tripped
@@ -40,9 +40,9 @@ const ARROWS: [(Transition, [State; 4]); 5] = {
     ]
 };
 
-/// The probe fails in these ticks: a trip in the first, if the test wants one, and the one that makes `Tripped`.
+/// Ticks of a probe fault: the trip under test, and the trip that brings the loop into `Tripped` before it.
 const TRIP: u64 = 20;
-const MAKE_TRIPPED: u64 = 5;
+const TRIP_BEFORE: u64 = 5;
 
 fn bench_in(state: State, trip: bool) -> Bench {
     let mut faults = Vec::new();
@@ -51,7 +51,7 @@ fn bench_in(state: State, trip: bool) -> Bench {
     }
     if state == State::Tripped {
         faults.push((
-            MAKE_TRIPPED..MAKE_TRIPPED + 1,
+            TRIP_BEFORE..TRIP_BEFORE + 1,
             Fault::Validity(Validity::Faulty),
         ));
     }
@@ -70,7 +70,7 @@ fn bench_in(state: State, trip: bool) -> Bench {
 #[test]
 fn transitions_match_the_state_diagram() {
     for (column, from) in STATES.into_iter().enumerate() {
-        for (change, to) in ARROWS {
+        for (change, to) in TRANSITIONS {
             let to = to[column];
             let mut bench = bench_in(from, change == Transition::Trip);
             let events = bench.events().len();
@@ -87,9 +87,9 @@ fn transitions_match_the_state_diagram() {
                 (to, to),
                 "{change:?} in {from:?}"
             );
-            let moved: Vec<_> = bench.events()[events..]
+            let changes: Vec<_> = bench.events()[events..]
                 .iter()
-                .filter(|e| is_move(&e.kind))
+                .filter(|e| is_state_change(&e.kind))
                 .map(|e| e.kind)
                 .collect();
             let expected = if from == to {
@@ -97,7 +97,7 @@ fn transitions_match_the_state_diagram() {
             } else {
                 vec![EventKind::State { from, to }]
             };
-            assert_eq!(moved, expected, "{change:?} in {from:?}");
+            assert_eq!(changes, expected, "{change:?} in {from:?}");
             assert_eq!(
                 bench.amplifier_is_on(),
                 matches!(to, State::Armed | State::Running),
@@ -117,7 +117,7 @@ fn transitions_match_the_state_diagram() {
     }
 }
 
-fn is_move(kind: &EventKind) -> bool {
+fn is_state_change(kind: &EventKind) -> bool {
     matches!(kind, EventKind::State { .. })
 }
 
@@ -171,7 +171,7 @@ fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
         bench.amplifier_calls()[before..]
             .iter()
             .all(|(_, call)| *call == AmplifierCall::Disable),
-        "nothing but off, again and again"
+        "the amplifier is only disabled"
     );
     assert_eq!(
         (bench.servo().last_trip(), bench.returned_programs),
@@ -187,7 +187,7 @@ fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
     assert_eq!(
         (bench.tick().state, bench.amplifier_is_on()),
         (State::Disarmed, false),
-        "start alone does nothing"
+        "a start request without arm has no effect"
     );
     bench.request(Request::Arm);
     let armed = bench.tick();
@@ -214,7 +214,7 @@ fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
     assert_eq!(
         bench.state(),
         State::Tripped,
-        "the amplifier keeps its fault"
+        "the amplifier refuses to clear its fault"
     );
     bench.run(100);
     bench.request(Request::Clear);
@@ -253,18 +253,18 @@ fn arm_request_in_other_states_does_not_enable_the_amplifier() {
         let enabled = bench.amplifier_calls()[before..]
             .iter()
             .any(|(_, call)| matches!(call, AmplifierCall::Enable { .. }));
-        assert!(!enabled, "enabled anew while {state:?}");
+        assert!(!enabled, "enabled again in {state:?}");
     }
 }
 
-/// Orders that arrive while the loop runs: handed over by its clock, between two ticks.
-struct Handing {
+/// A clock that adds requests between two ticks while the loop runs.
+struct RequestingClock {
     restarts: Arc<AtomicU64>,
     requests: Producer<Request>,
     late: Vec<(u64, Request)>,
 }
 
-impl Clock for Handing {
+impl Clock for RequestingClock {
     fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
         while self.late.first().is_some_and(|(tick, _)| *tick == number) {
             assert!(self.requests.push(self.late.remove(0).1).is_ok());
@@ -291,7 +291,7 @@ fn schedule_restarts_only_after_enabling_the_amplifier() {
         (5, Request::Clear),
         (6, Request::Arm),
     ];
-    let clock = Handing {
+    let clock = RequestingClock {
         restarts: Arc::clone(&restarts),
         requests,
         late,
@@ -301,7 +301,7 @@ fn schedule_restarts_only_after_enabling_the_amplifier() {
     assert_eq!(
         restarts.load(Ordering::Relaxed),
         1,
-        "a schedule that begins anew in a run hides a late tick"
+        "a restart of the schedule during a run would hide a late tick"
     );
 }
 
@@ -322,13 +322,13 @@ fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Request>, Consumer<L
     )
 }
 
-/// A program with a mistake in it.
-struct Panics;
+/// A program that panics at its eleventh tick.
+struct PanickingProgram;
 
-impl Program for Panics {
+impl Program for PanickingProgram {
     fn decide(&mut self, input: &ProgramInput) -> Decision {
         let tick = input.tick;
-        assert!(tick < 10, "the mistake");
+        assert!(tick < 10, "panic of the test program");
         Decision {
             reference_m: 0.0,
             requested_a: 0.1,
@@ -347,10 +347,13 @@ fn panic_in_the_loop_disables_the_amplifier() {
     let (servo, mut requests, _records) = loop_around(rig);
     assert!(
         requests.push(Request::Arm).is_ok()
-            && requests.push(Request::Start(Box::new(Panics))).is_ok()
+            && requests
+                .push(Request::Start(Box::new(PanickingProgram)))
+                .is_ok()
     );
-    let died = std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
-    assert!(died.is_err(), "the program panics at its tenth tick");
+    let ended =
+        std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
+    assert!(ended.is_err(), "the program panics after ten ticks");
     let calls = log.lock().expect("not poisoned").clone();
     let currents = calls.iter().filter(
         |(_, t)| matches!(t, AmplifierCall::Command { current_a, .. } if *current_a != 0.0),
@@ -373,8 +376,8 @@ fn amplifier_is_not_enabled_without_a_recording() {
     let plan = Plan::chirp(config);
     let folder = tempfile::tempdir().expect("a temporary folder");
     let file = folder.path().join("a_file");
-    std::fs::write(&file, "in the way").expect("a file");
-    // Nobody, root included, can make a file in /proc.
+    std::fs::write(&file, "a file instead of a folder").expect("a file");
+    // No user, not even root, can create a file in /proc.
     for out in [Path::new("/proc"), &file] {
         for pace in [Pace::Virtual, Pace::Realtime] {
             let rig = LoggedRig::new(StillRig::default());
@@ -383,12 +386,12 @@ fn amplifier_is_not_enabled_without_a_recording() {
                 .err()
                 .expect("no recording");
             assert!(error.to_string().contains("nothing was moved"), "{error}");
-            // The loop's thread holds the log until it is gone.
-            let gone = (0..1000).any(|_| {
+            // The loop's thread holds the log until it ends.
+            let has_ended = (0..1000).any(|_| {
                 std::thread::sleep(Duration::from_millis(10));
                 Arc::strong_count(&log) == 1
             });
-            assert!(gone, "the loop runs without leave");
+            assert!(has_ended, "the loop still runs");
             let calls = log.lock().expect("not poisoned").clone();
             assert!(
                 calls

@@ -1,4 +1,4 @@
-//! Closing the loop makes no jump: neither an offset of the probe nor an old set-point reaches the motor.
+//! Bumpless closing of the loop: neither a probe offset nor an old set-point causes a step of the current.
 use std::ops::Range;
 
 use bench::config::{Config, ReferenceSettings};
@@ -15,10 +15,10 @@ use crate::rig::{Bench, stage};
 
 const ALWAYS: Range<u64> = 0..u64::MAX;
 
-/// What the stage at rest and its probe may differ from the mean of half a second, with a probability of 1e-8 a tick:
-/// noise of 40 nm and quantisation of 30 nm/sqrt(12) at the probe, and the floor. Its 8 Hz line moves the stage (29 Hz)
-/// by a/w^2 = 24 nm, its 70 Hz line (second mode at 83 Hz, a/(83 Hz^2 - 70 Hz^2)) by 23 nm at the most: some 50 nm RMS in
-/// all, six times that for 300 nm; as much again for modes that the floor rings up by chance.
+/// Largest deviation of a reading at rest from the mean of half a second, exceeded with a probability of 1e-8 per tick.
+/// The probe has a noise of 40 nm and a quantisation of 30 nm/sqrt(12). The 8 Hz line of the floor moves the stage (29 Hz) by
+/// a/w^2 = 24 nm, the 70 Hz line (second mode at 83 Hz, a/(83 Hz^2 - 70 Hz^2)) by at most 23 nm. The sum is about 50 nm RMS;
+/// six sigma are 300 nm. Twice this value allows for modes that the floor excites.
 const REST_M: f64 = 0.6e-6;
 
 fn config(controller: &str, seed: u64) -> Config {
@@ -51,8 +51,8 @@ fn program(config: &Config, settle: u64, closed: u64) -> Control {
     Control::new(Box::new(law), reference, settle, closed)
 }
 
-/// The largest command, tick by tick, that errors of one metre at most can cause: the sum of the impulse response's
-/// magnitudes.
+/// For each tick, the largest command that control errors of at most 1 m can cause: the sum of the magnitudes of the impulse
+/// response.
 fn largest_gains(config: &Config, ticks: usize) -> Vec<f64> {
     let controller = controller(config);
     let mut state = controller.at_rest();
@@ -90,14 +90,14 @@ fn closed(bench: &Bench, from: u64) -> Vec<TickRecord> {
         .collect()
 }
 
-/// The first commands are those of a controller at rest that sees nothing but the rest's noise.
-fn makes_no_jump(config: &Config, records: &[TickRecord], offset_m: f64, what: &str) {
+/// Asserts that the first commands are those of a controller at rest whose input is only the noise at rest.
+fn assert_bumpless(config: &Config, records: &[TickRecord], offset_m: f64, what: &str) {
     let gains = largest_gains(config, 50);
     assert!(records.len() >= gains.len());
     for (record, gain) in records.iter().zip(&gains) {
         assert!(
             (record.reference_m - offset_m).abs() < REST_M,
-            "{what}: the origin is where the stage rests: {record:?}"
+            "{what}: the origin is the rest position: {record:?}"
         );
         assert!(
             (record.position_m - record.reference_m).abs() < REST_M,
@@ -113,7 +113,7 @@ fn makes_no_jump(config: &Config, records: &[TickRecord], offset_m: f64, what: &
         records.iter().any(|r| r.command_a != 0.0),
         "{what}: the loop is closed"
     );
-    // Were the origin zero, the offset itself would go through the controller: 300 um in place of REST_M.
+    // With an origin of zero the controller would receive the offset: 300 um instead of REST_M.
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn closing_the_loop_with_probe_offset_is_bumpless() {
             bench.request(Request::Start(Box::new(program(&config, 2500, 2500))));
             bench.run(5000);
             assert_eq!(bench.trips(), []);
-            makes_no_jump(
+            assert_bumpless(
                 &config,
                 &closed(&bench, 0),
                 offset_m,
@@ -160,7 +160,7 @@ fn no_current_flows_during_settling() {
     );
     let mean_m = bench.ticks().iter().map(|r| r.position_m).sum::<f64>() / 2500.0;
     let origin_m = bench.ticks().last().expect("ticks").reference_m;
-    // A running mean of 2500 numbers of 3e-4, each step rounded at 1e-16 of it.
+    // A running mean of 2500 values of 3e-4; each step has a relative rounding error of 1e-16.
     assert!(
         (origin_m - mean_m).abs() < 1e-16,
         "{origin_m:e} for {mean_m:e}"
@@ -170,8 +170,8 @@ fn no_current_flows_during_settling() {
 #[test]
 fn second_run_starts_from_rest_without_the_old_set_point() {
     for name in ["fast", "slow"] {
-        // The first run ends on a step of 50 um, held by current; then the stage swings back and rests: 10 s are 16 time
-        // constants of its first mode (zeta w = 1.66 1/s), 50 um e^-16 = 6 pm.
+        // The first run ends at a step of 50 um, held by current. Then the stage returns to rest: 10 s are 16 time constants of
+        // its first mode (zeta w = 1.66 1/s), 50 um e^-16 = 6 pm.
         let mut config = config(name, 5);
         let rig = SimulatedRig::new(&config).expect("a rig");
         let mut bench = Bench::around(
@@ -194,9 +194,9 @@ fn second_run_starts_from_rest_without_the_old_set_point() {
         bench.request(Request::Start(Box::new(program(&config, 2500, 2500))));
         bench.run(5000);
         let second = closed(&bench, from);
-        makes_no_jump(&config, &second, 100e-6, &format!("{name}, second run"));
+        assert_bumpless(&config, &second, 100e-6, &format!("{name}, second run"));
 
-        // Bit for bit what a new program decides that sees the same positions.
+        // Bit for bit the decisions of a new program with the same positions.
         let mut fresh = program(&config, 2500, 2500);
         let records = bench.ticks();
         for (tick, record) in records
@@ -221,10 +221,10 @@ fn reused_controller_starts_from_rest() {
         let mut config = config(name, 6);
         config.control.reference = ReferenceSettings::Hold(HoldReference {});
         let mut used = SectionController::new(controller(&config));
-        let moved = (0..1000).map(|_| used.update(&error(100e-6))).last();
+        let last_a = (0..1000).map(|_| used.update(&error(100e-6))).last();
         assert!(
-            moved.is_some_and(|current_a| current_a.abs() > 1e-3),
-            "{moved:?}"
+            last_a.is_some_and(|current_a| current_a.abs() > 1e-3),
+            "{last_a:?}"
         );
         let hold = || reference(&config, &ReferenceSettings::Hold(HoldReference {}));
         let mut after = Control::new(Box::new(used), hold(), 10, 100);

@@ -1,4 +1,4 @@
-//! Ticks that come late: counted, flagged, left out of the numbering, never caught up.
+//! Late ticks: missed ticks are counted, flagged and skipped in the numbering, and never caught up.
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -16,13 +16,13 @@ use rtrb::{Consumer, RingBuffer};
 
 use crate::rig::{CurrentProgram, StillRig, interlocks, stage};
 
-/// A clock by which some ticks are late: (call, ticks missed).
-struct Jerky {
+/// A clock with late ticks: (call, missed ticks).
+struct LateClock {
     late: Vec<(u64, u32)>,
     calls: u64,
 }
 
-impl Clock for Jerky {
+impl Clock for LateClock {
     fn wait(&mut self, number: u64, _outlet: &Publisher) -> TickTiming {
         let missed = self
             .late
@@ -91,7 +91,7 @@ impl IntoChunk for Consumer<LoopMessage> {
 
 #[test]
 fn missed_ticks_are_counted_flagged_and_skipped_in_the_numbering() {
-    let clock = Jerky {
+    let clock = LateClock {
         late: vec![(10, 1), (11, 7), (30, 20)],
         calls: 0,
     };
@@ -103,7 +103,7 @@ fn missed_ticks_are_counted_flagged_and_skipped_in_the_numbering() {
         10,
     );
     assert!(ended.completed && ended.lost_records == 0);
-    // 100 ticks of the run and the tail, which begins with the tick of completion: 110 served.
+    // 100 ticks of the run, and the tail of 10, which begins with the tick of completion.
     assert_eq!(records.len(), 110);
     let mut expected = 0;
     for (call, record) in records.iter().enumerate() {
@@ -129,10 +129,10 @@ fn missed_ticks_are_counted_flagged_and_skipped_in_the_numbering() {
     assert_eq!(expected, 110 + 28);
 }
 
-/// Writes down which ticks it was asked for.
-struct Asked(Arc<Mutex<Vec<u64>>>, u64);
+/// A program that records the ticks of its calls.
+struct RecordingProgram(Arc<Mutex<Vec<u64>>>, u64);
 
-impl Program for Asked {
+impl Program for RecordingProgram {
     fn decide(&mut self, input: &ProgramInput) -> Decision {
         let tick = input.tick;
         self.0.lock().expect("not poisoned").push(tick);
@@ -149,22 +149,22 @@ impl Program for Asked {
 
 #[test]
 fn program_continues_after_missed_ticks_without_catching_up() {
-    // Were ticks caught up, there would be more ticks than calls of the clock, or the program would skip or repeat some.
-    let asked = Arc::default();
-    let clock = Jerky {
+    // Catching up would give more ticks than calls of the clock, or skip or repeat ticks of the program.
+    let called = Arc::default();
+    let clock = LateClock {
         late: vec![(10, 3), (20, 5)],
         calls: 0,
     };
     let (ended, records) = run(
         StillRig::default(),
-        Box::new(Asked(Arc::clone(&asked), 50)),
+        Box::new(RecordingProgram(Arc::clone(&called), 50)),
         clock,
         50,
         0,
     );
     assert!(ended.completed);
     assert_eq!(
-        *asked.lock().expect("not poisoned"),
+        *called.lock().expect("not poisoned"),
         (0..50).collect::<Vec<u64>>()
     );
     let steps: Vec<u64> = records
@@ -178,10 +178,10 @@ fn program_continues_after_missed_ticks_without_catching_up() {
     );
 }
 
-/// A probe that holds up the loop once.
-struct Hangs(StillRig, u64);
+/// A rig whose probe blocks the loop once, for 20 ms.
+struct BlockingRig(StillRig, u64);
 
-impl CurrentAmplifier for Hangs {
+impl CurrentAmplifier for BlockingRig {
     fn enable(&mut self) -> Result<(), DeviceError> {
         self.0.enable()
     }
@@ -196,7 +196,7 @@ impl CurrentAmplifier for Hangs {
     }
 }
 
-impl DisplacementProbe for Hangs {
+impl DisplacementProbe for BlockingRig {
     fn latest(&mut self, now: Tick) -> Reading {
         if now.number >= self.1 {
             self.1 = u64::MAX;
@@ -208,11 +208,10 @@ impl DisplacementProbe for Hangs {
 
 #[test]
 fn real_time_ticks_are_served_or_counted_as_missed() {
-    // 500 Hz for a second. The probe hangs for 20 ms in one tick: ten periods, so the tick after it is due nine periods
-    // before it can be served at the soonest.
+    // 500 Hz for a second. The probe blocks for 20 ms in one tick, which is ten periods: at least nine ticks are missed.
     let clock = Realtime::new(0.002);
     let (ended, records) = run(
-        Hangs(StillRig::default(), 100),
+        BlockingRig(StillRig::default(), 100),
         Box::new(CurrentProgram(|_| 0.1, 500)),
         clock,
         u32::MAX,
@@ -240,10 +239,9 @@ fn real_time_ticks_are_served_or_counted_as_missed() {
         assert_eq!(record.scheduled_ns, record.tick * 2_000_000);
         assert!(
             record.woke_ns >= record.scheduled_ns,
-            "no tick begins before it is due: {record:?}"
+            "a tick begins before its scheduled time: {record:?}"
         );
-        // The tick is the latest that is due, whatever the machine does: less than a period late (but for rounding), or it
-        // would be another one.
+        // The served tick is always the latest one that is due, so it is less than a period late (plus rounding) on any machine.
         assert!(
             record.woke_ns < record.scheduled_ns + 2_000_000 + 10,
             "{record:?}"
@@ -255,7 +253,7 @@ fn real_time_ticks_are_served_or_counted_as_missed() {
 fn too_many_missed_ticks_trip_in_real_time() {
     let clock = Realtime::new(0.002);
     let (ended, records) = run(
-        Hangs(StillRig::default(), 100),
+        BlockingRig(StillRig::default(), 100),
         Box::new(CurrentProgram(|_| 0.1, 5000)),
         clock,
         4,
@@ -263,7 +261,7 @@ fn too_many_missed_ticks_trip_in_real_time() {
     );
     let (trip, at) = ended
         .trip
-        .expect("the hanging probe makes eight missed ticks, four are allowed");
+        .expect("at least nine ticks are missed, four are allowed");
     assert_eq!((trip.reason(), ended.completed), ("overruns", false));
     let last = records.last().expect("ticks");
     assert_eq!(
@@ -291,7 +289,7 @@ fn simulated_amplifier_holds_the_delayed_command_during_missed_ticks() {
         for rig in [&mut missing, &mut serving] {
             rig.enable().expect("enabled");
         }
-        // Of every ten ticks four are missed by the one; the other repeats its last command in them, as a hold does.
+        // `missing` misses four of ten ticks; `serving` repeats its last command in them, like a zero-order hold.
         for number in 0..1000u64 {
             let missed = (4..8).contains(&(number % 10));
             let held_a = current_a(if missed {
@@ -310,7 +308,7 @@ fn simulated_amplifier_holds_the_delayed_command_during_missed_ticks() {
         }
         assert!(
             serving.true_position_m() > 1e-5,
-            "something moved: {}",
+            "the stage moved: {}",
             serving.true_position_m()
         );
     }

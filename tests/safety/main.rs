@@ -1,4 +1,4 @@
-//! What the loop promises whoever stands beside the motor. Each test has been seen to fail with the line it guards broken.
+//! Safety requirements of the loop. Each test has been seen to fail with the guarded line broken.
 mod arming;
 mod bumpless;
 use bench_test_support::faulty_rig;

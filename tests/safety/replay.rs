@@ -1,4 +1,4 @@
-//! What the loop decided, it decides again from its recording, bit for bit; and what was altered is found.
+//! Replay: the loop makes the same decisions from its recording, bit for bit, and alterations are found.
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,7 @@ fn replayed(path: &Path) -> Replayed {
     replay(&Recording::open(path).expect("a recording")).expect("it can be replayed")
 }
 
-fn is_the_same(path: &Path, what: &str) {
+fn assert_identical(path: &Path, what: &str) {
     let recording = Recording::open(path).expect("a recording");
     let replayed = replayed(path);
     assert_eq!((replayed.different, replayed.first), (0, None), "{what}");
@@ -84,11 +84,8 @@ fn chirps_and_closed_loops_replay_bit_for_bit() {
             .expect("readable")
             .filter(|r| r.as_ref().is_ok_and(|r| r.command_a != 0.0))
             .count();
-        assert!(
-            moving > 4000,
-            "something is there to compare: {moving} commands"
-        );
-        is_the_same(&path, plan.kind.name());
+        assert!(moving > 4000, "only {moving} non-zero commands to compare");
+        assert_identical(&path, plan.kind.name());
     }
 }
 
@@ -118,13 +115,13 @@ fn tripped_runs_replay_bit_for_bit() {
                 _ => None,
             });
             assert_eq!(trip, Some((reason, at)));
-            // The loop goes on for a tenth of a second after a trip.
+            // The loop continues for 0.1 s after a trip.
             assert!(
                 (at + 499..=at + 502).contains(&recording.last_tick()),
                 "{}",
                 recording.last_tick()
             );
-            is_the_same(&path, &format!("{reason} in {}", plan.kind.name()));
+            assert_identical(&path, &format!("{reason} in {}", plan.kind.name()));
         }
     }
 }
@@ -143,8 +140,8 @@ fn peak_current_trip_by_the_controller_replays_bit_for_bit() {
         at_s: 0.01,
     });
     let path = record(&Plan::control(config).expect("a plan"), &[], folder.path());
-    // The recording carries the controller: its file may be gone.
-    std::fs::remove_file(file).expect("it was there");
+    // The recording contains the controller, so its file is not needed.
+    std::fs::remove_file(file).expect("the file exists");
     let recording = Recording::open(&path).expect("a recording");
     assert!(
         recording
@@ -152,11 +149,11 @@ fn peak_current_trip_by_the_controller_replays_bit_for_bit() {
             .iter()
             .any(|e| matches!(e.kind, EventKind::Trip(t) if t.reason() == "peak_current"))
     );
-    is_the_same(&path, "peak current");
+    assert_identical(&path, "peak current");
 }
 
-/// The recording again, its ticks passed through `alter`.
-fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
+/// Copies a recording and applies `alter` to its ticks.
+fn copy_altered(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
     let old = Recording::open(path).expect("a recording");
     let header = Header {
         config_toml: old.config_toml().expect("a configuration").into(),
@@ -183,32 +180,32 @@ fn rewritten(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
 
 #[test]
 fn one_altered_bit_of_a_reading_is_found_at_its_tick() {
-    // The first command of a closed loop to answer a change of the reading by d is that of the same tick, b d with b the
-    // product of the sections' first coefficients. Bit 24 of a reading near 30 um is 30e-6 2^-28 = 1e-13 m; fast: b = 460 A/m
-    // (K T/2 = 5.1, pole 9e-5, the others near one), slow: b = 0.12e6 T/2 (w T/2)^2 = 1e-3 A/m. That is 5e-11 A and 1e-16 A,
-    // and the second lies below the last bit of a command of 0.1 A, 1.4e-17, by no factor at all: so bit 40 for it.
+    // A change of the reading by d changes the command of the same tick by b d, where b is the product of the first coefficients
+    // of the sections. Bit 24 of a reading near 30 um is 30e-6 2^-28 = 1e-13 m. Fast controller: b = 460 A/m (K T/2 = 5.1, pole
+    // 9e-5, the others near one), so 5e-11 A. Slow controller: b = 0.12e6 T/2 (w T/2)^2 = 1e-3 A/m, so 1e-16 A. This is near the
+    // resolution of a command of 0.1 A (1.4e-17 A), so bit 40 is altered for the slow controller.
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (controller, bit) in [("fast", 24), ("slow", 40)] {
         let path = record(&control(controller), &[], folder.path());
         let at = 5000;
         let original = Recording::open(&path).expect("a recording");
-        let was = original
+        let recorded = original
             .ticks()
             .expect("readable")
             .nth(at as usize)
             .expect("5000 ticks")
             .expect("readable");
         assert!(
-            was.flags & flag::ACTIVE != 0 && was.position_m.abs() > 1e-6,
-            "{was:?}"
+            recorded.flags & flag::ACTIVE != 0 && recorded.position_m.abs() > 1e-6,
+            "{recorded:?}"
         );
 
         let same = folder.path().join(format!("{controller}_same.mcap"));
-        rewritten(&path, &same, |_| {});
-        is_the_same(&same, "rewritten as it was");
+        copy_altered(&path, &same, |_| {});
+        assert_identical(&same, "copied without alteration");
 
         let altered = folder.path().join(format!("{controller}_altered.mcap"));
-        rewritten(&path, &altered, |record| {
+        copy_altered(&path, &altered, |record| {
             if record.tick == at {
                 record.position_m = f64::from_bits(record.position_m.to_bits() ^ (1 << bit));
             }
@@ -217,10 +214,10 @@ fn one_altered_bit_of_a_reading_is_found_at_its_tick() {
         let first = found.first.expect("a difference");
         assert_eq!(
             (first.tick, first.recorded_a.to_bits()),
-            (at, was.command_a.to_bits()),
+            (at, recorded.command_a.to_bits()),
             "{controller}"
         );
-        assert!(first.replayed_a.to_bits() != was.command_a.to_bits() && found.different >= 1);
+        assert!(first.replayed_a.to_bits() != recorded.command_a.to_bits() && found.different >= 1);
     }
 }
 
@@ -236,7 +233,7 @@ fn altered_command_request_flag_or_reference_is_found_at_its_tick() {
     ];
     for (n, alter) in alterations.into_iter().enumerate() {
         let altered = folder.path().join(format!("altered_{n}.mcap"));
-        rewritten(&path, &altered, |record| {
+        copy_altered(&path, &altered, |record| {
             if record.tick == 3000 {
                 alter(record);
             }
@@ -282,7 +279,7 @@ fn refused_and_accepted_clear_requests_replay_bit_for_bit() {
         .iter()
         .for_each(|published| recorder.record(published).expect("a good disk"));
     recorder.finish(&[]).expect("a good disk");
-    is_the_same(&path, "two clears, the first one refused");
+    assert_identical(&path, "two clears, the first one refused");
 }
 
 #[test]
@@ -292,9 +289,9 @@ fn truncated_recording_replays_up_to_its_end() {
     let bytes = std::fs::read(&path).expect("just written");
     let cut = folder.path().join("cut.mcap");
     std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("a good disk");
-    let recording = Recording::open(&cut).expect("readable up to there");
+    let recording = Recording::open(&cut).expect("readable up to the cut");
     assert!(recording.truncated() && recording.tick_count() >= 2500);
-    is_the_same(&cut, "cut in the middle");
+    assert_identical(&cut, "cut in the middle");
 }
 
 #[test]
@@ -310,7 +307,7 @@ fn recordings_that_cannot_be_replayed_name_the_reason() {
         });
         recorder.finish(&[]).expect("a good disk");
         replay(&Recording::open(&path).expect("a recording"))
-            .expect_err("it has no plan")
+            .expect_err("it cannot be replayed")
             .to_string()
     };
     let tick = |tick| TickRecord {
@@ -323,15 +320,18 @@ fn recordings_that_cannot_be_replayed_name_the_reason() {
     let whole = plan.config_toml().expect("a configuration");
     let kind = |kind: &str| [("run".to_string(), kind.to_string())].into();
 
-    let foreign = write(
-        "foreign.mcap",
+    let other_configuration = write(
+        "other_configuration.mcap",
         &Header {
             config_toml: "a = 1\n".into(),
             ..Header::default()
         },
         &ticks,
     );
-    assert!(foreign.contains("configuration"), "{foreign}");
+    assert!(
+        other_configuration.contains("configuration"),
+        "{other_configuration}"
+    );
     let text = write(
         "text.mcap",
         &Header {
@@ -345,17 +345,20 @@ fn recordings_that_cannot_be_replayed_name_the_reason() {
         config_toml: whole.clone(),
         ..Header::default()
     };
-    let kindless = write("kindless.mcap", &header, &ticks);
+    let without_kind = write("without_kind.mcap", &header, &ticks);
     assert!(
-        kindless.contains("kind of run") && kindless.contains("bench chirp"),
-        "{kindless}"
+        without_kind.contains("kind of run") && without_kind.contains("bench chirp"),
+        "{without_kind}"
     );
     let header = Header {
         metadata: kind(RunKind::Control.name()),
         ..header
     };
-    let without = write("without.mcap", &header, &ticks);
-    assert!(without.contains("controller"), "{without}");
+    let without_controller = write("without_controller.mcap", &header, &ticks);
+    assert!(
+        without_controller.contains("controller"),
+        "{without_controller}"
+    );
     let lost = write("lost.mcap", &header, &[tick(0), tick(5)]);
     assert!(
         lost.contains("4 records") && lost.contains("tick 0"),
@@ -368,7 +371,7 @@ fn recording_with_decreasing_times_replays_without_panic() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = record(&control("fast"), &[], folder.path());
     let backwards = folder.path().join("backwards.mcap");
-    rewritten(&path, &backwards, |record| {
+    copy_altered(&path, &backwards, |record| {
         record.scheduled_ns = 1_000_000_000_000 - record.scheduled_ns
     });
     let outcome: Result<Replayed, ReplayError> =

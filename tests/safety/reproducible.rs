@@ -1,4 +1,4 @@
-//! The same seed and settings are the same run, bit for bit, on any machine.
+//! The same seed and settings give the same run, bit for bit, on any machine.
 use std::path::Path;
 
 use bench::config::{Config, Sweep};
@@ -57,19 +57,18 @@ fn same_seed_gives_identical_run_and_other_seed_does_not() {
 
 #[test]
 fn two_second_run_has_the_reference_digest() {
-    // A frozen value, and the one place for one: `bench control --fast --duration 2 --seed 1 --json` prints it as
-    // `loop_digest`. It holds on any x86-64 or ARM machine, because no function of the platform's libm stands between the
-    // settings and a command (the test below reads the code for it) and sums have a fixed order. It changes with the
-    // profile `stage`, the simulated rig, the controller and the fields of a tick: whoever changes one of them on purpose
-    // puts the new value here.
+    // A stored value; `bench control --fast --duration 2 --seed 1 --json` prints it as `loop_digest`. It is the same on any
+    // x86-64 or ARM machine, because the path from the settings to a command calls no function of the platform's libm (checked
+    // by the test below) and sums have a fixed order. It depends on the profile `stage`, the simulated rig, the controller and
+    // the fields of a tick. After an intended change of one of them, put the new value here.
     assert_eq!(
         format!("{:016x}", digest(&control("fast", 1))),
         "dbb9f5439d1e94ff"
     );
 }
 
-/// Everything between the settings and a command.
-const PATH_OF_A_RUN: [&str; 20] = [
+/// The modules from the settings to a command.
+const COMMAND_PATH: [&str; 20] = [
     "rt",
     "rig/simulated",
     "excitation",
@@ -92,14 +91,15 @@ const PATH_OF_A_RUN: [&str; 20] = [
     "model/plant/quadratic.rs",
 ];
 
-/// Functions of `f64` that differ from platform to platform in their last bit; `sqrt`, `abs`, `floor`, `round` do not.
-const OF_THE_PLATFORM: [&str; 28] = [
+/// Functions of `f64` whose last bit depends on the platform; `sqrt`, `abs`, `floor` and `round` are exact.
+const PLATFORM_FUNCTIONS: [&str; 28] = [
     "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh",
     "asinh", "acosh", "atanh", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10",
     "powf", "powi", "hypot", "cbrt", "arg", "to_polar",
 ];
 
-/// Calls that allocate, lock, print or ask the system: not in the loop's modules, whoever calls them.
+/// Words of locks, prints and files, which must not be in the modules of the tick. `tests/tick_does_not_allocate` covers
+/// allocations and system calls.
 const NOT_IN_A_TICK: [&str; 9] = [
     "Mutex",
     "RwLock",
@@ -150,9 +150,9 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
 
 #[test]
 fn command_path_calls_no_platform_libm() {
-    for (file, text) in PATH_OF_A_RUN.iter().flat_map(|of| sources(of)) {
+    for (file, text) in COMMAND_PATH.iter().flat_map(|of| sources(of)) {
         for (number, line) in lines(&text) {
-            for name in OF_THE_PLATFORM {
+            for name in PLATFORM_FUNCTIONS {
                 let called = [format!(".{name}("), format!("f64::{name}(")]
                     .iter()
                     .any(|call| line.contains(call.as_str()));
@@ -160,7 +160,7 @@ fn command_path_calls_no_platform_libm() {
             }
         }
     }
-    // nalgebra's own functions come from libm as well, and its products from no kernel that is chosen by the processor.
+    // nalgebra must use libm too, and must not select kernels for products by the processor.
     let manifest =
         std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"))
             .expect("a manifest");

@@ -1,4 +1,4 @@
-//! Any sequence of requests and faults: current flows in a run that was armed and started after the last trip, or not at all.
+//! Random sequences of requests and faults: current flows only in a run that was armed and started after the last trip.
 use std::ops::Range;
 
 use bench::rt::arming::State;
@@ -13,29 +13,30 @@ use crate::rig::{AmplifierCall, Bench, CurrentProgram, stage};
 
 const TICKS: u64 = 80;
 
+/// A request as a value that proptest can generate.
 #[derive(Clone, Copy, Debug)]
-enum Given {
+enum RandomRequest {
     Arm,
-    /// A program that asks for so many amperes, for so many ticks.
+    /// A program with a constant current in amperes and a number of ticks.
     Start(f64, u64),
     Stop,
     Clear,
 }
 
-fn requests() -> impl Strategy<Value = Vec<(u64, Given)>> {
+fn requests() -> impl Strategy<Value = Vec<(u64, RandomRequest)>> {
     let current = prop_oneof![
         8 => -5.0..5.0f64,
         1 => Just(f64::NAN),
         1 => Just(f64::INFINITY),
         1 => Just(11.0),
     ];
-    let given = prop_oneof![
-        4 => Just(Given::Arm),
-        4 => (current, 1..40u64).prop_map(|(a, ticks)| Given::Start(a, ticks)),
-        1 => Just(Given::Stop),
-        3 => Just(Given::Clear),
+    let request = prop_oneof![
+        4 => Just(RandomRequest::Arm),
+        4 => (current, 1..40u64).prop_map(|(a, ticks)| RandomRequest::Start(a, ticks)),
+        1 => Just(RandomRequest::Stop),
+        3 => Just(RandomRequest::Clear),
     ];
-    prop::collection::vec((0..TICKS, given), 0..40)
+    prop::collection::vec((0..TICKS, request), 0..40)
 }
 
 fn faults() -> impl Strategy<Value = Vec<(Range<u64>, Fault)>> {
@@ -61,18 +62,22 @@ fn late() -> impl Strategy<Value = Vec<(u64, u32)>> {
     prop::collection::vec((0..TICKS, 1..60u32), 0..3)
 }
 
-fn run(requests: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, u32)]) -> Bench {
+fn run(
+    requests: &[(u64, RandomRequest)],
+    faults: &[(Range<u64>, Fault)],
+    late: &[(u64, u32)],
+) -> Bench {
     let mut bench = Bench::still(&stage(), faults);
     for step in 0..TICKS {
-        // No more than the ring takes.
-        for (_, given) in requests.iter().filter(|(at, _)| *at == step).take(16) {
-            bench.request(match *given {
-                Given::Arm => Request::Arm,
-                Given::Start(current_a, ticks) => {
+        // The request ring has 16 slots.
+        for (_, request) in requests.iter().filter(|(at, _)| *at == step).take(16) {
+            bench.request(match *request {
+                RandomRequest::Arm => Request::Arm,
+                RandomRequest::Start(current_a, ticks) => {
                     Request::Start(Box::new(CurrentProgram(move |_| current_a, ticks)))
                 }
-                Given::Stop => Request::Stop,
-                Given::Clear => Request::Clear,
+                RandomRequest::Stop => Request::Stop,
+                RandomRequest::Clear => Request::Clear,
             });
         }
         bench.late_tick(
@@ -91,7 +96,7 @@ fn run(requests: &[(u64, Given)], faults: &[(Range<u64>, Fault)], late: &[(u64, 
     bench
 }
 
-/// Whether a current may flow after these events: by the words of the requirement, not by the machine.
+/// Whether a current may flow after these events. Written from the requirement, independently of the state machine.
 fn may_flow(events: &[Event]) -> bool {
     let place =
         |wanted: &dyn Fn(&EventKind) -> bool| events.iter().rposition(|event| wanted(&event.kind));
@@ -112,7 +117,7 @@ fn may_flow(events: &[Event]) -> bool {
     trip <= clear && armed > trip.max(clear).max(off) && running > armed
 }
 
-fn prove(bench: &Bench) -> Result<(), TestCaseError> {
+fn check_run(bench: &Bench) -> Result<(), TestCaseError> {
     let (calls, events) = (bench.amplifier_calls(), bench.events());
     for record in bench.ticks().iter() {
         // Completion is published after the record of its tick; everything else before it.
@@ -121,21 +126,21 @@ fn prove(bench: &Bench) -> Result<(), TestCaseError> {
             .iter()
             .rposition(|e| e.kind == EventKind::Completed && e.tick == record.tick);
         let known = &events[..completed.unwrap_or(until)];
-        let went_out = calls.iter().any(|(tick, call)| {
+        let has_current = calls.iter().any(|(tick, call)| {
             *tick == record.tick
                 && matches!(call, AmplifierCall::Command { current_a, refused: false } if *current_a != 0.0)
         });
-        let nonsense = calls.iter().any(|(tick, call)| {
+        let beyond_peak = calls.iter().any(|(tick, call)| {
             *tick == record.tick
                 && matches!(call, AmplifierCall::Command { current_a, .. } if !(-9.99..=9.99).contains(current_a))
         });
-        prop_assert!(!nonsense, "beyond the motor's peak: {record:?}");
-        if went_out {
+        prop_assert!(!beyond_peak, "beyond the motor's peak: {record:?}");
+        if has_current {
             prop_assert_eq!(record.state, State::Running);
             prop_assert_eq!(record.flags & flag::TRIPPED, 0);
             prop_assert!(may_flow(known), "{:?} after {:?}", record, known);
         }
-        prop_assert_eq!(record.command_a != 0.0, went_out, "{:?}", record);
+        prop_assert_eq!(record.command_a != 0.0, has_current, "{:?}", record);
     }
     let numbers: Vec<u64> = bench.ticks().iter().map(|r| r.tick + 1).collect();
     let missed: u64 = bench
@@ -162,13 +167,13 @@ proptest! {
     fn current_flows_only_after_arm_and_start_since_the_last_trip(
         requests in requests(), faults in faults(), late in late(),
     ) {
-        prove(&run(&requests, &faults, &late))?;
+        check_run(&run(&requests, &faults, &late))?;
     }
 }
 
 #[test]
 fn generators_cover_runs_trips_clears_and_completions() {
-    // The same generators must reach all that the property speaks of, or it would prove nothing.
+    // Otherwise the property would be tested on runs in which nothing happens.
     let mut runner = proptest::test_runner::TestRunner::new(ProptestConfig {
         rng_seed: RngSeed::Fixed(1),
         failure_persistence: None,
@@ -209,7 +214,7 @@ fn generators_cover_runs_trips_clears_and_completions() {
 
 #[test]
 fn virtual_pace_loses_no_message_with_a_full_request_ring() {
-    // All that the ring of requests holds, each with every event it can cause: an amplifier that does not enable.
+    // A full request ring in which every request causes as many events as possible: the amplifier refuses to be enabled.
     let mut bench = Bench::still(&stage(), &[(0..10, Fault::RefusedEnable(1))]);
     bench.tick();
     for _ in 0..8 {
@@ -223,6 +228,6 @@ fn virtual_pace_loses_no_message_with_a_full_request_ring() {
         published <= bench::rt::publisher::SLOTS_PER_TICK,
         "{published} in one tick"
     );
-    // Request, state, trip, state for each arm order, order and state for each clear order; then the record.
+    // Request, state, trip, state for each arm request; request and state for each clear request; then the record.
     assert_eq!(published, 8 * (4 + 2) + 1);
 }

@@ -1,4 +1,4 @@
-//! What a study finds.
+//! Results of a study against closed forms and independent programs.
 
 use serde_json::{Value, json};
 
@@ -26,10 +26,10 @@ fn share(counted: &Value, key: &str) -> f64 {
     let effect = list(counted, "settings")
         .iter()
         .find(|one| one["key"] == key);
-    number(&effect.unwrap_or_else(|| panic!("{key} is not there: {counted}"))["share"])
+    number(&effect.unwrap_or_else(|| panic!("{key} is missing: {counted}"))["share"])
 }
 
-/// What an interaction explains beyond its settings; 0 where it does not stand out.
+/// Share of an interaction beyond those of its settings; 0 if it is not listed.
 fn interaction(counted: &Value, keys: [&str; 2]) -> f64 {
     let found = list(counted, "interactions").iter().find(|one| {
         keys.iter()
@@ -47,8 +47,8 @@ fn xy_stage_has_the_reference_probabilities() {
             (&json!(20_000), &json!(0))
         );
         let counted = &answer["cnmp_pairs"];
-        // The sigma of a probability near one half is 0.35 points; the expected ones are themselves of 20,000 draws: 0.5 points
-        // between two such, of which 1.2 are 2.4.
+        // The sigma of a probability near 0.5 is 0.35 percentage points. The expected values come from 20,000 draws as well, so
+        // the sigma of the difference is 0.5 points; the tolerance of 1.2 points is 2.4 sigma.
         let expected = [0.602, 0.388, 0.010, 0.0];
         assert_eq!(probabilities(counted).len(), expected.len());
         for (pairs, expected) in expected.into_iter().enumerate() {
@@ -60,13 +60,12 @@ fn xy_stage_has_the_reference_probabilities() {
                 0.012,
             );
             let [p, low, high] = ["probability", "low", "high"].map(|key| number(&one[key]));
-            // 95 % are 1.96 sigma to either side: 0.7 points at most, and 0.02 where nothing was found.
+            // 95 % are +-1.96 sigma: at most +-0.7 percentage points, and 0.02 points if the count is zero.
             assert!(
                 low <= p && p <= high && high - low < 0.0145 && high > low,
                 "{one}"
             );
         }
-        // One pair of 20,000 would be 0.005 %.
         near(
             "the probability of any",
             number(&counted["any"]["probability"]),
@@ -81,8 +80,8 @@ fn pair_counts_of_100_000_draws_agree_with_reference() {
     let bench = Bench::new();
     bench.json(&format!("{XY} --draws 100000 --csv draws.csv"));
     let config = bench.json("config show --config xy");
-    // 100 draws next to the borders between counts, and 100 at random, with 60 digits; all of them in double precision by
-    // numpy, which has other roundings.
+    // With 60 digits: the 100 draws nearest to a change of the count, and 100 random ones. In double precision by numpy, whose
+    // rounding differs: all draws.
     let question = json!({"what": "digits", "config": config, "csv": bench.path("draws.csv"), "hardest": 100, "seed": 1});
     let Some(answers) = truth::ask_of("study.py", &[question]) else {
         return;
@@ -91,8 +90,8 @@ fn pair_counts_of_100_000_draws_agree_with_reference() {
     assert_eq!(answer["draws"], 100_000);
     assert_eq!(answer["differ_with_60_digits"], json!([]), "{answer}");
     assert_eq!(answer["differ_in_double"], json!([]), "{answer}");
-    // The hardest are hard: two zeros become one by a change of the pencil by 1e-7 of its size at most, and still are told
-    // apart, at roundings of 1e-15. Some have pairs, some have none.
+    // The 100 most ill-conditioned draws: a relative change of the pencil of at most 1e-7 merges two zeros. Rounding of 1e-15
+    // still separates them. The sample contains draws with and without pairs.
     let ease = list(answer, "ease_of_the_hardest");
     let (checked, with_pairs) = (number(&answer["checked"]), number(&answer["with_pairs"]));
     assert!(
@@ -137,7 +136,7 @@ fn shares_of_the_xy_stage_agree_with_pick_and_freeze() {
             [one, other] => alone + interaction(counted, [&key(one), &key(other)]),
             _ => alone,
         };
-        // Both are estimates, with a sigma of 0.004 each. A couple loses up to 1/28 of the variance within its classes.
+        // Both values are estimates with a sigma of 0.004. Binning a pair of settings loses up to 1/28 of the variance.
         let lost = if group.len() > 1 {
             1.0 / 28.0
         } else {
@@ -149,7 +148,7 @@ fn shares_of_the_xy_stage_agree_with_pick_and_freeze() {
             "{group:?}: {together}, and {truth}"
         );
     }
-    // What tells most: sL alone, upwards; and against sR.
+    // The largest share is that of sL, with positive direction; the largest interaction includes sR.
     let first = &list(counted, "settings")[0];
     assert_eq!(
         (&first["key"], &first["direction"]),
@@ -174,7 +173,7 @@ fn two_residues_match_the_closed_form() {
         "modes.toml",
         "[plant]\nmodel = \"modal\"\n[plant.modes]\nR = { omega_rad_s = 0.0, residue_per_kg = 1.0 }\nu = { omega_rad_s = 10.0, residue_per_kg = -1.0 }\nv = { omega_rad_s = 11.0, residue_per_kg = 1.0 }\n",
     );
-    // By the midpoint rule: of the 1000 x 1000 points some 1000 lie at the border.
+    // Midpoint rule: about 1000 of the 1000 x 1000 points are at the border.
     let at = |k: usize, nominal: f64| nominal + 0.95 * ((k as f64 + 0.5) / 500.0 - 1.0);
     let yes = |i: usize, j: usize| f64::from(complex(at(i, -1.0), at(j, 1.0)));
     let n = 1000;
@@ -191,7 +190,7 @@ fn two_residues_match_the_closed_form() {
     let (of_u, of_v) = (index(&rows), index(&columns));
     assert!(
         (0.1..0.9).contains(&p) && of_u > 0.02 && of_v > 0.02,
-        "a case that tells something: {p} {of_u} {of_v}"
+        "the case is not informative: {p} {of_u} {of_v}"
     );
 
     let [u, v] = ["u", "v"].map(|name| format!("plant.modes.{name}.residue_per_kg"));
@@ -207,10 +206,11 @@ fn two_residues_match_the_closed_form() {
             p,
             5.0 * 0.5 / 200.0,
         );
-        // Sigma of a share below 2 sqrt(S)/200; classes take 1/18^2 of a line.
+        // The sigma of a share S is below 2 sqrt(S/N) with N = 40,000 draws. Binning into 18 classes reduces a linear effect by
+        // 1/18^2.
         near("the share of u", share(counted, &u), of_u, 0.03);
         near("the share of v", share(counted, &v), of_v, 0.03);
-        // There is nothing else: the couple has the rest, less the 1/28 that its classes lose on one border, or two.
+        // The interaction explains the rest, less the 1/28 that binning loses at each of at most two borders.
         let rest = 1.0 - of_u - of_v - interaction(counted, [&u, &v]);
         assert!((-0.03..2.0 / 28.0 + 0.03).contains(&rest), "{rest}");
         let unexplained =
@@ -253,7 +253,7 @@ fn normal_tolerance_has_normal_tails() {
             between,
             bound,
         );
-        // One setting decides all, but for the classes that the two borders run through.
+        // One setting explains everything except the classes that contain the two borders.
         assert!(
             (0.85..=1.001).contains(&share(&answer["cnmp_pairs"], "plant.mass_asymmetry")),
             "{answer}"
@@ -264,7 +264,7 @@ fn normal_tolerance_has_normal_tails() {
 #[test]
 fn damped_zeros_are_counted() {
     let bench = Bench::new();
-    // Heavily damped, the XY stage keeps its zeros in the left half plane.
+    // With strong damping all zeros of the XY stage are in the left half plane.
     let answer = bench.json(&format!(
         "{XY} --draws 1000 --damped --set plant.damping.ratio=0.3"
     ));
@@ -274,7 +274,7 @@ fn damped_zeros_are_counted() {
         (0.32..0.48).contains(&without) && with < 0.01,
         "{without} {with}"
     );
-    // Hardly damped, they are counted as without damping, but for those next to the border.
+    // With weak damping the count equals that without damping, except for draws near the border.
     let answer = bench.json(&format!(
         "{XY} --draws 1000 --damped --set plant.damping.ratio=1e-6"
     ));

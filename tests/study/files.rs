@@ -1,4 +1,4 @@
-//! What is done is kept: shards that join, files that go on, and files that are not believed.
+//! Study files: joining shards, continuing, and rejecting damaged files.
 
 use crate::figures::XY;
 use crate::program::Bench;
@@ -160,7 +160,7 @@ fn truncated_file_continues_to_the_same_answer() {
             "cut at {length} of {all}: {}",
             answer.err
         );
-        // Now it is whole: nothing is left to do.
+        // The file is now complete: no draw is left.
         let again = bench.run(&format!("{XY} {DRAWS} --file cut.study --json"));
         assert!(
             again.out == whole && again.err.contains("2600 of 2600 draws are done already"),

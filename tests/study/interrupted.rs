@@ -1,4 +1,4 @@
-//! Ctrl-C, SIGTERM, SIGKILL, two at once, no room.
+//! Ctrl-C, SIGTERM, SIGKILL, two processes with one file, a full disk.
 
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use crate::figures::XY;
 use crate::program::Bench;
 
-/// More than any test waits for.
+/// More draws than a test lets the program complete.
 const LONG: &str = "--draws 3000000 --threads 2";
-/// A guard against waiting for ever, no figure of merit.
+/// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(120);
 
 fn start(bench: &Bench, arguments: &str) -> Child {
@@ -25,7 +25,7 @@ fn start(bench: &Bench, arguments: &str) -> Child {
         .expect("it starts")
 }
 
-/// Waits until the file holds some blocks of about 1.1 kB, and header.
+/// Waits until the file contains its header and several blocks of about 1.1 kB.
 fn until_written(child: &mut Child, file: &Path) {
     let deadline = Instant::now() + TIME_LIMIT;
     while std::fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
@@ -48,7 +48,7 @@ fn ended(child: Child) -> Output {
     child.wait_with_output().expect("a child of ours")
 }
 
-/// Draws in whole blocks, and lines that are none, by what the file itself says.
+/// Number of draws in complete blocks, and number of damaged lines.
 fn lines(text: &str) -> (u64, usize) {
     let blocks: Vec<Option<u64>> = text
         .split_inclusive('\n')
@@ -90,14 +90,14 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
             "{message}"
         );
     }
-    // Without a file there is nothing to go on from, which is message.
+    // Without a file the message states that nothing was stored.
     let bench = Bench::new();
     let child = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
     std::thread::sleep(Duration::from_millis(500));
     signal(&child, libc::SIGINT);
     let output = ended(child);
     let message = String::from_utf8_lossy(&output.stderr);
-    // The signal may come before the program listens for it, on a machine that is busy; then it just ends.
+    // On a loaded machine the signal may arrive before the program handles it; then the signal ends the program.
     assert!(
         output
             .status
@@ -161,7 +161,7 @@ fn rejects_a_file_that_another_process_uses() {
 fn reports_a_full_disk_and_keeps_completed_draws() {
     let bench = Bench::new();
     let arguments = format!("{XY} --draws 30000 --file a.study --json");
-    // 32 blocks of 512 bytes (1024 in some shells): 16 or 32 kB of some 70 kB.
+    // 32 blocks of 512 bytes (1024 in some shells): 16 or 32 kB of about 70 kB.
     let script = "trap '' XFSZ; ulimit -f 32; exec \"$0\" \"$@\"";
     let mut command = Command::new("sh");
     command
@@ -200,7 +200,7 @@ fn reports_a_full_disk_and_keeps_completed_draws() {
         (answer.code, answer.out),
         (0, bench.run(&format!("{XY} --draws 30000 --json")).out)
     );
-    // A table that does not fit is a failure as well.
+    // A table on a full disk is a failure as well.
     let full = bench.run(&format!("{XY} --draws 1000 --csv /dev/full"));
     assert!(
         full.code == 1 && full.err.contains("cannot write /dev/full"),

@@ -1,6 +1,6 @@
 //! `bench model study`: manufacturing tolerances, at the process boundary.
 //!
-//! Truth comes from closed forms and from `tests/python/study.py`, which shares no line with the program.
+//! Reference values come from closed forms and from `tests/python/study.py`, which is independent of the program.
 
 use bench_test_support::program;
 use bench_test_support::truth;

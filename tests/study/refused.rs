@@ -1,4 +1,4 @@
-//! What is no study is refused before a draw is made, with the reason and the remedy; and what a draw may meet is counted.
+//! Invalid studies are rejected before the first draw, with reason and remedy; failed draws are counted.
 
 use serde_json::json;
 
@@ -38,12 +38,13 @@ fn rejects_invalid_tolerances() {
         ),
         ("plant.beam_length_m=normal:0", &["above zero"]),
         ("plant.youngs_modulus_pa=+-1mm", &["a length in m", "Pa"]),
-        // Of a ratio, a percentage is of 1.
+        // A percentage of a ratio refers to 1.
         (
             "plant.secondary_mass_deviation.sL=+-100%",
             &["reaches -1", "allowed is -0.9 to 9"],
         ),
-        // Out of range at one end; a normal one at six sigma; a relation between two settings.
+        // Uniform tolerance out of range at one end; normal tolerance out of range at 6 sigma; violated relation between two
+        // settings.
         (
             "plant.secondary_mass_deviation.sL=uniform:-1:0",
             &["reaches -1", "allowed is -0.9 to 9", "narrow it"],
@@ -126,15 +127,15 @@ fn rejects_a_plant_without_response() {
 #[test]
 fn failed_draws_are_reported_separately() {
     let bench = Bench::new();
-    // Beams of 10 to 30 mm, and an operating point of 0 to 25 mm: each end is allowed with the other's nominal value, but
-    // beyond the length of the beams there is none. Of u < v, u uniform on 10..30 and v on 0..25: (15 x 15/2)/(20 x 25).
+    // Beam length of 10 to 30 mm, operating point of 0 to 19.9 mm: each limit is valid with the nominal value of the other setting,
+    // but an operating point beyond the length of the beams is not.
     let stage = "--config chapter2 --set plant.beam_length_m=0.02 --set plant.operating_point_m=0.01 --set plant.beam_thickness_m=2e-4";
     let vary =
         "--vary plant.beam_length_m=+-10mm --vary plant.operating_point_m=uniform:-10mm:9.9mm";
     let answer = bench.json(&format!(
         "model study {stage} {vary} --draws 4000 --csv draws.csv"
     ));
-    // v on 0..19.9 mm: u < v in (9.9 x 9.9/2)/(20 x 19.9).
+    // Length u uniform on 10..30 mm, operating point v on 0..19.9 mm: P(u < v) = (9.9 x 9.9/2)/(20 x 19.9).
     let expected = 9.9 * 9.9 / 2.0 / (20.0 * 19.9);
     let failed = number(&answer["not_analysed"]["draws"]);
     assert!(
@@ -166,7 +167,7 @@ fn failed_draws_are_reported_separately() {
         "{}",
         text.out
     );
-    // All of them, and it is still an answer.
+    // Without failed draws the object is present and empty.
     assert_eq!(
         bench.json(&format!("{XY} --draws 1"))["not_analysed"],
         json!({"draws": 0, "examples": []})

@@ -1,4 +1,4 @@
-//! Tables out.
+//! Tables as CSV and Parquet.
 
 use crate::figures::XY;
 use crate::program::Bench;
@@ -65,7 +65,7 @@ mod parquet {
     #[test]
     fn parquet_equals_csv() {
         let bench = Bench::new();
-        // In the second one some draws cannot be analysed: null in the table.
+        // In the second command some draws cannot be analysed: null in the table.
         let beams = "model study --config chapter2 --set plant.beam_length_m=0.02 --set plant.operating_point_m=0.01 --vary plant.beam_length_m=+-10mm --vary plant.operating_point_m=+-9.9mm --draws 300";
         let commands = [
             format!("{XY} --draws 2000 --damped"),

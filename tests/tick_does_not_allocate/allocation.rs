@@ -72,7 +72,7 @@ fn requests_do_not_allocate_and_programs_are_freed_outside_the_tick() {
             Request::Clear
         });
         test_loop.request(Request::Stop);
-        // Nobody collects the programs here: after four the ring is full, and they are kept rather than freed in the tick.
+        // No one takes the ended programs: after four the ring is full, and the tick keeps them instead of freeing them.
         for _ in 0..3 {
             assert_no_alloc(|| test_loop.bare_tick(0));
         }

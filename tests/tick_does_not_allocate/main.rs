@@ -1,4 +1,4 @@
-//! A tick allocates nothing and makes no system call: proven on the loop itself, whatever it runs and whatever goes wrong.
+//! A tick does not allocate and makes no system call, with every program and every fault.
 mod allocation;
 mod programs;
 mod system_calls;
@@ -18,7 +18,7 @@ fn stage() -> Config {
     load(&Source::default()).expect("the profile is valid")
 }
 
-/// A trip of every kind: its reason, what goes wrong, and what is commanded.
+/// A trip of every kind: reason, fault, and commanded current in amperes.
 fn all_trips() -> Vec<(&'static str, Fault, f64)> {
     vec![
         ("travel", Fault::Position(0.00095), 0.01),
@@ -37,7 +37,7 @@ fn all_trips() -> Vec<(&'static str, Fault, f64)> {
     ]
 }
 
-/// The stage would run away under a constant current: the motor's force is as good as none here.
+/// The stage with a very small motor force, so that a constant current does not move it to the soft limit.
 fn weak_motor() -> Config {
     let mut config = stage();
     let (peak_a, rated_a) = (

@@ -1,4 +1,4 @@
-//! Programs of every kind, each for about a second.
+//! Programs of every kind, each with a duration of about 1 s.
 use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
 };
@@ -9,10 +9,10 @@ use bench::excitation::{
 };
 use bench::rt::program::{Control, Excite, Program};
 
-/// The program that commands nothing.
+/// Name of the program that commands zero current.
 pub const NO_CURRENT: &str = "no current";
 
-/// Whatever the loop can run, each with a few seconds of its own.
+/// A program of every kind, with its name.
 pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     let period_s = config.servo.period_s();
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -86,7 +86,7 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     }
     for &kind in ExcitationKind::ALL {
         programs.push((
-            format!("{kind:?} by its settings"),
+            format!("{kind:?} from its settings"),
             Box::new(Excite(short(config, kind).chosen_excitation().build())),
         ));
     }
@@ -103,7 +103,7 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     programs
 }
 
-/// An excitation of nearly a second; the chirp comes twice.
+/// Settings for an excitation of almost 1 s; the chirp has two repetitions.
 fn short(config: &Config, kind: ExcitationKind) -> Config {
     let mut config = config.clone();
     config.excitation.kind = kind;

@@ -9,17 +9,17 @@ use crate::programs::programs;
 use crate::test_loop::{ConstantCurrent, TestLoop};
 use crate::{all_trips, stage, weak_motor};
 
-/// What became of a child.
+/// How a child process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Termination {
     Exit(i32),
     Signal(i32),
 }
 
-/// Runs `work` in a child of one thread and waits for its end; 0 is the exit code of a child that came to it.
+/// Runs `work` in a forked child with a single thread and waits for it. The exit code is 0 if `work` returns.
 fn in_child_process(work: impl FnOnce()) -> Termination {
-    // SAFETY: the child has this thread alone. What it does before `_exit` takes no lock that another thread may hold: the
-    // loop is made before the fork, and the ticks are here to be shown to need none.
+    // SAFETY: the child has only this thread. Until `_exit` it takes no lock that another thread may hold: the loop is created
+    // before the fork, and its ticks must not lock, which these tests check.
     let child = unsafe { libc::fork() };
     assert!(
         child >= 0,
@@ -28,11 +28,11 @@ fn in_child_process(work: impl FnOnce()) -> Termination {
     );
     if child == 0 {
         work();
-        // SAFETY: ends the child at once, without running anything of the parent's.
+        // SAFETY: ends the child at once, without exit handlers of the parent.
         unsafe { libc::_exit(0) };
     }
     let mut status = 0;
-    // SAFETY: `status` outlives the call; `child` is a child of this process that nobody else waits for.
+    // SAFETY: `status` outlives the call; `child` is a child of this process, and only this call waits for it.
     let waited = unsafe { libc::waitpid(child, &raw mut status, 0) };
     assert_eq!(waited, child, "{}", std::io::Error::last_os_error());
     if libc::WIFSIGNALED(status) {
@@ -42,7 +42,7 @@ fn in_child_process(work: impl FnOnce()) -> Termination {
     }
 }
 
-/// From here on the kernel kills the process at any system call but those named (and the ends of a process).
+/// From now on the kernel kills the process at any system call except `calls`, `exit`, `exit_group` and `rt_sigreturn`.
 fn allow_only(calls: &[libc::c_long]) {
     const LOAD_WORD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
     const JUMP_IF_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
@@ -50,7 +50,7 @@ fn allow_only(calls: &[libc::c_long]) {
     let line = |code, jt, jf, k| libc::sock_filter { code, jt, jf, k };
     let mut filter = [line(RETURN, 0, 0, libc::SECCOMP_RET_KILL_PROCESS); 16];
     let always = [libc::SYS_exit, libc::SYS_exit_group, libc::SYS_rt_sigreturn];
-    // The system call's number stands first in what a filter sees.
+    // The number of the system call is the first word of the filter's data.
     filter[0] = line(LOAD_WORD, 0, 0, 0);
     let mut next = 1;
     for call in always.iter().chain(calls) {
@@ -62,7 +62,7 @@ fn allow_only(calls: &[libc::c_long]) {
         len: filter.len() as u16,
         filter: filter.as_mut_ptr(),
     };
-    // SAFETY: the kernel copies the program, which outlives the call; both calls concern this thread alone.
+    // SAFETY: the kernel copies the program, which outlives the call; both calls affect this thread only.
     let refused = unsafe {
         libc::prctl(libc::PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0
             || libc::prctl(
@@ -72,15 +72,15 @@ fn allow_only(calls: &[libc::c_long]) {
             ) != 0
     };
     if refused {
-        // SAFETY: ends the child; 99 tells the parent that the kernel has no filters.
+        // SAFETY: ends the child; exit code 99 means that the kernel has no system call filters.
         unsafe { libc::_exit(99) };
     }
 }
 
 const TICKS: u64 = 20_000;
 
-/// Other chains than the default: a drive that measures its current, delays of several ticks, a probe of its own clock with
-/// its queue, and the stage with its quadratic geometry.
+/// Signal chains other than the default: a drive that measures its current, delays of several ticks, a free-running probe with
+/// its queue, and the stage with quadratic geometry.
 fn chains() -> Vec<(&'static str, Config)> {
     let with = |config: Option<&str>, sets: &[&str]| {
         let sets = sets.iter().map(|set| set.to_string()).collect();
@@ -131,7 +131,7 @@ fn other_signal_chains_do_not_allocate_or_make_system_calls() {
         assert_eq!(
             termination,
             Termination::Exit(0),
-            "{name}: a signal is a system call in a tick"
+            "{name}: a signal means a system call in a tick"
         );
     }
 }
@@ -148,13 +148,13 @@ fn programs_make_no_system_calls() {
                 test_loop.bare_tick(0);
                 test_loop.collect();
             }
-            // SAFETY: as in the parent; 1 says that the program did not run.
+            // SAFETY: ends the child; exit code 1 means that the program did not run.
             unsafe { libc::_exit(if test_loop.has_done(&name) { 0 } else { 1 }) };
         });
         assert_eq!(
             termination,
             Termination::Exit(0),
-            "{name}: a signal is a system call in a tick"
+            "{name}: a signal means a system call in a tick"
         );
     }
 }
@@ -187,7 +187,7 @@ fn trips_requests_and_late_ticks_make_no_system_calls() {
                 test_loop.bare_tick(2);
                 test_loop.collect();
             }
-            // SAFETY: as above; 1 says that there was no such trip.
+            // SAFETY: ends the child; exit code 1 means that the trip did not occur.
             unsafe { libc::_exit(if test_loop.trip == Some(reason) { 0 } else { 1 }) };
         });
         assert_eq!(termination, Termination::Exit(0), "{reason}, {fault:?}");
@@ -214,7 +214,7 @@ fn real_time_loop_makes_only_clock_system_calls() {
         }
     });
     assert_eq!(termination, Termination::Exit(0));
-    assert_eq!(test_loop.commands, 0, "the child ran its own copy");
+    assert_eq!(test_loop.commands, 0, "the child runs a copy of the loop");
 }
 
 #[test]
@@ -225,29 +225,29 @@ fn detects_a_system_call_or_an_allocation() {
     let prints = in_child_process(|| {
         allow_only(&[]);
         test_loop.bare_tick(0);
-        // SAFETY: an empty text; the call itself is what the filter must see.
+        // SAFETY: writes zero bytes; the filter must detect the call.
         unsafe { libc::write(2, std::ptr::null(), 0) };
     });
-    assert_eq!(prints, killed, "a print is one system call");
+    assert_eq!(prints, killed, "a print is a system call");
     let maps = in_child_process(|| {
         allow_only(&[]);
-        // 64 MiB come from the system, never from what the process already has.
+        // 64 MiB need a system call, because they exceed the free memory of the heap.
         let memory = vec![1u8; 64 << 20];
         std::hint::black_box(&memory);
     });
-    assert_eq!(maps, killed, "so is a large allocation");
+    assert_eq!(maps, killed, "a large allocation is a system call");
     let waits = in_child_process(|| {
         allow_only(&[]);
         std::thread::sleep(std::time::Duration::from_millis(1));
     });
-    assert_eq!(waits, killed, "so is a sleep");
+    assert_eq!(waits, killed, "a sleep is a system call");
     let allocates = in_child_process(|| {
         assert_no_alloc(|| std::hint::black_box(Box::new(1u8)));
     });
     assert_eq!(
         allocates,
         Termination::Signal(libc::SIGABRT),
-        "and a single byte from the heap is an abort"
+        "an allocation of one byte aborts"
     );
     assert_eq!(in_child_process(|| ()), Termination::Exit(0));
 }

@@ -1,4 +1,4 @@
-//! The loop with its rings, driven tick by tick without an allocation of its own.
+//! The loop with its rings, driven tick by tick. The driver does not allocate either.
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -16,7 +16,7 @@ use rtrb::{Consumer, Producer, RingBuffer};
 use crate::faulty_rig::{Fault, FaultyRig};
 use crate::programs::NO_CURRENT;
 
-/// A loop with its rings, and what comes out of them.
+/// A loop with its rings, and a summary of its messages.
 pub struct TestLoop {
     pub servo: Servo,
     pub requests: Producer<Request>,
@@ -72,7 +72,7 @@ impl TestLoop {
         assert!(self.requests.push(request).is_ok());
     }
 
-    /// What the loop does in a tick, and nothing else.
+    /// One tick of the loop, after `missed` missed ticks.
     pub fn bare_tick(&mut self, missed: u32) {
         let moment = self
             .clock
@@ -82,7 +82,7 @@ impl TestLoop {
         self.next = moment.tick.number + 1;
     }
 
-    /// What others do between two ticks; allocates nothing either.
+    /// Reads the messages between two ticks, without an allocation.
     pub fn collect(&mut self) {
         while let Ok(published) = self.records.pop() {
             match published {
@@ -96,7 +96,7 @@ impl TestLoop {
         }
     }
 
-    /// Whether the program came to its end, and commanded what it is there for.
+    /// Whether the program completed and commanded a current (or none, if that is its purpose).
     pub fn has_done(&self, name: &str) -> bool {
         let commanded = if name == NO_CURRENT {
             self.commands == 0

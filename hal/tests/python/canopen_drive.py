@@ -1,14 +1,14 @@
-"""A CiA 402 drive made of python's canopen, a CANopen stack of other hands; what it adds is the state machine.
+"""A CiA 402 drive based on Python's canopen, an independent CANopen stack. This script adds the state machine.
 
     canopen_drive.py INTERFACE NODE
 
-SDO server, NMT, heartbeat, emergency messages and the packing of PDOs are the library's; the PDOs are those that a master
-has written into the object dictionary. A line on stdin is answered by one on stdout:
+The library provides SDO server, NMT, heartbeat, emergency messages and the packing of PDOs; the master writes the PDO mapping
+into the object dictionary. Each line on stdin is answered by one line on stdout:
 
-    show          state of the power stage, target that is followed in per mille, NMT state
-    fault CODE    an emergency message with this code (hexadecimal) and the state Fault
+    show          state of the power stage, followed target in per mille, NMT state
+    fault CODE    sends an emergency message with this code (hexadecimal) and enters the state Fault
 
-It does not watch its master's heartbeat: the library does not, and the simulated drive of bench-hal does.
+It does not monitor the heartbeat of its master, because the library does not. The simulated drive of bench-hal does.
 """
 
 import struct
@@ -33,7 +33,7 @@ def variable(name, kind, default, index, sub=0, access="rw"):
 
 
 def several(container, name, index, members):
-    """An array or record: sub-index 0 and what follows."""
+    """An array or record: sub-index 0 and the following ones."""
     new = container(name, index)
     for sub, (kind, default) in members.items():
         new.add_member(variable(f"{name} {sub}", kind, default, index, sub))
@@ -57,7 +57,7 @@ def dictionary(node_id):
     for index, kind, default, access in [
         (0x1000, U32, 0x00020192, "ro"),
         (0x1001, U8, 0, "ro"),
-        (0x1008, datatypes.VISIBLE_STRING, "a drive of other hands", "ro"),
+        (0x1008, datatypes.VISIBLE_STRING, "independent drive", "ro"),
         (0x1017, U16, 0, "rw"),
         (0x6007, I16, 0, "rw"),
         (0x6040, U16, 0, "rw"),
@@ -74,17 +74,17 @@ def dictionary(node_id):
     return objects
 
 
-def towards(state, order):
-    """The state after an order, by the arrows of CiA 402."""
+def next_state(state, controlword):
+    """The state after a controlword, by the transitions of CiA 402."""
     if state == FAULT:
         return FAULT
-    if not order & 0x02:
+    if not controlword & 0x02:
         return SWITCH_ON_DISABLED
-    if order & 0x07 == 0x06:
+    if controlword & 0x07 == 0x06:
         return READY
-    if order & 0x0F == 0x07:
+    if controlword & 0x0F == 0x07:
         return SWITCHED_ON if state in (READY, ENABLED) else state
-    if order & 0x0F == 0x0F:
+    if controlword & 0x0F == 0x0F:
         return {READY: SWITCHED_ON, SWITCHED_ON: ENABLED}.get(state, state)
     return state
 
@@ -98,21 +98,21 @@ class Drive:
         network.add_node(self.node)
         self.node.add_write_callback(self.on_write)
         self.node.rpdo[1].add_callback(self.on_set_point)
-        network.subscribe(0x000, self.on_nmt)  # after the library's own
+        network.subscribe(0x000, self.on_nmt)  # after the callback of the library
         network.subscribe(0x080, self.on_sync)
         self.node.nmt.send_command(0)
         self.node.nmt.state = "PRE-OPERATIONAL"
 
     def on_write(self, index, subindex, od, data):
         if index == 0x6040:
-            self.obey(struct.unpack("<H", data)[0])
+            self.on_controlword(struct.unpack("<H", data)[0])
         elif index == 0x6060:
             self.put(0x6061, data)
 
     def put(self, index, data):
         self.node.set_data(index, 0, data)
 
-    def obey(self, controlword):
+    def on_controlword(self, controlword):
         with self.lock:
             rises = controlword & ~self.controlword & 0x80
             self.controlword = controlword
@@ -120,11 +120,11 @@ class Drive:
                 self.state = SWITCH_ON_DISABLED
                 self.node.emcy.reset()
             else:
-                self.state = towards(self.state, controlword)
-            self.tell()
+                self.state = next_state(self.state, controlword)
+            self.update_status()
 
-    def tell(self):
-        """Statusword and actual value, into the object dictionary and the PDO."""
+    def update_status(self):
+        """Writes statusword and actual value into the object dictionary and the PDO."""
         enabled = self.state == ENABLED
         status = self.state | VOLTAGE_AND_REMOTE | (FOLLOWS_TARGET if enabled else 0)
         actual = self.target if enabled else 0
@@ -141,7 +141,7 @@ class Drive:
         with self.lock:
             self.node.rpdo[1].read()
             self.node.tpdo[1].read()
-            self.tell()
+            self.update_status()
             if self.node.tpdo[1].trans_type >= 254:
                 self.node.tpdo[1].start(self.node.tpdo[1].event_timer / 1000)
 
@@ -152,18 +152,18 @@ class Drive:
         if message.trans_type <= 240:
             self.waiting_for_sync = values
         else:
-            self.take(values)
+            self.apply(values)
 
-    def take(self, values):
+    def apply(self, values):
         with self.lock:
             self.target = values[0x6071]
-            self.obey(values[0x6040])
+            self.on_controlword(values[0x6040])
 
     def on_sync(self, can_id, data, timestamp):
         status = self.node.tpdo[1]
         if self.node.nmt.state == "OPERATIONAL" and status.trans_type == 1:
             if self.waiting_for_sync is not None:
-                self.take(self.waiting_for_sync)
+                self.apply(self.waiting_for_sync)
                 self.waiting_for_sync = None
             status.transmit()
 
@@ -171,7 +171,7 @@ class Drive:
         self.node.emcy.send(code, 0x01)
         with self.lock:
             self.state = FAULT
-            self.tell()
+            self.update_status()
 
 
 def main():

@@ -1,4 +1,4 @@
-"""A CANopen master made of python's canopen, a stack of other hands, against bench-hal's simulated drive (node 5).
+"""A CANopen master based on Python's canopen, an independent stack, with the simulated drive of bench-hal (node 5).
 
     canopen_master.py INTERFACE
 """
@@ -39,12 +39,12 @@ def objects(sdo):
     refused(lambda: sdo.upload(0x7777, 0), 0x06020000)  # no such object
     refused(lambda: sdo.upload(0x1018, 9), 0x06090011)  # no such sub-index
     refused(lambda: sdo.download(0x6041, 0, b"\0\0"), 0x06010002)  # read only
-    refused(lambda: sdo.download(0x6060, 0, b"\x08"), 0x06090030)  # a mode it does not have
+    refused(lambda: sdo.download(0x6060, 0, b"\x08"), 0x06090030)  # an unsupported mode
     refused(lambda: sdo.download(0x6071, 0, b"\0"), 0x06070010)  # length
 
 
 def configure(sdo):
-    """Cyclic torque, set-points as they come, status with SYNC."""
+    """Cyclic torque mode, asynchronous set-points, status with SYNC."""
     sdo.download(0x1017, 0, struct.pack("<H", 50))
     sdo.download(0x6060, 0, b"\x0a")
     for parameters, cob_id, kind, words in (
@@ -52,7 +52,7 @@ def configure(sdo):
         (0x1800, STATUS, 1, (0x60410010, 0x60770010)),
     ):
         mapping = parameters + 0x200
-        refused(lambda: sdo.download(mapping, 1, struct.pack("<I", words[0])), 0x06010000)  # the PDO is still on
+        refused(lambda: sdo.download(mapping, 1, struct.pack("<I", words[0])), 0x06010000)  # the PDO is still enabled
         sdo.download(parameters, 1, struct.pack("<I", cob_id | 1 << 31))
         sdo.download(mapping, 0, b"\0")
         for sub, word in enumerate(words, 1):
@@ -63,13 +63,13 @@ def configure(sdo):
 
 
 def drive(network):
-    """Up to Operation Enabled, both directions of current, and off."""
+    """Operation Enabled, both directions of current, and off."""
     statuses = []
     network.subscribe(STATUS, lambda _id, data, _time: statuses.append(struct.unpack("<Hh", data)))
     for controlword, target, state, actual in (
         (0x06, 0, 0x21, 0),
         (0x07, 0, 0x23, 0),
-        (0x07, 250, 0x23, 0),  # a target before operation is enabled gives nothing
+        (0x07, 250, 0x23, 0),  # a target before Operation Enabled has no effect
         (0x0F, 0, 0x27, 0),
         (0x0F, 250, 0x27, 250),
         (0x0F, -250, 0x27, -250),
@@ -97,7 +97,7 @@ def main():
     node.sdo.RESPONSE_TIMEOUT = 10
     objects(node.sdo)
     configure(node.sdo)
-    # The drive watches this master, and disables its voltage without it.
+    # The drive monitors the heartbeat of this master and disables its voltage without it.
     node.sdo.download(0x6007, 0, struct.pack("<h", 2))
     node.sdo.download(0x1016, 1, struct.pack("<I", 0x7F << 16 | 2000))
     heartbeat = network.send_periodic(OWN_HEARTBEAT, b"\5", 0.1)

@@ -10,7 +10,7 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier};
 use crate::support::adapter::Adapter;
 use crate::support::{BIT_RATE, Rig, host, settings, wait_for};
 
-/// The next condition; that the interface was down in between does not count.
+/// The next condition of the bus. Errors while the interface is down are ignored.
 fn condition(bus: &mut dyn CanBus) -> Condition {
     let mut found = None;
     wait_for("a condition", || {
@@ -22,7 +22,7 @@ fn condition(bus: &mut dyn CanBus) -> Condition {
     found.unwrap()
 }
 
-/// One test, since there is one adapter: the parts build upon each other.
+/// One test, because there is one adapter; each part depends on the previous one.
 #[test]
 fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
     let adapter = Adapter::new();
@@ -33,9 +33,9 @@ fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
     adapter.send("sw096000");
     assert_eq!(condition(listener.as_mut()), Condition::Warning);
     rig.assert_current(-1.0, -1.0);
-    let seen = Interface::read(&name).unwrap();
+    let interface = Interface::read(&name).unwrap();
     assert_eq!(
-        (seen.state, seen.is_healthy, seen.bit_rate),
+        (interface.state, interface.is_healthy, interface.bit_rate),
         (Some("error warning"), true, Some(BIT_RATE))
     );
 
@@ -56,7 +56,10 @@ fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
         refused.contains("is in state bus off; check cable, termination and bit rate"),
         "{refused}"
     );
-    assert!(rig.drive.reset_fault().is_err(), "still off");
+    assert!(
+        rig.drive.reset_fault().is_err(),
+        "the controller is still in bus-off"
+    );
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_OFF));
 
     adapter.restart_interface();

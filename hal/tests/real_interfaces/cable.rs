@@ -1,4 +1,4 @@
-//! The interface goes down, or away, while current flows.
+//! The interface goes down or is removed while current flows.
 
 use bench_hal::CurrentAmplifier;
 use bench_hal::can::drive::{fault_text, faults};
@@ -20,7 +20,10 @@ fn interface_down_stops_the_drive_and_can_be_cleared() {
             "`ip link set IFACE up`, then clear the fault"
         )
     );
-    assert!(rig.drive.reset_fault().is_err(), "still down");
+    assert!(
+        rig.drive.reset_fault().is_err(),
+        "the interface is still down"
+    );
     vcan.set_up(true);
     rig.assert_recovers();
 }

@@ -18,20 +18,20 @@ fn drive_on_another_card_runs_and_cards_report_their_state() {
     let mut rig = Rig::new("can0", &host("can1"), settings()).enabled();
     rig.assert_current(-2.0, -2.0);
     for card in ["can0", "can1"] {
-        let seen = Interface::read(card).unwrap();
-        assert!(seen.is_up && seen.is_healthy, "{seen:?}");
+        let state = Interface::read(card).unwrap();
+        assert!(state.is_up && state.is_healthy, "{state:?}");
         assert_eq!(
-            (seen.bit_rate, seen.state),
+            (state.bit_rate, state.state),
             (Some(BIT_RATE), Some("error active"))
         );
         assert_eq!(
-            (seen.error_counters, seen.restart_ms),
+            (state.error_counters, state.restart_ms),
             (Some((0, 0)), Some(100))
         );
     }
     drop(rig.drive);
-    let seen = inspect(&host("can0"), 5, Duration::from_secs(3)).unwrap();
-    assert_eq!(seen.name.as_deref(), Some("simulated CANopen drive"));
+    let state = inspect(&host("can0"), 5, Duration::from_secs(3)).unwrap();
+    assert_eq!(state.name.as_deref(), Some("simulated CANopen drive"));
 
     let refused = SocketPort::open("can0", 500_000).unwrap_err().to_string();
     assert!(

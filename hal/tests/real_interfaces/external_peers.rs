@@ -1,4 +1,4 @@
-//! The driver against a drive, and the simulated drive against a master, of another CANopen stack: python's canopen.
+//! The driver with a drive, and the simulated drive with a master, of an independent CANopen stack: Python's canopen.
 
 use std::time::Duration;
 
@@ -12,12 +12,12 @@ use crate::support::python::{PythonDrive, script};
 use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, host, open, settings, wait_for};
 
-/// A loop at the pace of the script, until the drive shows `shown`.
-fn command_until(drive: &mut CanopenDrive, current_a: f64, peer: &mut PythonDrive, shown: &str) {
-    wait_for(shown, || {
+/// Commands a current at the rate of the script, until the drive reports the state `expected`.
+fn command_until(drive: &mut CanopenDrive, current_a: f64, peer: &mut PythonDrive, expected: &str) {
+    wait_for(expected, || {
         let _ = drive.command(current_a); // refused in the tick in which a fault is found
         std::thread::sleep(Duration::from_millis(10));
-        peer.state() == shown
+        peer.state() == expected
     });
 }
 
@@ -25,8 +25,8 @@ fn command_until(drive: &mut CanopenDrive, current_a: f64, peer: &mut PythonDriv
 fn assert_runs(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
     drive.enable().unwrap();
     assert_eq!(peer.state(), "27 0 OPERATIONAL");
-    for (current_a, shown) in [(1.0, "27 250 OPERATIONAL"), (-2.0, "27 -500 OPERATIONAL")] {
-        command_until(drive, current_a, peer, shown);
+    for (current_a, expected) in [(1.0, "27 250 OPERATIONAL"), (-2.0, "27 -500 OPERATIONAL")] {
+        command_until(drive, current_a, peer, expected);
         wait_for("the actual current", || {
             let _ = drive.command(current_a);
             drive.actual_current_a() == Some(current_a)
@@ -35,14 +35,14 @@ fn assert_runs(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
     assert_eq!(drive.status(), AmplifierStatus::Enabled);
 }
 
-/// A fault of the drive is reported, and cleared by the operator.
+/// A fault of the drive is reported and can be cleared.
 fn assert_fault_is_cleared(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
     peer.inject_fault(0x4210);
     command_until(drive, 1.0, peer, "08 0 OPERATIONAL");
     let fault = AmplifierStatus::Fault(faults::EMERGENCY + 0x4210);
     wait_for("the fault", || drive.status() == fault);
     assert_eq!(fault_text(faults::EMERGENCY + 0x4210).what, "drive too hot");
-    assert!(drive.enable().is_err(), "a fault is not left by enabling");
+    assert!(drive.enable().is_err(), "enabling must not clear a fault");
     assert_eq!(peer.state(), "08 0 OPERATIONAL");
     drive.reset_fault().unwrap();
     assert_eq!(
@@ -55,8 +55,8 @@ fn assert_fault_is_cleared(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
 fn driver_operates_an_independent_drive() {
     let vcan = Vcan::up();
     let mut peer = PythonDrive::new(&vcan.name);
-    let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
-    assert_eq!(seen.name.as_deref(), Some("a drive of other hands"));
+    let identity_read = inspect(&host(&vcan.name), 5, Duration::from_secs(10)).unwrap();
+    assert_eq!(identity_read.name.as_deref(), Some("independent drive"));
     let identity = ExpectedIdentity {
         vendor: Some(0x123),
         serial: Some(42),
@@ -89,11 +89,11 @@ fn independent_master_operates_the_emulated_drive() {
     let vcan = Vcan::up();
     let far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
     let output = script("canopen_master.py", &vcan.name).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stdout).into_owned()
+    let output_text = String::from_utf8_lossy(&output.stdout).into_owned()
         + &String::from_utf8_lossy(&output.stderr);
     assert!(
-        output.status.success() && said.contains("all well"),
-        "{said}"
+        output.status.success() && output_text.contains("all well"),
+        "{output_text}"
     );
     assert_eq!(far_end.current_a(), 0.0);
 }

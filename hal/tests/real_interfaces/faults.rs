@@ -1,4 +1,4 @@
-//! Every fault of a drive, over a real socket: detected, no current, and usable again after the operator clears it.
+//! Every fault of a drive over a real socket: it is detected, the current is zero, and the operator can clear it.
 
 use std::time::Duration;
 
@@ -9,13 +9,13 @@ use bench_hal::can::emulator::{DeviceFault, EmulatedAmplifier};
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, open, settings, wait_for};
 
-/// `fault` is found as `code`, is cleared with its cause, and the drive can be opened anew, too.
+/// Asserts that `fault` is detected as `code`, can be cleared without its cause, and that the drive can be opened again.
 fn assert_detected_and_cleared(fault: DeviceFault, code: u32) {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     rig.far_end.device().inject(fault);
-    let found = rig.fault();
-    assert_eq!(found, code, "{fault:?}: {}", fault_text(found).what);
+    let detected = rig.fault();
+    assert_eq!(detected, code, "{fault:?}: {}", fault_text(detected).what);
     rig.assert_recovers();
     let Rig { drive, far_end } = rig;
     drop(drive);
@@ -85,7 +85,7 @@ fn detects_a_drive_with_late_frames() {
     rig.far_end.device().inject(DeviceFault::Late(700));
     assert_eq!(rig.fault(), faults::STATUS_LOST);
     rig.far_end.device().inject(DeviceFault::None);
-    std::thread::sleep(2 * late); // what is on the way still comes
+    std::thread::sleep(2 * late); // delayed frames still arrive
     rig.assert_recovers();
 }
 
@@ -96,7 +96,11 @@ fn drive_that_ignores_disable_is_stopped_by_nmt_or_lost_heartbeat() {
         let mut rig = vcan.running();
         rig.far_end.device().inject(fault);
         rig.drive.disable();
-        assert_eq!(rig.far_end.current_a(), 1.0, "{fault:?}: it does not obey");
+        assert_eq!(
+            rig.far_end.current_a(),
+            1.0,
+            "{fault:?}: the drive ignores the request"
+        );
         rig.far_end.wait_until_off();
         assert_eq!(rig.fault(), faults::STILL_ENABLED, "{fault:?}");
         rig.assert_recovers();
@@ -108,7 +112,7 @@ fn switches_off_when_the_loop_sends_no_commands() {
     let vcan = Vcan::up();
     let mut rig = vcan.running();
     let code = i64::from(faults::COMMANDS_STOPPED);
-    wait_for("a loop that stands still is missed", || {
+    wait_for("the driver detects the stopped loop", || {
         rig.far_end.current_a() == 0.0
     });
     assert_eq!(rig.drive.enable().unwrap_err().code, code);

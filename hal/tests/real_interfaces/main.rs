@@ -1,8 +1,8 @@
-//! The drivers on real interfaces: SocketCAN, slcan, CAN cards and UARTs of a kernel, and programs of other hands.
+//! The drivers on real interfaces: SocketCAN, slcan, CAN cards and UARTs of a kernel, and external programs.
 //!
-//! These tests make and delete network interfaces and need cards that few machines have, so they run in the emulated
-//! machine of `.ci/vm` (`.ci/vm/check`), and a plain `cargo test` does not build them. Time there is emulated: contents
-//! and states are asserted, never latencies, and the drivers' time limits are raised (`support::settings`).
+//! These tests create and delete network interfaces and need cards that few machines have. They run in the virtual machine of
+//! `.ci/vm` (`.ci/vm/check`), and `cargo test` does not build them. Time is emulated there, so the tests check contents and
+//! states but no latencies, and the time limits of the drivers are longer (`support::settings`).
 
 mod bus_off;
 mod cable;

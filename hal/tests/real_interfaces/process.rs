@@ -1,4 +1,4 @@
-//! The process dies in the middle of it.
+//! The process is killed while current flows.
 
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -11,7 +11,7 @@ use bench_hal::can::emcy;
 use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, open, refusal, settings, wait_for};
 
-/// Tells the test below that it is the process to be killed, and its interface.
+/// Interface of the child process. If it is set, the test below is the process to be killed.
 const INTERFACE: &str = "BENCH_HAL_TO_BE_KILLED_ON";
 
 #[test]
@@ -33,7 +33,11 @@ fn drive_stops_and_node_is_released_after_the_process_is_killed() {
         child.id()
     );
     assert!(refused.starts_with(&holder), "{refused}");
-    assert_eq!(far_end.current_a(), 1.0, "the refused one changed nothing");
+    assert_eq!(
+        far_end.current_a(),
+        1.0,
+        "the refused opening must not change the current"
+    );
 
     child.kill().unwrap(); // SIGKILL
     child.wait().unwrap();
@@ -42,7 +46,7 @@ fn drive_stops_and_node_is_released_after_the_process_is_killed() {
     assert_eq!(
         first_emergency(emergencies.as_mut()),
         0x8130,
-        "the drive's own heartbeat consumer says so"
+        "the heartbeat consumer of the drive reports the loss"
     );
 
     let drive =
@@ -60,9 +64,9 @@ fn start_child_process(interface: &str) -> Child {
     command.spawn().unwrap()
 }
 
-/// What a user's process does, until it is killed. It dies with a parent that failed, too.
+/// Commands a current until the process is killed. The kernel also kills it when its parent ends.
 fn command_until_killed(interface: &str) -> ! {
-    // SAFETY: an integer goes in, nothing is pointed to.
+    // SAFETY: the arguments are integers.
     unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
     let mut drive = open(interface, settings()).unwrap();
     drive.enable().unwrap();
@@ -72,7 +76,7 @@ fn command_until_killed(interface: &str) -> ! {
     }
 }
 
-/// The code of the first emergency message that came.
+/// The code of the first received emergency message.
 fn first_emergency(bus: &mut dyn CanBus) -> u16 {
     let event = bus.receive(Duration::from_secs(10)).unwrap();
     let Some(BusEvent::Frame(frame)) = event else {

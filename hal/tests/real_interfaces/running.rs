@@ -30,15 +30,15 @@ fn drive_follows_quantised_set_points_and_is_disabled() {
             (rig.drive.status(), rig.far_end.current_a()),
             (AmplifierStatus::Enabled, 0.0)
         );
-        // 1 A of 4 A is 250 counts; 0.9985 A is 249.6 counts, so 250; beyond the limit of 4 A 1000 counts remain.
-        for (wanted_a, given_a) in [
+        // 1 A of 4 A is 250 counts; 0.9985 A is 249.6 counts, rounded to 250; above the limit of 4 A the value is 1000 counts.
+        for (command_a, applied_a) in [
             (1.0, 1.0),
             (-2.0, -2.0),
             (0.9985, 1.0),
             (-0.003, -0.004),
             (9.0, 4.0),
         ] {
-            rig.assert_current(wanted_a, given_a);
+            rig.assert_current(command_a, applied_a);
         }
         rig.drive.disable();
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
@@ -56,7 +56,7 @@ fn closing_leaves_the_drive_off_and_pre_operational() {
     let vcan = Vcan::up();
     let Rig { drive, far_end } = vcan.running();
     drop(drive);
-    wait_for("it is pre-operational and watches nobody", || {
+    wait_for("pre-operational, without heartbeat monitoring", || {
         let device = far_end.device();
         (device.nmt_state(), device.read(Address::new(0x1016, 1)))
             == (nmt::State::PreOperational, 0)
@@ -68,14 +68,14 @@ fn closing_leaves_the_drive_off_and_pre_operational() {
 fn rejects_drive_with_unexpected_identity() {
     let vcan = Vcan::up();
     let _far_end = FarEnd::new(&vcan.name, &host(&vcan.name));
-    let seen = inspect(&host(&vcan.name), 5, Duration::from_secs(3)).unwrap();
+    let inspection = inspect(&host(&vcan.name), 5, Duration::from_secs(3)).unwrap();
     assert_eq!(
-        seen.name.as_deref(),
+        inspection.name.as_deref(),
         Some("simulated CANopen drive"),
         "read in four segments"
     );
     assert_eq!(
-        (seen.identity, seen.rated_current_a),
+        (inspection.identity, inspection.rated_current_a),
         ([0x402, 1, 0x1_0000, 1].map(Some), Some(4.0))
     );
     let identity = ExpectedIdentity {
@@ -121,6 +121,6 @@ fn endpoint_receives_only_its_identifiers_in_their_format() {
     assert_eq!(
         all.receive(Duration::from_millis(50)),
         Ok(None),
-        "nobody hears himself"
+        "an endpoint does not receive its own frames"
     );
 }

@@ -1,7 +1,7 @@
 //! A probe at the other end of a real serial line: two cross-connected UARTs (16550, emulated), 8E1.
 //!
-//! The probe's own rate is 230400; an emulated 16550 takes 115200 at most, so that is the rate here. What parity the chips
-//! were told is asked of the kernel: the emulated wire has no bits that could be damaged, so damage comes from the probe.
+//! The probe uses 230400 baud, but an emulated 16550 supports at most 115200, so the tests use that. The emulated line has no
+//! parity bit: the kernel reports the parity setting of both chips, and the emulated probe produces the damaged bytes.
 
 use std::io::{Read, Write};
 use std::path::Path;
@@ -26,7 +26,7 @@ const THERE: &str = "/dev/ttyS3";
 const RANGE_M: f64 = 200e-6;
 const POSITION_M: f64 = 60e-6;
 
-/// A capaNCDT at the far end, with a stage that stands still.
+/// A capaNCDT at the far end, with the stage at rest.
 struct FarProbe {
     probe: SharedProbe,
     stop: Arc<AtomicBool>,
@@ -73,7 +73,7 @@ impl Drop for FarProbe {
 fn serve(mut line: serialport::TTYPort, probe: &SharedProbe, stop: &AtomicBool) {
     let (started, mut bytes) = (Instant::now(), [0; 64]);
     while !stop.load(Ordering::Acquire) {
-        let count = line.read(&mut bytes).unwrap_or(0); // nothing in time
+        let count = line.read(&mut bytes).unwrap_or(0); // 0 after a timeout
         let now_ns = started.elapsed().as_nanos() as u64;
         let answer = probe
             .lock()
@@ -83,32 +83,35 @@ fn serve(mut line: serialport::TTYPort, probe: &SharedProbe, stop: &AtomicBool) 
     }
 }
 
-/// Looks until the statistics please; every reading on the way is either right or not valid.
+/// Reads until `condition` holds. Every reading must be correct or not valid.
 fn read_until(
     probe: &mut SerialProbe,
     what: &str,
     mut condition: impl FnMut(&Reading, &Statistics) -> bool,
 ) -> Reading {
-    let (mut seen, mut sequence) = (Reading::default(), 0);
+    let (mut reading, mut sequence) = (Reading::default(), 0);
     wait_for(what, || {
-        seen = probe.latest(Tick::default());
-        let is_right = (seen.position_m - POSITION_M).abs() < 0.05e-6;
+        reading = probe.latest(Tick::default());
+        let is_correct = (reading.position_m - POSITION_M).abs() < 0.05e-6;
         assert!(
-            seen.validity != Validity::Valid || is_right,
-            "a false value: {seen:?}"
+            reading.validity != Validity::Valid || is_correct,
+            "a wrong value: {reading:?}"
         );
-        assert!(seen.sequence >= sequence, "{sequence} before {seen:?}");
-        sequence = seen.sequence;
-        condition(&seen, &probe.statistics())
+        assert!(
+            reading.sequence >= sequence,
+            "{sequence} before {reading:?}"
+        );
+        sequence = reading.sequence;
+        condition(&reading, &probe.statistics())
     });
-    seen
+    reading
 }
 
-/// Waits for so many more valid readings.
-fn reads(probe: &mut SerialProbe, more: u64) {
+/// Waits for `more` further valid readings.
+fn read_more(probe: &mut SerialProbe, more: u64) {
     let goal = probe.statistics().published + more;
-    read_until(probe, "readings", |seen, statistics| {
-        statistics.published >= goal && seen.validity == Validity::Valid
+    read_until(probe, "readings", |reading, statistics| {
+        statistics.published >= goal && reading.validity == Validity::Valid
     });
 }
 
@@ -129,7 +132,7 @@ fn settings(protocol: &Arc<dyn Protocol>, locks: &Path) -> ProbeSettings {
     ProbeSettings::new(port, Arc::clone(protocol))
 }
 
-/// With times for an emulated machine that may stand still: an answer has a second, and is complete after 200 ms of silence.
+/// With time limits for a virtual machine that may pause: 1 s for an answer, which is complete after 200 ms of silence.
 fn protocol() -> Arc<dyn Protocol> {
     Arc::new(capancdt::Settings {
         polling: Polling {
@@ -141,7 +144,7 @@ fn protocol() -> Arc<dyn Protocol> {
     })
 }
 
-/// One test, since there is one pair.
+/// One test, because there is one pair of UARTs.
 #[test]
 fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
     let protocol = protocol();
@@ -155,15 +158,17 @@ fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
         "{:?}",
         probe.notes()
     );
-    reads(&mut probe, 50);
+    read_more(&mut probe, 50);
     assert!(is_even(HERE) && is_even(THERE));
 
     far.inject_fault(Fault::Corrupt { every: 251 }); // after a pause an answer has up to 93 bytes
     let damaged = probe.statistics().damaged_bytes;
     let goal = probe.statistics().published + 10;
-    read_until(&mut probe, "damage, and values between", |_, statistics| {
-        statistics.damaged_bytes > damaged + 100 && statistics.published > goal
-    });
+    read_until(
+        &mut probe,
+        "damaged bytes and valid values",
+        |_, statistics| statistics.damaged_bytes > damaged + 100 && statistics.published > goal,
+    );
 
     far.inject_fault(Fault::Silence);
     let before = probe.statistics().timeouts;
@@ -177,7 +182,7 @@ fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
     );
     assert!(
         last.age_ns > 1_000_000_000,
-        "an old value says that it is old: {last:?}"
+        "the age of an old value: {last:?}"
     );
 
     far.inject_fault(Fault::Reset);
@@ -185,5 +190,5 @@ fn probe_over_8e1_gives_no_wrong_value_with_damage_silence_and_restart() {
         statistics.restarts == 1
     });
     far.inject_fault(Fault::None);
-    reads(&mut probe, 20);
+    read_more(&mut probe, 20);
 }

@@ -39,7 +39,7 @@ fn reads_the_position_of_a_probe_without_fault() {
             statistics.running && statistics.out_of_range == 0,
             "{statistics:?}"
         );
-        // The counters are read one after the other: they agree when nothing is received meanwhile.
+        // The counters are not read atomically, so they are compared while the probe is silent.
         rehearsal.inject_fault(Fault::Silence);
         until(probe, "all values accounted for", |_, statistics| {
             statistics.values

@@ -57,18 +57,18 @@ fn exclusive_use_ends_after_a_reader_was_killed() {
 #[test]
 fn bytes_without_a_reader_are_lost() {
     let rehearsal = Rehearsal::new(&optoncdt(), 20_000.0, still);
-    let nobody = shared(&rehearsal);
+    let observer = shared(&rehearsal);
     while rehearsal.sent() < 20_000 {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     rehearsal.inject_fault(Fault::Silence);
-    let waiting = nobody.bytes_to_read().unwrap();
+    let waiting = observer.bytes_to_read().unwrap();
     assert!(
         waiting < 2048 + 1024,
         "{waiting} bytes of {} wait",
         rehearsal.sent()
     );
-    drop(nobody);
+    drop(observer);
     rehearsal.inject_fault(Fault::None);
     let mut probe = rehearsal.open();
     until(&mut probe, "a new reading", |reading, _| {

@@ -67,7 +67,7 @@ fn helper_process_holds_the_port() {
     };
     let _probe = SerialProbe::open(ProbeSettings::new(port, protocol())).unwrap();
     println!("holding");
-    std::thread::sleep(Duration::from_secs(600)); // killed long before
+    std::thread::sleep(Duration::from_secs(600)); // the test kills this process earlier
 }
 
 #[test]
@@ -88,11 +88,11 @@ fn rejects_port_of_another_process_until_that_process_is_killed() {
         .env(HOLD, hold)
         .stdout(Stdio::piped());
     let mut other = command.spawn().unwrap();
-    let said = BufReader::new(other.stdout.take().unwrap())
+    let output = BufReader::new(other.stdout.take().unwrap())
         .lines()
         .map_while(Result::ok);
     assert!(
-        said.into_iter().any(|line| line.contains("holding")),
+        output.into_iter().any(|line| line.contains("holding")),
         "the other process did not open the port"
     );
     let error = refusal(rehearsal.settings());
@@ -113,7 +113,7 @@ fn rejects_terminal_locked_by_another_program() {
         .write(true)
         .open(&rehearsal.path)
         .unwrap();
-    let _theirs = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
+    let _locked = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
     let error = refusal(rehearsal.settings()).to_string();
     assert!(
         error.contains("held by another process; stop that first"),

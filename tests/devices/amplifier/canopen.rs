@@ -1,9 +1,9 @@
 //! The CANopen driver with the emulated drive: every fault in every state.
 use super::*;
 
-/// A fault, and what must follow from it.
+/// A fault and its required effect.
 struct Case {
-    word: &'static str,
+    fault: &'static str,
     /// While the amplifier is in use, the loop trips within this number of ticks, with this code.
     found: (u64, u32),
     /// The current is zero within this number of ticks.
@@ -12,9 +12,9 @@ struct Case {
     armed_into: Option<u32>,
 }
 
-const fn case(word: &'static str, found: (u64, u32), zero: u64, armed_into: Option<u32>) -> Case {
+const fn case(fault: &'static str, found: (u64, u32), zero: u64, armed_into: Option<u32>) -> Case {
     Case {
-        word,
+        fault,
         found,
         zero,
         armed_into,
@@ -95,7 +95,7 @@ fn runs_without_fault_complete_without_a_trip() {
         lab.bench.run(1000);
         assert_eq!(lab.bench.trips(), []);
         assert_eq!(lab.bench.state(), State::Running);
-        lab.next_run_completes();
+        lab.assert_next_run_completes();
     }
 }
 
@@ -106,24 +106,24 @@ fn every_fault_during_a_run_ends_the_current_in_time_and_the_next_run_completes(
             let mut lab = Lab::new();
             lab.run_until_current_flows(run);
             let begin = lab.last_tick();
-            lab.begin(case.word);
+            lab.begin_fault(case.fault);
             let zero = lab.ticks_with_current(AFTER);
             assert!(
                 zero <= case.zero,
                 "{}: current for {zero} ticks, {} are allowed",
-                case.word,
+                case.fault,
                 case.zero
             );
             assert!(
                 !lab.drive.is_enabled(),
                 "{}: {}",
-                case.word,
+                case.fault,
                 lab.drive.state()
             );
-            lab.trips_naming(case.found.1, begin..=begin + case.found.0);
+            lab.assert_trip_with_code(case.found.1, begin..=begin + case.found.0);
             match run {
-                Run::Chirp => lab.next_run_completes(),
-                Run::Control => lab.next_program_completes(),
+                Run::Chirp => lab.assert_next_run_completes(),
+                Run::Control => lab.assert_next_program_completes(),
             }
         }
     }
@@ -135,16 +135,16 @@ fn every_fault_while_armed_switches_the_amplifier_off_in_time() {
         let mut lab = Lab::new();
         lab.arm();
         let begin = lab.last_tick();
-        lab.begin(case.word);
+        lab.begin_fault(case.fault);
         let off = lab.ticks_enabled(AFTER);
         let allowed = case.zero.max(case.found.0 + SWITCH_OFF);
         assert!(
             off <= allowed,
             "{}: enabled for {off} ticks, {allowed} are allowed",
-            case.word
+            case.fault
         );
-        lab.trips_naming(case.found.1, begin..=begin + case.found.0);
-        lab.next_run_completes();
+        lab.assert_trip_with_code(case.found.1, begin..=begin + case.found.0);
+        lab.assert_next_run_completes();
     }
 }
 
@@ -153,29 +153,29 @@ fn every_fault_while_disarmed_gives_no_current_and_prevents_arming() {
     for case in &CASES {
         let mut lab = Lab::new();
         lab.bench.run(50);
-        lab.begin(case.word);
-        assert_eq!(lab.ticks_enabled(AFTER), 0, "{}", case.word);
+        lab.begin_fault(case.fault);
+        assert_eq!(lab.ticks_enabled(AFTER), 0, "{}", case.fault);
         assert_eq!(lab.bench.state(), State::Disarmed);
         let begin = lab.last_tick();
         lab.bench.request(Request::Arm);
         lab.bench
             .request(Request::Start(program(&lab.config, Run::Chirp)));
         // The run begins with 50 ms at zero current: the fault is found before a current flows.
-        assert_eq!(lab.ticks_with_current(50), 0, "{}", case.word);
+        assert_eq!(lab.ticks_with_current(50), 0, "{}", case.fault);
         match case.armed_into {
             Some(code) => {
-                lab.trips_naming(code, begin..=begin + 40);
+                lab.assert_trip_with_code(code, begin..=begin + 40);
                 assert_eq!(
                     lab.ticks_enabled(AFTER),
                     0,
                     "{}: {}",
-                    case.word,
+                    case.fault,
                     lab.drive.state()
                 );
             }
-            None => assert_eq!(lab.bench.trips(), [], "{}", case.word),
+            None => assert_eq!(lab.bench.trips(), [], "{}", case.fault),
         }
-        lab.next_run_completes();
+        lab.assert_next_run_completes();
     }
 }
 
@@ -184,7 +184,7 @@ fn same_fault_gives_an_identical_run() {
     let run = || {
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Control);
-        lab.begin("amplifier.silence");
+        lab.begin_fault("amplifier.silence");
         lab.bench.run(AFTER);
         lab.bench
             .all
@@ -198,25 +198,25 @@ fn same_fault_gives_an_identical_run() {
 #[test]
 fn disobedient_drive_is_stopped_by_nmt_or_by_the_lost_heartbeat() {
     // After 70 ms without confirmation and a repeat of 10 ms: NMT stop; 70 ms later the drive detects the lost heartbeat.
-    for (word, off) in [
+    for (fault, off) in [
         ("amplifier.set-points-ignored", 85),
         ("amplifier.orders-ignored", 175),
     ] {
         let mut lab = Lab::new();
         lab.run_until_current_flows(Run::Chirp);
-        lab.begin(word);
+        lab.begin_fault(fault);
         lab.bench.request(Request::Stop);
         let zero = lab.ticks_with_current(AFTER);
         assert!(
             (60..=off).contains(&zero),
-            "{word}: current for {zero} ticks"
+            "{fault}: current for {zero} ticks"
         );
         assert!(!lab.drive.is_enabled());
         lab.bench.request(Request::Arm);
         lab.bench.run(1);
         let at = lab.last_tick();
-        lab.trips_naming(STILL_ENABLED, at..=at);
-        lab.next_run_completes();
+        lab.assert_trip_with_code(STILL_ENABLED, at..=at);
+        lab.assert_next_run_completes();
     }
 }
 
@@ -225,9 +225,10 @@ fn drive_that_ignores_set_points_trips_on_its_measured_current() {
     for run in [Run::Chirp, Run::Control] {
         let mut lab = Lab::new();
         lab.run_until_current_flows(run);
-        lab.ask("amplifier.set-points-ignored");
-        let asked = lab.last_tick();
-        // Two windows of 50 ms at 1 kHz, the status's 2 ms, and the time until commands differ by 0.1 A; then off by NMT.
+        lab.inject("amplifier.set-points-ignored");
+        let begin = lab.last_tick();
+        // The trip occurs within two windows of 50 ms, plus 2 ms of status period, plus the time until commands differ by 0.1 A.
+        // NMT then stops the drive (85 ms).
         let flowed = lab.ticks_with_current(1500);
         let (trip, tick) = lab.trip().expect("it trips");
         assert!(
@@ -235,9 +236,9 @@ fn drive_that_ignores_set_points_trips_on_its_measured_current() {
             "{run:?}: {trip:?}"
         );
         assert!(
-            tick - asked <= 1000 && flowed <= tick - asked + 85,
+            tick - begin <= 1000 && flowed <= tick - begin + 85,
             "{run:?}: {} ticks, {flowed}",
-            tick - asked
+            tick - begin
         );
     }
 }
@@ -247,14 +248,11 @@ fn dropped_loop_leaves_the_drive_without_current() {
     let mut lab = Lab::new();
     lab.run_until_current_flows(Run::Control);
     let Lab {
-        bench,
-        drive,
-        world,
-        ..
+        bench, drive, host, ..
     } = lab;
     assert!(matches!(bench.all.last(), Some(LoopMessage::Tick(_))));
     drop(bench);
-    world.sleep(Duration::from_millis(2));
+    host.sleep(Duration::from_millis(2));
     assert!(
         drive.current_a() == 0.0 && !drive.is_enabled(),
         "{}",

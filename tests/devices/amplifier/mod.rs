@@ -71,7 +71,7 @@ fn program(config: &Config, run: Run) -> Box<dyn Program> {
 
 /// A probe without error, which first advances the simulated time by a tick.
 struct IdealProbe {
-    world: SimulatedHost,
+    host: SimulatedHost,
     stage: Stage,
     due_ns: u64,
     sequence: u64,
@@ -80,11 +80,11 @@ struct IdealProbe {
 impl DisplacementProbe for IdealProbe {
     fn latest(&mut self, _now: Tick) -> Reading {
         // A slow request restarts the schedule.
-        self.due_ns = (self.due_ns + PERIOD.as_nanos() as u64).max(self.world.now_ns());
-        self.world
-            .sleep(Duration::from_nanos(self.due_ns - self.world.now_ns()));
+        self.due_ns = (self.due_ns + PERIOD.as_nanos() as u64).max(self.host.now_ns());
+        self.host
+            .sleep(Duration::from_nanos(self.due_ns - self.host.now_ns()));
         self.sequence += 1;
-        let position_m = self.stage.position_m(self.world.now_ns());
+        let position_m = self.stage.position_m(self.host.now_ns());
         Reading {
             position_m,
             sequence: self.sequence,
@@ -99,25 +99,25 @@ struct Lab {
     bench: Bench,
     drive: AmplifierServer,
     stage: Stage,
-    world: SimulatedHost,
+    host: SimulatedHost,
     config: Config,
 }
 
 /// The driver, opened on the bus.
-fn driver(config: &Config, world: &SimulatedHost) -> Box<dyn CurrentAmplifier> {
+fn driver(config: &Config, host: &SimulatedHost) -> Box<dyn CurrentAmplifier> {
     let device = config.amplifier.device.can().expect("a real device");
     let requirements = Requirements::new(&config.amplifier, &config.servo);
-    let opened = device.open(requirements, Box::new(world.clone()));
+    let opened = device.open(requirements, Box::new(host.clone()));
     opened.expect("it opens").0
 }
 
 /// The driver in a loop that is disarmed.
-fn open(config: &Config, world: &SimulatedHost, stage: &Stage) -> Bench {
-    let amplifier = driver(config, world);
+fn open(config: &Config, host: &SimulatedHost, stage: &Stage) -> Bench {
+    let amplifier = driver(config, host);
     let probe = IdealProbe {
-        world: world.clone(),
+        host: host.clone(),
         stage: stage.clone(),
-        due_ns: world.now_ns(),
+        due_ns: host.now_ns(),
         sequence: 0,
     };
     Bench::around(config, Devices { amplifier, probe })
@@ -129,22 +129,22 @@ impl Lab {
     }
 
     fn of(config: Config) -> Lab {
-        let world = SimulatedHost::default();
+        let host = SimulatedHost::default();
         let stage = Stage::new(&config).expect("a stage");
         let (log, _) = EventLog::new();
         let drive = AmplifierServer::start(
             &config.amplifier.device,
-            Arc::new(world.clone()),
+            Arc::new(host.clone()),
             stage.clone(),
             log,
         )
         .expect("a drive");
-        let bench = open(&config, &world, &stage);
+        let bench = open(&config, &host, &stage);
         Lab {
             bench,
             drive,
             stage,
-            world,
+            host,
             config,
         }
     }
@@ -181,25 +181,27 @@ impl Lab {
         panic!("no current flows: {:?}", self.bench.trips());
     }
 
-    fn begin(&mut self, word: &str) {
-        match word {
-            INTERFACE_DOWN => self.world.bus().set_down(true),
-            word => self.ask(word),
+    fn begin_fault(&mut self, fault: &str) {
+        match fault {
+            INTERFACE_DOWN => self.host.bus().set_down(true),
+            fault => self.inject(fault),
         }
     }
 
-    fn end(&mut self) {
-        self.world.bus().set_down(false);
-        self.ask("amplifier.none");
+    fn end_fault(&mut self) {
+        self.host.bus().set_down(false);
+        self.inject("amplifier.none");
         self.bench.run(300);
     }
 
-    fn ask(&self, word: &str) {
-        let request: FaultRequest = word.parse().expect("a fault");
+    fn inject(&self, fault: &str) {
+        let request: FaultRequest = fault.parse().expect("a fault");
         let EmulatedFault::Amplifier(fault) = request.fault else {
-            panic!("{word} is not a fault of the amplifier")
+            panic!("{fault} is not a fault of the amplifier")
         };
-        self.drive.inject(fault).expect("a bus in memory takes it");
+        self.drive
+            .inject(fault)
+            .expect("a bus in memory accepts it");
     }
 
     fn trip(&self) -> Option<(Trip, u64)> {
@@ -238,11 +240,11 @@ impl Lab {
             .unwrap_or(0)
     }
 
-    fn trips_naming(&self, code: u32, at: std::ops::RangeInclusive<u64>) {
+    fn assert_trip_with_code(&self, code: u32, at: std::ops::RangeInclusive<u64>) {
         let (trip, tick) = self.trip().expect("it trips");
         let names = |trip: &Trip| matches!(*trip, Trip::Amplifier { code: found, .. } if found == i64::from(code));
         assert!(names(&trip), "0x{code:x}: {trip:?}");
-        assert!(at.contains(&tick), "tick {tick}, {at:?} was promised");
+        assert!(at.contains(&tick), "tick {tick}, {at:?} is required");
         self.bench.assert_recording_complete(tick, "amplifier");
         let (_folder, recording) = self.bench.recorded();
         assert!(
@@ -260,8 +262,8 @@ impl Lab {
     }
 
     /// The operator removes the cause, clears the trip, and runs again.
-    fn next_run_completes(&mut self) {
-        self.end();
+    fn assert_next_run_completes(&mut self) {
+        self.end_fault();
         let clearing = if self.bench.state() == State::Tripped {
             Request::Clear
         } else {
@@ -269,46 +271,49 @@ impl Lab {
         };
         self.bench.request(clearing);
         self.bench.run(100);
-        self.run_completes();
+        self.assert_run_completes();
     }
 
-    /// The program ends, and the next one opens the drive again.
-    fn next_program_completes(mut self) {
-        self.end();
+    /// The program ends, and the next program opens the drive again.
+    fn assert_next_program_completes(mut self) {
+        self.end_fault();
         let Lab {
             bench,
             drive,
             stage,
-            world,
+            host,
             config,
         } = self;
         drop(bench);
-        let bench = open(&config, &world, &stage);
+        let bench = open(&config, &host, &stage);
         let mut next = Lab {
             bench,
             drive,
             stage,
-            world,
+            host,
             config,
         };
         if next.drive.state() == "fault" {
-            next.a_fault_of_the_drive_outlives_the_program();
+            next.assert_drive_fault_persists();
         }
-        next.run_completes();
+        next.assert_run_completes();
     }
 
-    /// Only a request of the operator clears it: a new program is refused as well.
-    fn a_fault_of_the_drive_outlives_the_program(&mut self) {
+    /// Only a request of the operator clears a fault of the drive: a new program is refused as well.
+    fn assert_drive_fault_persists(&mut self) {
         self.bench.run(10);
         self.bench.request(Request::Arm);
         self.bench.run(1);
-        self.trips_naming(DRIVE_FAULT, 10..=10);
+        self.assert_trip_with_code(DRIVE_FAULT, 10..=10);
         self.bench.request(Request::Clear);
         self.bench.run(100);
     }
 
-    fn run_completes(&mut self) {
-        assert!(self.is_off(), "neither cleared nor opened is armed");
+    fn assert_run_completes(&mut self) {
+        assert!(
+            self.is_off(),
+            "the amplifier is off after clear and after opening"
+        );
         let trips = self.bench.trips().len();
         let mut config = self.config.clone();
         config.control.duration_s = 0.3;

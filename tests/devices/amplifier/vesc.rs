@@ -16,7 +16,7 @@ fn every_vesc_fault_ends_the_current_in_time_and_the_next_run_completes() {
         ("amplifier.bus-off", (FRAME, 2), 502),
         (INTERFACE_DOWN, (FRAME, 3), 502),
     ];
-    for (word, (found, code), zero) in cases {
+    for (fault, (found, code), zero) in cases {
         for run in [None, Some(Run::Chirp), Some(Run::Control)] {
             let mut lab = Lab::of(config(&[VESC]));
             match run {
@@ -24,16 +24,16 @@ fn every_vesc_fault_ends_the_current_in_time_and_the_next_run_completes() {
                 None => lab.arm(),
             }
             let begin = lab.last_tick();
-            lab.begin(word);
+            lab.begin_fault(fault);
             let ticks = lab.ticks_with_current(600);
             assert!(
                 ticks <= zero,
-                "{word}: current for {ticks} ticks, {zero} are allowed"
+                "{fault}: current for {ticks} ticks, {zero} are allowed"
             );
-            lab.trips_naming(code, begin..=begin + found);
-            lab.end();
+            lab.assert_trip_with_code(code, begin..=begin + found);
+            lab.end_fault();
             lab.bench.run(200); // delayed frames arrive
-            lab.next_run_completes();
+            lab.assert_next_run_completes();
         }
     }
 }

@@ -45,21 +45,21 @@ fn refused_command_switches_the_amplifier_off_in_the_same_tick() {
     assert_eq!(
         bench.ticks().at(AT).requested_a,
         SOME_A,
-        "the record says what was asked for"
+        "the record has the requested current"
     );
 }
 
 #[test]
 fn non_finite_returned_current_switches_the_amplifier_off() {
-    for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut bench = Bench::running(
             &stage(),
-            &[(AT..AT + 1, Fault::ReturnedCurrent(nonsense))],
+            &[(AT..AT + 1, Fault::ReturnedCurrent(value))],
             constant(),
         );
         runs_without_trip(&mut bench, AT - 1);
         bench.run(1 + AFTER);
-        // The command went out before the answer came: the record shows zero, the amplifier is disabled in the same tick.
+        // The command was sent before the current was returned. The record has zero, and the amplifier is disabled in that tick.
         assert_eq!(bench.ticks().at(AT).command_a.to_bits(), 0);
         assert_eq!(
             (bench.state(), bench.amplifier_is_on()),
@@ -94,8 +94,5 @@ fn failed_enable_trips_and_the_program_does_not_start() {
         assert_off_after_trip(&bench, AT, "amplifier"),
         Trip::Amplifier { code: 31, .. }
     ));
-    assert_eq!(
-        bench.returned_programs, 1,
-        "the program is handed back unused"
-    );
+    assert_eq!(bench.returned_programs, 1, "the program is returned unused");
 }

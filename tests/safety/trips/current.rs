@@ -1,4 +1,4 @@
-//! Trips by the command, the heat of the motor, and a current that does not follow its command.
+//! Trips by the command, by the thermal model of the motor, and by a measured current that does not follow its command.
 use super::*;
 
 #[test]
@@ -34,20 +34,20 @@ fn continuous_current_trips_at_the_tick_of_the_closed_form() {
         config.motor.thermal_time_constant_s,
     );
     for current_a in [2.4, -3.0, 5.0, 9.9] {
-        // tau q' = i^2 - q from q = 0 reaches i_c^2 at t = -tau ln(1 - (i_c/i)^2). The loop takes Euler's steps of c = T/tau:
-        // (1 - c)^n = exp(-t/tau) has n = (t/T) c/-ln(1 - c) = (t/T)(1 - c/2), at most 1.5 ticks of 150,000 fewer. The
-        // command of tick k heats until the end of its period, so the tick that is refused is the one with k < n <= k + 1.
+        // tau q' = i^2 - q from q = 0 reaches i_c^2 at t = -tau ln(1 - (i_c/i)^2). The loop uses Euler steps of c = T/tau:
+        // (1 - c)^n = exp(-t/tau) has n = (t/T) c/-ln(1 - c) = (t/T)(1 - c/2), at most 1.5 ticks of 150,000 fewer. The command of
+        // tick k heats until the end of its period, so the loop trips in the tick with k < n <= k + 1.
         let (period_s, square) = (
             config.servo.period_s(),
             (rated_a / current_a) * (rated_a / current_a),
         );
-        let warm_s = -tau_s * f64::ln(1.0 - square);
-        let n = warm_s / period_s * (1.0 - period_s / tau_s / 2.0);
+        let limit_s = -tau_s * f64::ln(1.0 - square);
+        let n = limit_s / period_s * (1.0 - period_s / tau_s / 2.0);
         let mut bench = Bench::running(&config, &[], endless(move |_| current_a));
         let at = first_trip(&mut bench, 0) as f64;
         assert!(
             (n - 1.01..=n + 0.01).contains(&at),
-            "{current_a} A: tick {at}, warm after {n} ticks"
+            "{current_a} A: tick {at}, expected after {n} ticks"
         );
     }
 }
@@ -80,7 +80,7 @@ fn rated_current_does_not_trip_in_six_time_constants() {
     let config = stage();
     let rated_a = config.motor.continuous_current_a();
     let mut bench = Bench::running(&config, &[], endless(move |_| rated_a * 0.9999));
-    // Six time constants: the heat is at 99.75 % of where it settles.
+    // Six time constants: the thermal state is at 99.75 % of its final value.
     for _ in 0..300_000 {
         let record = bench.tick();
         assert_eq!((record.state, bench.trips().len()), (State::Running, 0));
@@ -90,16 +90,16 @@ fn rated_current_does_not_trip_in_six_time_constants() {
 
 #[test]
 fn non_finite_command_trips_and_is_not_sent() {
-    for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN] {
-        let program = endless(move |tick| if tick == AT { nonsense } else { SOME_A });
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -f64::NAN] {
+        let program = endless(move |tick| if tick == AT { value } else { SOME_A });
         let mut bench = Bench::running(&stage(), &[], program);
         trips(&mut bench, AT, "command_not_finite");
-        let asked = bench
+        let sent = bench
             .amplifier_calls()
             .iter()
             .any(|(_, t)| matches!(t, AmplifierCall::Command { current_a, .. } if !current_a.is_finite()));
-        assert!(!asked, "the amplifier never saw it");
-        let largest = Bench::running(
+        assert!(!sent, "the amplifier received it");
+        let smallest = Bench::running(
             &stage(),
             &[],
             endless(|tick| {
@@ -110,13 +110,13 @@ fn non_finite_command_trips_and_is_not_sent() {
                 }
             }),
         );
-        runs_without_trip(&mut { largest }, AT + 10);
+        runs_without_trip(&mut { smallest }, AT + 10);
     }
 }
 
 #[test]
 fn thermal_state_is_kept_after_clear_and_arm() {
-    // Tripped at i_c; from there the same current trips again at once, long before a cold winding would.
+    // The first trip is at i_c. From there the same current trips again at once, long before it would with a cold winding.
     let config: Config = stage();
     let mut bench = Bench::running(&config, &[], endless(|_| 9.9));
     let first = first_trip(&mut bench, 0);
@@ -127,7 +127,7 @@ fn thermal_state_is_kept_after_clear_and_arm() {
     ] {
         bench.request(request);
     }
-    // The tick of the trip cooled the winding by i_c^2/50,000, one of 9.9 A heats it 17 times as much: one at most passes.
+    // The tick of the trip cools the winding by i_c^2/50,000; a tick of 9.9 A heats it 17 times as much, so at most one passes.
     bench.run(3);
     assert_eq!(bench.trips().len(), 2);
     assert!(bench.trips()[1].tick <= first + 2, "{:?}", bench.trips());
@@ -135,8 +135,8 @@ fn thermal_state_is_kept_after_clear_and_arm() {
 
 #[test]
 fn thermal_model_includes_missed_ticks() {
-    // 9.9 A with three of four ticks missed: the winding warms by the clock, not by the ticks that were served. Overruns
-    // are allowed here. Closed form as above; what is seen only every fourth tick may be seen three ticks late.
+    // 9.9 A with three of four ticks missed: the thermal model uses the elapsed time, not the number of served ticks. Missed
+    // ticks cause no trip here. Closed form as above; the trip is up to three ticks late, because every fourth tick is served.
     let mut config = stage();
     config.interlock.overruns_per_s = 1_000_000;
     let rated_a = config.motor.continuous_current_a();
@@ -171,7 +171,7 @@ fn trips_on_measured_current_beyond_tolerance() {
         let at = bench.trips().first().map_or(0, |event| event.tick);
         assert!(
             (ticks as u64..=ticks as u64 + 3).contains(&at),
-            "{at}: judged at the end of a window of {ticks} ticks"
+            "tick {at}: evaluated at the end of a window of {ticks} ticks"
         );
         assert_off_after_trip(&bench, at, "current_not_followed");
     }

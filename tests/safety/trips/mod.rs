@@ -1,4 +1,4 @@
-//! Every reason to trip, from both sides of its limit.
+//! Every trip reason, on both sides of its limit.
 mod amplifier;
 mod current;
 mod probe;
@@ -12,31 +12,31 @@ use bench_hal::Validity;
 use crate::faulty_rig::Fault;
 use crate::rig::{AmplifierCall, Bench, endless, stage};
 
-/// When faults begin, unless a test says otherwise.
+/// Tick in which a fault begins.
 const AT: u64 = 100;
-/// Ticks watched after a trip: a tenth of a second.
+/// Ticks observed after a trip: 0.1 s.
 const AFTER: u64 = 500;
-/// A current that disturbs no interlock, but is none.
+/// A non-zero current within all limits.
 const SOME_A: f64 = 0.1;
 
 fn runs_without_trip(bench: &mut Bench, ticks: u64) {
     bench.run(ticks);
-    assert_eq!(bench.trips(), [], "nothing may trip inside the limits");
+    assert_eq!(bench.trips(), [], "a trip within the limits");
     let last = bench.tick();
     assert!(
         last.state == State::Running && last.command_a != 0.0,
-        "the run goes on: {last:?}"
+        "the run continues: {last:?}"
     );
 }
 
-/// Runs up to the tick `at` with current and without a trip, through it, and on: there it must trip.
+/// Asserts that the run has current and no trip before tick `at`, and trips in it.
 fn trips(bench: &mut Bench, at: u64, reason: &str) -> Trip {
     runs_without_trip(bench, at - 1);
     bench.run(1 + AFTER);
     assert_off_after_trip(bench, at, reason)
 }
 
-/// What every trip promises, whatever its reason.
+/// Asserts what holds for every trip: zero current, the amplifier off, one event, and a complete recording.
 fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
     let record = bench.ticks().at(at);
     assert_eq!(
@@ -54,7 +54,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
             .ticks()
             .iter()
             .all(|r| (r.flags & flag::TRIPPED != 0) == (r.tick == at)),
-        "one tick is flagged"
+        "exactly one tick has the flag"
     );
     assert!(
         bench
@@ -65,10 +65,12 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
     );
 
     let calls = bench.amplifier_calls();
-    let taken = |call: &AmplifierCall| matches!(call, AmplifierCall::Command { current_a, refused: false } if *current_a != 0.0);
+    let has_current = |call: &AmplifierCall| matches!(call, AmplifierCall::Command { current_a, refused: false } if *current_a != 0.0);
     assert!(
-        !calls.iter().any(|(tick, call)| *tick >= at && taken(call)),
-        "a current went out in or after the trip"
+        !calls
+            .iter()
+            .any(|(tick, call)| *tick >= at && has_current(call)),
+        "a current was commanded in or after the tick of the trip"
     );
     let in_tick: Vec<AmplifierCall> = calls
         .iter()
@@ -84,7 +86,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
         !calls
             .iter()
             .any(|(tick, call)| *tick > at && *call != AmplifierCall::Disable),
-        "left alone after it"
+        "only disable calls after the trip"
     );
     assert!(!bench.amplifier_is_on());
 
@@ -113,7 +115,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
     trip
 }
 
-/// The tick of the first trip, every tick being late by so many; none within 40 s is a failure.
+/// The tick of the first trip, with `missed` ticks missed before every tick. Panics after 200,000 served ticks without a trip.
 fn first_trip(bench: &mut Bench, missed: u32) -> u64 {
     for _ in 0..200_000 {
         bench.late_tick(missed);
@@ -122,7 +124,7 @@ fn first_trip(bench: &mut Bench, missed: u32) -> u64 {
         }
         bench.all.drain(..bench.all.len().saturating_sub(8));
     }
-    panic!("nothing trips");
+    panic!("no trip");
 }
 
 fn constant() -> Box<dyn bench::rt::program::Program> {
@@ -164,7 +166,7 @@ fn trips_above_the_allowed_missed_ticks_per_second() {
 #[test]
 fn missed_ticks_are_counted_in_a_sliding_second() {
     let config = stage();
-    // 30 ticks missed every 0.6 s: at most two such moments lie within a second, 60 ticks.
+    // 30 missed ticks every 0.6 s: at most two such gaps are within a second, which gives 60.
     let mut bench = Bench::running(&config, &[], constant());
     bench.run(AT);
     bench.late_tick(30);
@@ -172,7 +174,7 @@ fn missed_ticks_are_counted_in_a_sliding_second() {
     let at = bench.late_tick(30).tick;
     bench.run(AFTER);
     assert_off_after_trip(&bench, at, "overruns");
-    // One, then 49 after 0.9 s, then 49 more 0.2 s later: within the last second there are 98.
+    // One, then 49 after 0.9 s, then 49 more 0.2 s later: the last second has 98.
     let mut bench = Bench::running(&config, &[], constant());
     bench.run(AT);
     bench.late_tick(1);
@@ -189,7 +191,7 @@ fn missed_ticks_are_counted_in_a_sliding_second() {
             limit: 50
         }
     );
-    // 25 every 0.505 s: never more than two such moments, 50 ticks, within one second.
+    // 25 every 0.505 s: at most two such gaps, 50 ticks, are within one second.
     let mut bench = Bench::running(&config, &[], constant());
     for _ in 0..20 {
         bench.late_tick(25);

@@ -1,4 +1,4 @@
-//! Trips by the reading: travel, validity, age, and a position that does not change.
+//! Trips by the reading: travel, validity, age, and a constant position.
 use super::*;
 
 #[test]
@@ -40,10 +40,10 @@ fn invalid_reading_trips_at_any_position() {
             (validity, flag::INVALID)
         );
     }
-    for nonsense in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         let mut bench = Bench::running(
             &stage(),
-            &[(AT..AT + 1, Fault::Position(nonsense))],
+            &[(AT..AT + 1, Fault::Position(value))],
             constant(),
         );
         trips(&mut bench, AT, "probe_invalid");
@@ -84,7 +84,7 @@ fn allows_the_stale_limit_and_trips_one_nanosecond_above() {
 
 #[test]
 fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
-    // Last new measurement at tick 99; 1 ms are five ticks of 0.2 ms: tick 104 is the last that may use it.
+    // The last new measurement is at tick 99. 1 ms are five ticks of 0.2 ms, so tick 104 is the last one that may use it.
     let config = stage();
     runs_without_trip(
         &mut Bench::running(&config, &[(AT..AT + 5, Fault::RepeatedSample)], constant()),
@@ -101,14 +101,14 @@ fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
     assert!((age_s - 0.0012).abs() < 1e-12, "six ticks old: {trip:?}");
 }
 
-/// A current that steps from one to another in the middle of the time that a probe may be stuck.
+/// A current step within the time in which the position may be constant.
 fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench::rt::program::Program> {
     endless(move |tick| if tick < AT + 50 { from_a } else { to_a })
 }
 
 #[test]
 fn constant_position_under_changing_current_trips_as_stuck() {
-    // interlock: 0.1 s are 500 ticks; the last change is seen at tick 99, so tick 599 is within and tick 600 beyond.
+    // probe_stuck_s = 0.1 s is 500 ticks. The last change is at tick 99, so tick 599 is within the limit and tick 600 beyond.
     let mut config = stage();
     assert_eq!(config.interlock.probe_stuck_s, 0.1);
     config.interlock.probe_stuck_current_a = 0.25;
@@ -133,7 +133,7 @@ fn constant_position_under_changing_current_trips_as_stuck() {
         (unchanged_s - 0.1002).abs() < 1e-12 && (limit_s - 0.1).abs() < 1e-12,
         "{trip:?}"
     );
-    // Changes of 0.25 A are exact in binary: at the limit nothing trips, one bit beyond it does.
+    // A change of 0.25 A is exact in binary: no trip at the limit, a trip one bit above.
     runs_without_trip(
         &mut Bench::running(&config, &stuck(1000), stepping(0.25, 0.5)),
         AT + 1500,

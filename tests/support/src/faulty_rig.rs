@@ -1,48 +1,48 @@
-//! A rig that fails when told to.
+//! A rig with injected faults.
 use std::ops::Range;
 
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };
 
-/// What goes wrong.
+/// An injected fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Fault {
-    /// The probe says this of its reading.
+    /// The reading has this validity.
     Validity(Validity),
-    /// The probe reads this position, in metres.
+    /// The reading has this position, in metres.
     Position(f64),
-    /// The probe reads so much more than there is, in metres.
+    /// This offset is added to the position, in metres.
     Offset(f64),
     /// The reading has this age, in nanoseconds.
     Age(u64),
-    /// The probe hands out an old measurement under its old number.
+    /// The reading repeats the sequence number of the previous one.
     RepeatedSample,
-    /// New measurements, always of the same position.
+    /// New sequence numbers with a constant position.
     Stuck,
-    /// The amplifier has switched itself off with this code.
+    /// The amplifier reports a fault with this code.
     AmplifierFault(u32),
-    /// The amplifier refuses commands with this code.
+    /// The amplifier refuses a command with this code.
     RefusedCommand(i64),
-    /// The amplifier cannot be enabled, with this code.
+    /// The amplifier refuses to be enabled, with this code.
     RefusedEnable(i64),
-    /// The amplifier keeps its fault, whoever clears it.
+    /// The amplifier refuses to clear its fault.
     RefusedClear,
-    /// The amplifier says that it gives this current, whatever it was asked for.
+    /// The amplifier returns this current from every command, in amperes.
     ReturnedCurrent(f64),
-    /// The amplifier measures the current that it was asked for last, in amperes, and this much more.
+    /// The measured current is the last command plus this offset, in amperes.
     MeasuredOffset(f64),
 }
 
-/// A rig and what goes wrong with it, by tick.
+/// A rig with its faults, each in a range of ticks.
 pub struct FaultyRig<R> {
-    /// What works.
+    /// The rig without faults.
     pub inner: R,
-    /// What fails, when.
+    /// Each fault with its ticks.
     pub faults: Vec<(Range<u64>, Fault)>,
     now: Option<u64>,
     last: Reading,
-    asked_a: f64,
+    commanded_a: f64,
 }
 
 impl<R: Rig> FaultyRig<R> {
@@ -52,11 +52,11 @@ impl<R: Rig> FaultyRig<R> {
             faults: faults.to_vec(),
             now: None,
             last: Reading::default(),
-            asked_a: 0.0,
+            commanded_a: 0.0,
         }
     }
 
-    /// The faults of the tick under way.
+    /// The first fault of the tick that `wanted` selects.
     fn find<T>(&self, tick: u64, wanted: impl Fn(&Fault) -> Option<T>) -> Option<T> {
         self.faults
             .iter()
@@ -72,13 +72,13 @@ impl<R: Rig> FaultyRig<R> {
 fn refusal(code: i64) -> DeviceError {
     DeviceError {
         what: "the amplifier refuses",
-        remedy: "it was told to",
+        remedy: "this fault is injected by a test",
         code,
     }
 }
 
 impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
-    /// Orders are taken before the probe is read: the tick is the one after the last reading.
+    /// The loop processes requests before it reads the probe, so the tick is the one after the last reading.
     fn enable(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         match self.find(tick, |fault| {
@@ -94,7 +94,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
-        self.asked_a = current_a;
+        self.commanded_a = current_a;
         if let Some(code) = self.find(self.now(), |fault| {
             if let Fault::RefusedCommand(code) = fault {
                 Some(*code)
@@ -104,15 +104,15 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
         }) {
             return Err(refusal(code));
         }
-        let given_a = self.inner.command(current_a)?;
-        let claimed = self.find(self.now(), |fault| {
+        let inner_a = self.inner.command(current_a)?;
+        let returned_a = self.find(self.now(), |fault| {
             if let Fault::ReturnedCurrent(a) = fault {
                 Some(*a)
             } else {
                 None
             }
         });
-        Ok(claimed.unwrap_or(given_a))
+        Ok(returned_a.unwrap_or(inner_a))
     }
 
     fn disable(&mut self) {
@@ -120,23 +120,23 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn actual_current_a(&self) -> Option<f64> {
-        let beyond_a = |fault: &Fault| {
+        let offset_a = |fault: &Fault| {
             if let Fault::MeasuredOffset(a) = fault {
                 Some(*a)
             } else {
                 None
             }
         };
-        self.find(self.now(), beyond_a)
-            .map(|beyond_a| self.asked_a + beyond_a)
+        self.find(self.now(), offset_a)
+            .map(|offset_a| self.commanded_a + offset_a)
     }
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
-        let kept = self.find(tick, |fault| {
+        let refused = self.find(tick, |fault| {
             (*fault == Fault::RefusedClear).then_some(refusal(5))
         });
-        kept.map_or(Ok(()), Err)
+        refused.map_or(Ok(()), Err)
     }
 
     fn status(&self) -> AmplifierStatus {

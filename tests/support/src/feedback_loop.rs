@@ -1,4 +1,4 @@
-//! A closed loop of a resonance and a PI controller, simulated apart from the library: y = P u + v, u = C (r - y).
+//! A closed loop of a resonance and a PI controller, simulated independently of the library: y = P u + v, u = C (r - y).
 
 use bench::identify::Signals;
 use bench::identify::joint::LoopSignals;
@@ -44,12 +44,12 @@ pub fn run(noise: f64, seed: u64) -> LoopSignals {
         let r = swept(k as f64 / RATE_HZ);
         let now = a1 * y[0] + a2 * y[1] + b * u;
         y = [now, y[0]];
-        let seen = now + noise * dice.normal();
-        sum += r - seen;
-        u = KP * (r - seen) + KI / RATE_HZ * sum;
+        let measured = now + noise * dice.normal();
+        sum += r - measured;
+        u = KP * (r - measured) + KI / RATE_HZ * sum;
         reference_m.push(r);
         input_a.push(u);
-        output_m.push(seen);
+        output_m.push(measured);
     }
     LoopSignals {
         signals: Signals {

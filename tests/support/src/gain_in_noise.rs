@@ -1,4 +1,4 @@
-//! A constant gain with white noise on its measured input and output, and every way to estimate it.
+//! A constant gain with white noise on its measured input and output, and the estimators for it.
 
 use bench::identify::{
     Estimator, EstimatorSettings, Frf, IdentifyError, LocalModel, Signals, local, welch,
@@ -8,13 +8,14 @@ use crate::stage::Dice;
 
 pub const GAIN: f64 = 1.5e-4;
 const BAND_HZ: (f64, f64) = (5.0, 495.0);
-/// Power of the noise over that of the signal, at every frequency.
+/// Ratio of the noise power to the signal power, at every frequency.
 pub const NOISE: f64 = 0.05;
 pub const ESTIMATORS: [Estimator; 3] = [Estimator::H1, Estimator::H2, Estimator::Hv];
 
 pub type Estimate = dyn Fn(&Signals, Estimator) -> Result<Frf, IdentifyError>;
 
-/// White input through a gain: no leakage, no curvature. Noise on input and output with a given ratio of the signal's power.
+/// White input through a gain, so there is no leakage and no curvature. `on_input` and `on_output` are the ratios of the noise
+/// power to the signal power.
 pub fn signals(seed: u64, on_input: f64, on_output: f64) -> Signals {
     let mut dice = Dice::new(seed);
     let truth: Vec<f64> = (0..10_000).map(|_| dice.normal()).collect();

@@ -19,7 +19,7 @@ pub fn config(sets: &[String]) -> Config {
     .expect("the profile is valid")
 }
 
-/// The analysis of a run with `config`, believing `assumed`.
+/// Analyses a chirp with `config`, using the configuration `assumed`.
 pub fn analysed(config: &Config, assumed: &Config) -> Analysis {
     simulated::analysed(&Plan::chirp(config.clone()), assumed).expect("an analysis")
 }
@@ -42,7 +42,7 @@ pub fn model(config: &Config) -> Vec<Truth> {
         .collect()
 }
 
-/// The fitted mode that stands for one of the model, within half a percent of its frequency.
+/// The fitted mode nearest to a mode of the model, if it is within 0.5 % of its frequency.
 pub fn stands_for(modes: &[FittedMode], omega_rad_s: f64) -> Option<FittedMode> {
     let off = |mode: &&FittedMode| (mode.omega_rad_s.value / omega_rad_s - 1.0).abs();
     modes

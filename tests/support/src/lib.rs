@@ -1,4 +1,4 @@
-//! What the integration tests share: running the program, external references in python, rigs, records.
+//! Shared code of the integration tests: running the program, independent references in Python, rigs, recordings.
 
 pub mod faulty_rig;
 pub mod feedback_loop;

@@ -1,4 +1,4 @@
-//! A loop that is driven tick by tick, around a rig that writes down all it is told.
+//! A loop driven tick by tick, with a rig that records all calls of the amplifier.
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -25,7 +25,7 @@ pub fn stage() -> Config {
     load(&Source::default()).expect("the profile is valid")
 }
 
-/// A stage that stands still but for a nanometre, and an amplifier that gives what it is asked for.
+/// A stage that moves by +-1 nm only, and an amplifier that returns every command unchanged.
 #[derive(Debug, Default)]
 pub struct StillRig {
     enabled: bool,
@@ -78,7 +78,7 @@ impl DisplacementProbe for StillRig {
     }
 }
 
-/// What the amplifier was told.
+/// A call of the amplifier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum AmplifierCall {
     Enable { refused: bool },
@@ -86,10 +86,10 @@ pub enum AmplifierCall {
     Disable,
 }
 
-/// All that the amplifier was told, each with its tick.
+/// All calls of the amplifier, each with its tick.
 pub type Log = Arc<Mutex<Vec<(u64, AmplifierCall)>>>;
 
-/// Writes down every call of the amplifier.
+/// A rig that records every call of its amplifier.
 pub struct LoggedRig<R> {
     pub inner: R,
     pub log: Log,
@@ -153,7 +153,7 @@ impl<R: Rig> DisplacementProbe for LoggedRig<R> {
     }
 }
 
-/// A program that commands a function of its tick.
+/// A program whose command is a function of its tick; the second field is its number of ticks.
 pub struct CurrentProgram<F>(pub F, pub u64);
 
 impl<F: FnMut(u64) -> f64 + Send> Program for CurrentProgram<F> {
@@ -179,7 +179,7 @@ pub fn interlocks(config: &Config) -> Interlocks {
     Interlocks::new(&config.interlock, &config.motor, &config.servo)
 }
 
-/// The loop, its rings, and everything that came out of them.
+/// The loop, its rings, and everything it has published.
 pub struct Bench {
     servo: Servo,
     requests: Producer<Request>,
@@ -189,16 +189,16 @@ pub struct Bench {
     now: Arc<AtomicU64>,
     clock: Virtual,
     next: u64,
-    /// All that the loop published, in its order.
+    /// All messages of the loop, in their order.
     pub all: Vec<LoopMessage>,
-    /// Programs that came back.
+    /// Number of programs that the loop has returned.
     pub returned_programs: usize,
 }
 
 impl Bench {
     pub fn around(config: &Config, rig: impl Rig + 'static) -> Bench {
-        let watched = LoggedRig::new(rig);
-        let (log, now) = (Arc::clone(&watched.log), Arc::clone(&watched.now));
+        let logged = LoggedRig::new(rig);
+        let (log, now) = (Arc::clone(&logged.log), Arc::clone(&logged.now));
         let (publisher, published) = RingBuffer::new(256);
         let (requests, taken) = RingBuffer::new(16);
         let (hand_back, retired) = RingBuffer::new(16);
@@ -209,7 +209,7 @@ impl Bench {
             progress: Arc::new(Progress::default()),
         };
         Bench {
-            servo: Servo::new(Box::new(watched), interlocks(config), connections),
+            servo: Servo::new(Box::new(logged), interlocks(config), connections),
             requests,
             published,
             retired,
@@ -224,12 +224,12 @@ impl Bench {
         }
     }
 
-    /// A stage that stands still, disarmed.
+    /// A stage at rest, disarmed.
     pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
         Bench::around(config, FaultyRig::new(StillRig::default(), faults))
     }
 
-    /// A stage that stands still, with a program that runs from tick 0.
+    /// A stage at rest, with a program that runs from tick 0.
     pub fn running(
         config: &Config,
         faults: &[(Range<u64>, Fault)],
@@ -241,7 +241,7 @@ impl Bench {
         bench
     }
 
-    /// Taken at the next tick.
+    /// Adds a request, which the loop processes in its next tick.
     pub fn request(&mut self, request: Request) {
         assert!(
             self.requests.push(request).is_ok(),
@@ -253,7 +253,7 @@ impl Bench {
         self.late_tick(0)
     }
 
-    /// A tick before which `missed` passed unserved.
+    /// A tick after `missed` missed ticks.
     pub fn late_tick(&mut self, missed: u32) -> TickRecord {
         let number = self.next + u64::from(missed);
         let scheduled_ns = (number as f64 * self.clock.period_s * 1e9).round() as u64;
@@ -304,7 +304,7 @@ impl Bench {
         self.all.iter().filter_map(event).collect()
     }
 
-    /// State after the last tick, by the events.
+    /// State after the last tick, from the events.
     pub fn state(&self) -> State {
         let to = |event: &Event| {
             if let EventKind::State { to, .. } = event.kind {
@@ -323,12 +323,12 @@ impl Bench {
             .collect()
     }
 
-    /// All that the amplifier was told so far.
+    /// All calls of the amplifier so far.
     pub fn amplifier_calls(&self) -> Vec<(u64, AmplifierCall)> {
         self.log.lock().expect("no test panics with it").clone()
     }
 
-    /// Whether the amplifier is on after all it was told.
+    /// Whether the amplifier is on after its last call.
     pub fn amplifier_is_on(&self) -> bool {
         let calls = self.amplifier_calls();
         let last = calls.iter().rev().find(|(_, call)| {
@@ -337,7 +337,7 @@ impl Bench {
         matches!(last, Some((_, AmplifierCall::Enable { refused: false })))
     }
 
-    /// All that was published so far, written as a recording and read back; with the folder that it lies in.
+    /// All messages so far, written as a recording and read back, with its folder.
     pub fn recorded(&self) -> (tempfile::TempDir, Recording) {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("loop.mcap");
@@ -353,7 +353,7 @@ impl Bench {
         (folder, Recording::open(&path).expect("a recording"))
     }
 
-    /// Every tick is there or counted as missed, and the trip with its reason.
+    /// Asserts that every tick is recorded or counted as missed, and that the trip is recorded with its reason.
     pub fn assert_recording_complete(&self, at: u64, reason: &str) {
         let (_folder, recording) = self.recorded();
         let last = self.ticks().last().expect("ticks").tick;
@@ -369,14 +369,14 @@ impl Bench {
         assert_eq!(
             recording.tick_count() + recording.overruns(),
             last + 1,
-            "every tick is there or counted as missed"
+            "every tick is recorded or counted as missed"
         );
-        let is_it = |event: &Event| {
+        let is_trip = |event: &Event| {
             event.tick == at
                 && matches!(event.kind, EventKind::Trip(trip) if trip.reason() == reason)
         };
         assert!(
-            recording.events().iter().any(is_it),
+            recording.events().iter().any(is_trip),
             "the trip is in the recording: {:?}",
             recording.events()
         );
@@ -387,7 +387,7 @@ impl Bench {
     }
 }
 
-/// The records among what was published.
+/// The tick records among the messages of the loop.
 pub struct Records<'a>(&'a [LoopMessage]);
 
 impl<'a> Records<'a> {

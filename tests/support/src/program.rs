@@ -1,4 +1,4 @@
-//! The program as a person or a script meets it: arguments in; exit code, text and files out.
+//! The program at its process boundary: arguments in; exit code, text and files out.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
@@ -7,13 +7,13 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// A folder of its own to work in.
+/// A program with a temporary working folder.
 pub struct Bench {
     folder: TempDir,
     program: PathBuf,
 }
 
-/// What came back.
+/// Exit code and output of a run.
 #[derive(Debug)]
 pub struct Answer {
     pub code: i32,
@@ -22,12 +22,12 @@ pub struct Answer {
 }
 
 impl Bench {
-    #[allow(clippy::new_without_default, reason = "a test names what it makes")]
+    #[allow(clippy::new_without_default, reason = "each call makes a new folder")]
     pub fn new() -> Bench {
         Bench::of(bench_program())
     }
 
-    /// Another program in a folder of its own.
+    /// Another program, with a temporary working folder.
     pub fn of(program: impl Into<PathBuf>) -> Bench {
         Bench {
             folder: tempfile::tempdir().expect("a temporary folder"),
@@ -35,7 +35,7 @@ impl Bench {
         }
     }
 
-    /// Runs `bench` with arguments as typed, parted by blanks.
+    /// Runs `bench` with arguments separated by spaces.
     pub fn run(&self, arguments: &str) -> Answer {
         self.run_with(arguments.split_whitespace())
     }
@@ -85,7 +85,7 @@ impl Bench {
     }
 }
 
-/// The program under test, as cargo names it to integration tests.
+/// The program under test, whose path cargo passes to integration tests.
 fn bench_program() -> PathBuf {
     std::env::var_os("CARGO_BIN_EXE_bench")
         .expect("set by cargo test")
@@ -97,8 +97,8 @@ pub fn run_in(folder: &Path, arguments: impl IntoIterator<Item = impl AsRef<OsSt
     run_program(&bench_program(), folder, arguments)
 }
 
-/// Runs a program in a folder. It must neither panic nor die of a signal, nor hang: the time limit is some hundred times
-/// what the longest command takes.
+/// Runs a program in a folder. It must not panic, end by a signal or hang; the time limit is about a hundred times the duration
+/// of the longest command.
 pub fn run_program(
     program: &Path,
     folder: &Path,
@@ -129,7 +129,7 @@ fn text(bytes: Vec<u8>) -> String {
 }
 
 impl Answer {
-    /// Standard output as the one JSON object that must be there, and nothing else.
+    /// Standard output, which must be exactly one JSON object.
     pub fn json(&self) -> Value {
         let mut values = serde_json::Deserializer::from_str(&self.out).into_iter::<Value>();
         let first = values.next().unwrap_or_else(|| {
@@ -148,8 +148,8 @@ impl Answer {
         value
     }
 
-    /// Refused as usage: exit code 2 and all of `words` in the message. Standard output has nothing or, with `--json`, the
-    /// same message in an error object.
+    /// Asserts exit code 2 and all of `words` in the message. Standard output must be empty or, with `--json`, an error object
+    /// with the same message.
     pub fn is_refused(&self, words: &[&str]) {
         assert_eq!(self.code, 2, "{self:?}");
         if !self.out.is_empty() {
@@ -199,7 +199,7 @@ impl Draw {
         low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// As likely in one decade as in another.
+    /// Log-uniform between two limits.
     pub fn over_decades(&mut self, low: f64, high: f64) -> f64 {
         self.between(low.ln(), high.ln()).exp()
     }

@@ -1,12 +1,11 @@
-//! Independent truth from numpy and scipy, where there are such: BENCH_PYTHON names the interpreter (else python3), and
-//! BENCH_REQUIRE_PYTHON=1 makes their absence a failure.
+//! Independent reference values from numpy and scipy. BENCH_PYTHON names the interpreter (default python3). Without scipy a
+//! test passes without the comparison; with BENCH_REQUIRE_PYTHON=1 it fails.
 
 use std::io::Write as _;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-/// The numbers that a script of `tests/python` prints, line by line; none, with the reason on standard output, without
-/// scipy.
+/// The numbers that a script of `tests/python` prints, line by line. Without scipy: `None`, with the reason on standard output.
 pub fn numbers(script: &str, arguments: &[&str], input: &str) -> Option<Vec<Vec<f64>>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or_else(|_| "python3".into());
     if let Err(why) = scipy(&python) {

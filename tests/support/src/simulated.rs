@@ -1,4 +1,4 @@
-//! Runs on the simulated stage, recorded and analysed as they are on the command line.
+//! Runs on the simulated stage, recorded and analysed as by the command line.
 use std::path::{Path, PathBuf};
 
 use bench::config::Config;
@@ -16,14 +16,14 @@ pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, LoopOutcome) {
     ended
 }
 
-/// The recording of a run by `plan` that comes to its end.
+/// The recording of a run by `plan`, which must complete.
 pub fn recorded(plan: &Plan, folder: &Path) -> PathBuf {
     let (path, ended) = ended(plan, folder);
     assert!(ended.completed, "{ended:?}");
     path
 }
 
-/// The analysis of a run by `plan`, believing `assumed`.
+/// Analyses a run of `plan` with the configuration `assumed`.
 pub fn analysed(plan: &Plan, assumed: &Config) -> Result<Analysis, AnalysisError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     analyse(

@@ -1,5 +1,5 @@
-//! The truth of these tests: the stage at 8 % of L with 10 % of asymmetry, sampled at 5 kHz, with its chirp and its
-//! noise. Written apart from everything in the library.
+//! Reference plant: the stage at 8 % of L with 10 % of asymmetry, sampled at 5 kHz, with its chirp and its noise.
+//! Independent of the library.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -120,7 +120,7 @@ pub fn chirp() -> Vec<f64> {
     chirp_of(110.0, 2.0, 8.0)
 }
 
-/// The same within other times.
+/// The same chirp with other durations.
 pub fn chirp_of(duration_s: f64, before_s: f64, after_s: f64) -> Vec<f64> {
     const AMPLITUDES: [(f64, f64); 7] = [
         (0.1, 0.4),
@@ -180,8 +180,8 @@ pub fn clean_run() -> Signals {
     RUN.clone()
 }
 
-/// The noise of the built stage: a probe of 40 nm RMS, read in steps of 30 nm, on a floor that shakes it by 20 nm RMS
-/// around 5 Hz and 15 nm RMS around 70 Hz.
+/// The noise of the built stage: probe noise of 40 nm RMS, quantisation of 30 nm, and floor vibration of 20 nm RMS around 5 Hz
+/// and 15 nm RMS around 70 Hz.
 pub fn with_noise(signals: &Signals, seed: u64) -> Signals {
     let mut dice = Dice::new(seed);
     let slow = floor(&mut dice, signals.len(), 5.0, 0.1, 20e-9);
@@ -197,7 +197,7 @@ pub fn with_noise(signals: &Signals, seed: u64) -> Signals {
     }
 }
 
-/// Narrowband noise: a resonance in white noise, in its stationary state from the start.
+/// Narrowband noise: a resonance driven by white noise, stationary from the start.
 fn floor(dice: &mut Dice, ticks: usize, frequency_hz: f64, damping: f64, rms: f64) -> Vec<f64> {
     let omega = 2.0 * PI * frequency_hz / RATE_HZ;
     let step = (Complex::new(-damping, (1.0 - damping * damping).sqrt()) * omega).exp();

@@ -1,6 +1,6 @@
-//! Enough of an SVG reader to see what was drawn, in units of the page: a tenth of a pixel.
+//! A small SVG reader for the charts, in units of the page: a tenth of a pixel.
 
-/// A piece of text with the box that it takes at most, in any usual sans-serif.
+/// A text with an upper bound of its box, for any usual sans-serif font.
 #[derive(Debug)]
 pub struct Words {
     pub text: String,
@@ -31,7 +31,7 @@ fn pair(text: &str) -> (f64, f64) {
     (x.parse().unwrap(), y.parse().unwrap())
 }
 
-/// All text.
+/// All texts.
 pub fn words(svg: &str) -> Vec<Words> {
     let mut lines = svg.lines();
     let mut all = Vec::new();

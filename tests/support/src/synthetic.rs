@@ -1,9 +1,9 @@
-//! Responses by closed form, with noise of known power.
+//! Frequency responses in closed form, with noise of known power.
 use bench::identify::FrfDatum;
 use bench::model::zeros::ModalTerm;
 use nalgebra::Complex;
 
-/// Numbers of mean 0 and variance 1, near enough normal: sums of twelve.
+/// Approximately normal deviates of mean 0 and variance 1: sums of twelve uniform deviates.
 pub fn normal(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x1234_5678_9ABC_DEF1;
     let mut uniform = move || {
@@ -41,7 +41,7 @@ pub fn response(modes: &[ModalTerm], hz: f64, delay_s: f64) -> Complex<f64> {
     modes.iter().map(part).sum::<Complex<f64>>() * (-s * delay_s).exp()
 }
 
-/// 5 to 200 Hz, one block every twentieth of a percent; noise of `sigma_m_per_n`, in all.
+/// 5 to 200 Hz in steps of 0.05 %. The complex noise has a standard deviation of `sigma_m_per_n`.
 pub fn frf_data(modes: &[ModalTerm], delay_s: f64, sigma_m_per_n: f64, seed: u64) -> Vec<FrfDatum> {
     let mut normal = normal(seed);
     let count = (200.0f64 / 5.0).ln() / 5e-4;

@@ -1,7 +1,7 @@
-//! Truth from another hand: `tests/python/truth.py`, with numpy, scipy and mpmath.
+//! Independent reference values: `tests/python/truth.py`, with numpy, scipy and mpmath.
 //!
-//! `BENCH_PYTHON` names the interpreter (default `python3`). Without it or its packages a test says so and passes; with
-//! `BENCH_REQUIRE_PYTHON=1`, as in CI, it fails.
+//! `BENCH_PYTHON` names the interpreter (default `python3`). Without it or its packages a test prints a note and passes;
+//! with `BENCH_REQUIRE_PYTHON=1`, as in CI, it fails.
 
 use std::io::Write;
 use std::path::Path;
@@ -9,7 +9,7 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-/// The answers of `truth.py` to questions, in their order; `None`, and why on standard error, where there is no Python to ask.
+/// The answers of `truth.py` to the questions, in their order. Without Python: `None`, with the reason on standard error.
 pub fn ask(questions: &[Value]) -> Option<Vec<Value>> {
     ask_of("truth.py", questions)
 }

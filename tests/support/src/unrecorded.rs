@@ -1,4 +1,4 @@
-//! The default excitation on the simulated stage, straight from the rig, without loop and recording.
+//! The default excitation on the simulated stage, without loop and recording.
 use bench::config::Config;
 use bench::excitation::{Chirp, Excitation};
 use bench::identify::Signals;

@@ -1,4 +1,4 @@
-//! A pretend CAN adapter behind a pseudo terminal, driven by the kernel's slcan: a bus whose troubles are made here.
+//! An emulated CAN adapter behind a pseudo terminal, used by the kernel's slcan driver: a bus with injected errors.
 //!
 //! ```text
 //! t IIIL DD..      a frame, both ways          e1R      an error of the receiver
@@ -32,7 +32,7 @@ pub struct Adapter {
     _terminal: File,
 }
 
-/// The bus behind the adapter. It has one other node, whoever connected last.
+/// The bus behind the adapter. It has one other node: the endpoint opened last.
 #[derive(Clone)]
 pub struct FarSide {
     line: Arc<Mutex<File>>,
@@ -41,7 +41,7 @@ pub struct FarSide {
 }
 
 impl Adapter {
-    /// Plugged in, at [`BIT_RATE`], up.
+    /// An adapter whose interface is up at [`BIT_RATE`].
     pub fn new() -> Adapter {
         let pty = openpty(None, None).unwrap();
         let mut raw = tcgetattr(&pty.slave).unwrap();
@@ -74,18 +74,18 @@ impl Adapter {
         self.far_side.clone()
     }
 
-    /// What the adapter tells the kernel.
+    /// Sends a line from the adapter to the kernel.
     pub fn send(&self, line: &str) {
         self.far_side.write(line);
     }
 
-    /// The controller leaves the bus: 255 errors of the transmitter, and nothing passes in either direction.
+    /// The controller enters bus-off: 255 transmit errors, and no frame passes in either direction.
     pub fn enter_bus_off(&self) {
         self.far_side.is_off.store(true, Ordering::Release);
         self.send("sb000255");
     }
 
-    /// `ip link set IFACE down` and up again: slcan has no other way out of bus-off.
+    /// `ip link set IFACE down` and up again, which is the only way out of bus-off with slcan.
     pub fn restart_interface(&self) {
         self.interface.bring_down().unwrap();
         self.far_side.is_off.store(false, Ordering::Release);
@@ -93,13 +93,13 @@ impl Adapter {
     }
 }
 
-/// Makes the terminal a CAN interface, as slcand does; its name.
+/// Makes the terminal a CAN interface, as slcand does, and returns its name.
 fn attach(terminal: &File) -> String {
     let (fd, mut name) = (terminal.as_raw_fd(), [0u8; libc::IFNAMSIZ]);
-    // SAFETY: an open descriptor, and a pointer to an integer that lives through the call.
+    // SAFETY: the descriptor is open, and the pointed-to integer outlives the call.
     let attached = unsafe { libc::ioctl(fd, libc::TIOCSETD, &N_SLCAN) };
     assert_eq!(attached, 0, "a kernel with slcan: use .ci/vm/check");
-    // SAFETY: the kernel writes a name with its zero, IFNAMSIZ bytes at most.
+    // SAFETY: the kernel writes a name with its terminating zero, at most IFNAMSIZ bytes.
     let named = unsafe { libc::ioctl(fd, libc::SIOCGIFNAME as libc::Ioctl, name.as_mut_ptr()) };
     assert_eq!(named, 0, "the name of the interface");
     std::ffi::CStr::from_bytes_until_nul(&name)
@@ -114,7 +114,8 @@ impl FarSide {
         write!(self.line.lock().unwrap(), "{line}\r").unwrap();
     }
 
-    /// Reads what the kernel sends to the adapter, always: it waits for its bytes to leave the terminal.
+    /// Reads the lines that the kernel sends to the adapter. It must always read, because the kernel waits until its bytes are
+    /// read.
     fn read_frames(self, mut line: File) {
         let (mut bytes, mut text) = ([0; 256], String::new());
         while let Ok(count) = line.read(&mut bytes) {

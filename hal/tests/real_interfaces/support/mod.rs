@@ -21,7 +21,7 @@ pub const BIT_RATE: u32 = 1_000_000;
 /// A test that waits longer than this has failed.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// The default with longer time limits: the emulated machine may stop for a tenth of a second.
+/// The default settings with longer time limits, because the virtual machine may pause for 0.1 s.
 pub fn settings() -> DriveSettings {
     let ms = Duration::from_millis;
     DriveSettings {
@@ -38,7 +38,7 @@ pub fn settings() -> DriveSettings {
     }
 }
 
-/// Interface `name`, in real time.
+/// The host with interface `name`, in real time.
 pub fn host(name: &str) -> SystemHost<SocketPort> {
     SystemHost::new(SocketPort::open(name, BIT_RATE).unwrap())
 }
@@ -47,7 +47,7 @@ pub fn open(name: &str, settings: DriveSettings) -> Result<CanopenDrive, OpenErr
     CanopenDrive::open(settings, Box::new(host(name)))
 }
 
-/// Why it did not open.
+/// The error of an opening that must fail.
 pub fn refusal(name: &str, settings: DriveSettings) -> String {
     open(name, settings)
         .err()
@@ -63,15 +63,15 @@ pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// A simulated drive at work on a bus.
+/// A running simulated drive on a bus.
 pub struct FarEnd {
     device: Arc<Mutex<EmulatedDrive>>,
     running: TaskHandle,
 }
 
 impl FarEnd {
-    /// A drive that has just got power, seen on interface `name`. Returns when its boot-up message is over: a driver that
-    /// hears it takes it for a restart.
+    /// A drive directly after power-on, on interface `name`. Returns after its boot-up message, which a driver would take for a
+    /// restart.
     pub fn new(name: &str, host: &dyn Host) -> FarEnd {
         let mut bus = self::host(name).endpoint(&[heartbeat::cob_id(5)]).unwrap();
         let far_end = FarEnd::start(
@@ -86,7 +86,7 @@ impl FarEnd {
         far_end
     }
 
-    /// The same drive, plugged into another bus.
+    /// The same drive, connected to another bus.
     pub fn moved_to(self, host: &dyn Host) -> FarEnd {
         let FarEnd { device, running } = self;
         drop(running);
@@ -115,7 +115,7 @@ impl FarEnd {
     }
 }
 
-/// A driver in front of a simulated drive.
+/// A driver connected to a simulated drive.
 pub struct Rig {
     pub drive: CanopenDrive,
     pub far_end: FarEnd,
@@ -129,7 +129,7 @@ impl Rig {
         Rig { drive, far_end }
     }
 
-    /// A loop that commands `current_a` until `done`.
+    /// Commands `current_a` repeatedly until `done`.
     fn command_until(&mut self, current_a: f64, what: &str, done: impl Fn(&Rig) -> bool) {
         wait_for(what, || {
             let _ = self.drive.command(current_a); // refused in the tick in which a fault is found
@@ -137,13 +137,13 @@ impl Rig {
         });
     }
 
-    /// The drive gives the commanded current and reports it.
-    pub fn assert_current(&mut self, wanted_a: f64, given_a: f64) {
-        assert_eq!(self.drive.command(wanted_a), Ok(given_a));
-        let near = |current_a: f64| (current_a - given_a).abs() < 1e-9;
+    /// Asserts that the driver returns `applied_a` for `command_a`, and that the drive reaches and reports it.
+    pub fn assert_current(&mut self, command_a: f64, applied_a: f64) {
+        assert_eq!(self.drive.command(command_a), Ok(applied_a));
+        let near = |current_a: f64| (current_a - applied_a).abs() < 1e-9;
         self.command_until(
-            wanted_a,
-            &format!("{given_a} A flow and come back"),
+            command_a,
+            &format!("{applied_a} A flow and are reported"),
             |rig| near(rig.far_end.current_a()) && rig.drive.actual_current_a().is_some_and(near),
         );
         assert_eq!(self.drive.status(), AmplifierStatus::Enabled);
@@ -155,27 +155,27 @@ impl Rig {
         self
     }
 
-    /// The fault that a loop meets which commands on; afterwards it is refused and no current flows.
+    /// Commands a current until a fault is reported, and returns its code. Afterwards commands are refused and no current flows.
     pub fn fault(&mut self) -> u32 {
         self.command_until(1.0, "a fault", |rig| {
             matches!(rig.drive.status(), AmplifierStatus::Fault(_))
         });
         let AmplifierStatus::Fault(code) = self.drive.status() else {
-            panic!("the fault did not stay")
+            panic!("the fault did not persist")
         };
         self.far_end.wait_until_off();
         assert!(
             self.drive.command(1.0).is_err(),
-            "a heedless loop is refused"
+            "commands must be refused after a fault"
         );
         assert!(
             self.drive.enable().is_err(),
-            "a fault is not left by enabling"
+            "enabling must not clear a fault"
         );
         code
     }
 
-    /// After the cause is removed: the operator clears the fault; the drive is off, and is enabled only on request.
+    /// Removes the cause and clears the fault. The drive is then off, and is enabled only on request.
     pub fn assert_recovers(&mut self) {
         self.far_end.device().inject(DeviceFault::None);
         self.drive
@@ -189,7 +189,7 @@ impl Rig {
         assert_eq!(
             self.far_end.current_a(),
             0.0,
-            "an old command does not come back"
+            "an old command must not take effect"
         );
         self.assert_current(0.5, 0.5);
     }

@@ -1,9 +1,9 @@
-//! Programs of other hands: scripts of `tests/python` with python's canopen.
+//! External programs: scripts of `tests/python` with Python's canopen.
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// The script `name` on `interface`, with the python of `.ci/run`.
+/// The script `name` on `interface`, with the Python of `.ci/run`.
 pub fn script(name: &str, interface: &str) -> Command {
     let python = std::env::var_os("BENCH_PYTHON")
         .expect("BENCH_PYTHON: a python with .ci/python-packages.txt");
@@ -25,7 +25,7 @@ pub struct PythonDrive {
 }
 
 impl PythonDrive {
-    /// On the bus; returns when it has started.
+    /// Starts the drive on the bus and waits until it is ready.
     pub fn new(interface: &str) -> PythonDrive {
         let mut command = script("canopen_drive.py", interface);
         let mut process = command
@@ -56,12 +56,12 @@ impl PythonDrive {
         self.answer()
     }
 
-    /// Statusword's state (hexadecimal), target that is followed (per mille), NMT state.
+    /// State of the statusword (hexadecimal), followed target (per mille), NMT state.
     pub fn state(&mut self) -> String {
         self.ask("show")
     }
 
-    /// Emergency message and Fault.
+    /// Sends an emergency message and enters the state Fault.
     pub fn inject_fault(&mut self, code: u16) {
         self.ask(&format!("fault {code:x}"));
     }

@@ -9,14 +9,14 @@ use super::{Rig, host, settings};
 
 static COUNT: AtomicU32 = AtomicU32::new(0);
 
-/// An interface with a name of its own, deleted with this.
+/// An interface with a unique name, deleted on drop.
 pub struct Vcan {
     pub name: String,
     interface: Option<CanInterface>,
 }
 
 impl Vcan {
-    /// Made, and still down.
+    /// A new interface that is down.
     pub fn down() -> Vcan {
         Vcan::named(format!("vcan{}", COUNT.fetch_add(1, Ordering::Relaxed)))
     }
@@ -63,12 +63,12 @@ impl Vcan {
         self.set_up(true);
     }
 
-    /// Driver and simulated drive on this interface, off.
+    /// Driver and simulated drive on this interface, disabled.
     pub fn rig(&self, settings: DriveSettings) -> Rig {
         Rig::new(&self.name, &host(&self.name), settings)
     }
 
-    /// Enabled, 1 A flowing.
+    /// Driver and simulated drive, enabled at 1 A.
     pub fn running(&self) -> Rig {
         self.rig(settings()).enabled()
     }

@@ -66,7 +66,7 @@ pub fn optoncdt(bytes: &[u8]) -> Vec<i64> {
 pub fn keyence(bytes: &[u8], half_range_mm: f64) -> Vec<i64> {
     let text: String = bytes.iter().map(|byte| char::from(*byte)).collect();
     let mut lines: Vec<&str> = text.split('\r').collect();
-    lines.pop(); // not ended
+    lines.pop(); // without terminator
     lines
         .iter()
         .skip(1)

@@ -67,7 +67,7 @@ pub fn still(_now_ns: u64) -> f64 {
     60e-6
 }
 
-/// Moves through the range in 100 s: the position tells the time of the measurement.
+/// Moves through the range in 100 s, so the position gives the time of the measurement.
 pub fn ramp(now_ns: u64) -> f64 {
     now_ns as f64 * 1e-9 / 100.0 * RANGE_M
 }
