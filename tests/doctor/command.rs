@@ -4,8 +4,9 @@ use serde_json::Value;
 
 use crate::program::{Answer, Bench};
 
-/// No effective limit of missed ticks: the timing of the machine is not tested.
-const NO_TIMING_LIMIT: &str = "--set interlock.overruns_per_s=1000000";
+/// The profile `lab` without its devices, which this machine may have, and without an effective limit of missed ticks, because
+/// the timing of the machine is not tested.
+const LAB: &str = "--config lab --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9 --set interlock.overruns_per_s=1000000";
 
 /// Checks structure and consistency of the JSON object, and returns it.
 pub fn checked_report(answer: &Answer) -> Value {
@@ -223,10 +224,7 @@ fn missing_interface_is_reported_as_failure_with_remedy() {
         "",
         "--set amplifier.device={kind=\"vesc\",interface=\"no-such-can\",bit_rate=500000,node=1}",
     ] {
-        let set = "--set amplifier.device.interface=no-such-can";
-        let report = checked_report(&Bench::new().run(&format!(
-            "doctor --config lab --json {NO_TIMING_LIMIT} {set} {device}"
-        )));
+        let report = checked_report(&Bench::new().run(&format!("doctor {LAB} --json {device}")));
         let found = [
             findings_on(&report, "CAN kernel"),
             findings_on(&report, "CAN interface"),
@@ -258,9 +256,8 @@ fn unavailable_processor_is_not_a_failure() {
         found[0].starts_with("note: loop.cpu is 1023, this process may use"),
         "{found:?}"
     );
-    let lab = checked_report(&Bench::new().run(&format!(
-        "doctor --config lab --json {NO_TIMING_LIMIT} --set loop.cpu=1023"
-    )));
+    let lab =
+        checked_report(&Bench::new().run(&format!("doctor {LAB} --json --set loop.cpu=1023")));
     assert!(
         findings_on(&lab, "processor")[0].starts_with("warning: loop.cpu is 1023"),
         "{lab}"

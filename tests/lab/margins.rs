@@ -215,10 +215,22 @@ fn rejects_virtual_pace_mixed_devices_and_missing_interfaces() {
         code == 2 && errors.contains("capancdt") && errors.contains("both"),
         "{errors}"
     );
-    // This machine has no can0, or no such port: nothing moves, and the word says which.
-    let (code, _, errors) = bench(folder.path(), &["control", "--config", "lab", "--slow"]);
+    // No motion; the error names the missing device. The names are set, because this machine may have the devices of the profile.
+    let (code, _, errors) = bench(
+        folder.path(),
+        &[
+            "control",
+            "--config",
+            "lab",
+            "--slow",
+            "--set",
+            "probe.device.line.port=/dev/ttyNONE9",
+            "--set",
+            "amplifier.device.interface=no-such-can",
+        ],
+    );
     assert!(
-        code == 2 && errors.contains("nothing was moved"),
+        code == 2 && errors.contains("/dev/ttyNONE9") && errors.contains("nothing was moved"),
         "{errors}"
     );
 }
