@@ -247,7 +247,9 @@ impl ProbeRig {
     fn program(&self, of: LoopState) -> Box<dyn Program> {
         let plan = match of {
             LoopState::Control => Plan::control(self.config.clone()).expect("a plan"),
-            _ => Plan::chirp(self.config.clone()),
+            LoopState::Disarmed | LoopState::Armed | LoopState::Chirp => {
+                Plan::chirp(self.config.clone())
+            }
         };
         plan.program().expect("a program")
     }

@@ -28,10 +28,17 @@ pub fn bench(arguments: &[&str]) -> Command {
     command
 }
 
-/// A minute of closed loop with the slow controller, or of chirp: longer than a test lets it run.
-pub fn minute(what: &str) -> Vec<&str> {
-    let own: &[&str] = match what {
-        "control" => &[
+/// A run of 60 s, which is longer than a test lets it run.
+#[derive(Clone, Copy)]
+pub enum LongRun {
+    /// Closed loop with the slow controller.
+    Control,
+    Chirp,
+}
+
+pub fn arguments_of(run: LongRun) -> Vec<&'static str> {
+    let own: &[&str] = match run {
+        LongRun::Control => &[
             "control",
             "--slow",
             "--duration",
@@ -41,7 +48,7 @@ pub fn minute(what: &str) -> Vec<&str> {
             "--amplitude",
             "20um",
         ],
-        _ => &[
+        LongRun::Chirp => &[
             "chirp",
             "--duration",
             "60",

@@ -1,13 +1,13 @@
 //! SIGKILL: the program cannot react, and the written part of the recording is still readable.
 use bench::recording::Recording;
 
-use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr};
+use crate::common::{LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr};
 
 #[test]
 fn killed_run_is_recovered_except_for_the_last_second() {
-    for what in ["control", "chirp"] {
+    for run in [LongRun::Control, LongRun::Chirp] {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut running = Running::start(&minute(what), folder.path());
+        let mut running = Running::start(&arguments_of(run), folder.path());
         let sleeps = running.until_slept(5 * RATE_HZ / 2);
         running.signal(libc::SIGKILL);
         assert_eq!(running.end().status.code(), None, "killed");

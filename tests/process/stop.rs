@@ -3,12 +3,12 @@ use bench::recording::Recording;
 use bench::rt::arming::State;
 use bench::rt::record::{EventKind, RequestKind, TickRecord};
 
-use crate::common::{RATE_HZ, Running, bench, minute, recording_in, stderr, ticks};
+use crate::common::{LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks};
 
 /// A run stopped by a signal ends at zero current, with a complete recording and report.
-fn stopped_by(signal: i32, what: &str) {
+fn stopped_by(signal: i32, run: LongRun) {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut running = Running::start(&minute(what), folder.path());
+    let mut running = Running::start(&arguments_of(run), folder.path());
     // The loop closes half a second after the start, the chirp begins after a tenth.
     running.until_slept(RATE_HZ);
     running.signal(signal);
@@ -83,28 +83,28 @@ fn stopped_by(signal: i32, what: &str) {
 
 #[test]
 fn ctrl_c_stops_a_closed_loop_with_zero_current_and_complete_recording() {
-    stopped_by(libc::SIGINT, "control");
+    stopped_by(libc::SIGINT, LongRun::Control);
 }
 
 #[test]
 fn ctrl_c_stops_a_chirp_with_zero_current_and_complete_recording() {
-    stopped_by(libc::SIGINT, "chirp");
+    stopped_by(libc::SIGINT, LongRun::Chirp);
 }
 
 #[test]
 fn sigterm_stops_a_closed_loop_with_zero_current_and_complete_recording() {
-    stopped_by(libc::SIGTERM, "control");
+    stopped_by(libc::SIGTERM, LongRun::Control);
 }
 
 #[test]
 fn sigterm_stops_a_chirp_with_zero_current_and_complete_recording() {
-    stopped_by(libc::SIGTERM, "chirp");
+    stopped_by(libc::SIGTERM, LongRun::Chirp);
 }
 
 #[test]
 fn second_ctrl_c_has_no_effect() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut running = Running::start(&minute("control"), folder.path());
+    let mut running = Running::start(&arguments_of(LongRun::Control), folder.path());
     running.until_slept(RATE_HZ);
     for _ in 0..3 {
         running.signal(libc::SIGINT);

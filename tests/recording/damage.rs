@@ -15,7 +15,7 @@ fn slow_run(ticks: u64) -> Vec<LoopMessage> {
             scheduled_ns: t.tick * 100_000_000,
             ..t
         }),
-        event => event,
+        event @ LoopMessage::Event(_) => event,
     };
     run(ticks).into_iter().map(slow).collect()
 }

@@ -12,7 +12,7 @@ use bench::rt::thread::{self, LoopOutcome};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };
-use rtrb::{Consumer, RingBuffer};
+use rtrb::RingBuffer;
 
 use crate::rig::{CurrentProgram, StillRig, interlocks, stage};
 
@@ -56,9 +56,9 @@ fn run(
 ) -> (LoopOutcome, Vec<TickRecord>) {
     let mut config = stage();
     config.interlock.overruns_per_s = overruns_per_s;
-    let (publisher, records): (_, Consumer<LoopMessage>) = RingBuffer::new(1 << 14);
+    let (publisher, mut records) = RingBuffer::new(1 << 14);
     let (mut requests, taken) = RingBuffer::new(16);
-    let (retired, _spent) = RingBuffer::new(16);
+    let (retired, _retired) = RingBuffer::new(16);
     assert!(requests.push(Request::Arm).is_ok() && requests.push(Request::Start(program)).is_ok());
     let connections = Connections {
         requests: taken,
@@ -68,25 +68,12 @@ fn run(
     };
     let servo = Servo::new(Box::new(rig), interlocks(&config), connections);
     let ended = thread::run(servo, clock, tail);
-    let records = records.into_chunk().filter_map(|p| {
-        if let LoopMessage::Tick(r) = p {
-            Some(r)
-        } else {
-            None
-        }
+    let messages = std::iter::from_fn(move || records.pop().ok());
+    let ticks = messages.filter_map(|message| match message {
+        LoopMessage::Tick(record) => Some(record),
+        LoopMessage::Event(_) => None,
     });
-    (ended, records.collect())
-}
-
-/// All that is in a ring.
-trait IntoChunk {
-    fn into_chunk(self) -> impl Iterator<Item = LoopMessage>;
-}
-
-impl IntoChunk for Consumer<LoopMessage> {
-    fn into_chunk(mut self) -> impl Iterator<Item = LoopMessage> {
-        std::iter::from_fn(move || self.pop().ok())
-    }
+    (ended, ticks.collect())
 }
 
 #[test]

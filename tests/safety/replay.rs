@@ -112,7 +112,10 @@ fn tripped_runs_replay_bit_for_bit() {
             let recording = Recording::open(&path).expect("a recording");
             let trip = recording.events().iter().find_map(|e| match e.kind {
                 EventKind::Trip(trip) => Some((trip.reason(), e.tick)),
-                _ => None,
+                EventKind::Request(_)
+                | EventKind::State { .. }
+                | EventKind::Completed
+                | EventKind::Lost { .. } => None,
             });
             assert_eq!(trip, Some((reason, at)));
             // The loop continues for 0.1 s after a trip.

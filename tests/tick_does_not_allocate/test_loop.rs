@@ -90,7 +90,7 @@ impl TestLoop {
                 LoopMessage::Event(event) => match event.kind {
                     EventKind::Trip(trip) => self.trip = Some(trip.reason()),
                     EventKind::Completed => self.completed = true,
-                    _ => {}
+                    EventKind::Request(_) | EventKind::State { .. } | EventKind::Lost { .. } => {}
                 },
             }
         }
