@@ -4,8 +4,6 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use bench::doctor::{Finding, Report, Severity, examine_canopen_drive, examine_vesc};
-use std::num::NonZeroU32;
-
 use bench_hal::can::bus::{
     BusError, BusEvent, CanBus, Claim, Host, NodeInUse, Port, SimulatedHost, Task, TaskHandle,
 };
@@ -187,33 +185,41 @@ fn stopped_node_is_recognised_by_its_heartbeat() {
     );
 }
 
-/// A host in which another process holds every node.
-struct OccupiedHost(SimulatedHost);
+/// A bus in memory with the claims of an interface of this name.
+struct ClaimingHost {
+    inner: SimulatedHost,
+    interface: String,
+}
 
-impl Port for OccupiedHost {
-    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
-        self.0.endpoint(ids)
-    }
-
-    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
-        Err(NodeInUse {
-            node,
-            pid: NonZeroU32::new(4711),
-        })
+impl ClaimingHost {
+    /// A host whose claims are independent of those of other tests.
+    fn new(inner: SimulatedHost, test: &str) -> ClaimingHost {
+        let interface = format!("{test}-{}", std::process::id());
+        ClaimingHost { inner, interface }
     }
 }
 
-impl Host for OccupiedHost {
+impl Port for ClaimingHost {
+    fn endpoint(&self, ids: &[Id]) -> Result<Box<dyn CanBus>, BusError> {
+        self.inner.endpoint(ids)
+    }
+
+    fn claim(&self, node: u8) -> Result<Claim, NodeInUse> {
+        Claim::new(&self.interface, node)
+    }
+}
+
+impl Host for ClaimingHost {
     fn now_ns(&self) -> u64 {
-        self.0.now_ns()
+        self.inner.now_ns()
     }
 
     fn sleep(&self, time: Duration) {
-        self.0.sleep(time);
+        self.inner.sleep(time);
     }
 
     fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
-        self.0.start(name, task)
+        self.inner.start(name, task)
     }
 }
 
@@ -221,14 +227,19 @@ impl Host for OccupiedHost {
 fn node_in_use_by_another_process_receives_no_frame() {
     let (host, _device, _running) = rig(EmulatedDriveSettings::default());
     let mut listener = host.bus().connect(&[]);
-    let report = examine(&OccupiedHost(host));
+    let host = ClaimingHost::new(host, "in-use");
+    let _claim = host.claim(5).unwrap();
+    let report = examine(&host);
     let [finding] = &report.findings[..] else {
         panic!("{report:?}")
     };
     assert_eq!(finding.severity, Severity::Failure);
     assert_eq!(
         finding.what,
-        "node 5 is used by process 4711; nothing was sent to it"
+        format!(
+            "node 5 is used by process {}; nothing was sent to it",
+            std::process::id()
+        )
     );
     assert_eq!(received_frames(&mut listener), []);
 }
@@ -236,8 +247,9 @@ fn node_in_use_by_another_process_receives_no_frame() {
 #[test]
 fn node_is_released_after_the_examination() {
     let (host, _device, _running) = rig(EmulatedDriveSettings::default());
-    examine(&host);
-    assert!(CanopenDrive::open(DriveSettings::default(), Box::new(host)).is_ok());
+    let host = ClaimingHost::new(host, "released");
+    assert!(problems(&examine(&host)).is_empty());
+    assert!(host.claim(5).is_ok());
 }
 
 /// Sends STATUS of VESC 23 every 20 ms.
