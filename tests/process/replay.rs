@@ -23,7 +23,7 @@ fn json(output: &Output) -> serde_json::Value {
 fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments = [
-        &["control", "--slow", "--duration", "2", "--json"][..],
+        &["control", "--slow", "--duration", "5", "--json"][..],
         &AT_1_KHZ,
         &NO_OVERRUN_LIMIT,
     ]

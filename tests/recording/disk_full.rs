@@ -98,7 +98,7 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
 
 /// Pushes a message, waiting for a free slot. If the ring stays full, the thread of the recorder has stopped reading it.
 fn push(ring: &mut rtrb::Producer<LoopMessage>, published: LoopMessage) {
-    let deadline = Instant::now() + Duration::from_secs(10);
+    let deadline = Instant::now() + Duration::from_secs(60);
     while ring.is_full() {
         assert!(
             Instant::now() < deadline,

@@ -1,4 +1,6 @@
 //! The thread that writes messages from the ring to the disk.
+use std::time::{Duration, Instant};
+
 use bench::recording::{Recorder, Recording, spawn};
 use bench::rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
@@ -52,8 +54,13 @@ fn messages_beyond_the_ring_capacity_are_counted_as_lost() {
     assert_eq!(refused, 50);
     let handle =
         spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
+    let deadline = Instant::now() + Duration::from_secs(60);
     while ring.slots() < 100 {
-        std::thread::yield_now();
+        assert!(
+            Instant::now() < deadline,
+            "the recorder does not read the ring"
+        );
+        std::thread::sleep(Duration::from_millis(1));
     }
     ring.push(LoopMessage::Event(Event {
         tick: 150,

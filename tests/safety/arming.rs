@@ -387,7 +387,7 @@ fn amplifier_is_not_enabled_without_a_recording() {
                 .expect("no recording");
             assert!(error.to_string().contains("nothing was moved"), "{error}");
             // The loop's thread holds the log until it ends.
-            let has_ended = (0..1000).any(|_| {
+            let has_ended = (0..6000).any(|_| {
                 std::thread::sleep(Duration::from_millis(10));
                 Arc::strong_count(&log) == 1
             });

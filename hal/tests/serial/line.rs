@@ -6,7 +6,7 @@ use bench_hal::serial::emulator::Fault;
 use serialport::{SerialPort, TTYPort};
 
 use crate::support::probes::{all, optoncdt, ramp, still};
-use crate::support::rehearsal::{Rehearsal, more, until};
+use crate::support::rehearsal::{Rehearsal, more, until, wait_for};
 
 /// Whether the terminal is in exclusive use: a user other than root could not open it.
 fn is_exclusive(terminal: &TTYPort) -> bool {
@@ -45,22 +45,14 @@ fn exclusive_use_ends_after_a_reader_was_killed() {
     let result = unsafe { libc::ioctl(killed.as_raw_fd(), libc::TIOCEXCL) };
     assert_eq!(result, 0);
     drop(killed);
-    for _ in 0..60_000 {
-        if !is_exclusive(&observer) {
-            return;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
-    panic!("still in exclusive use");
+    wait_for("the end of exclusive use", || !is_exclusive(&observer));
 }
 
 #[test]
 fn bytes_without_a_reader_are_lost() {
     let rehearsal = Rehearsal::new(&optoncdt(), 20_000.0, still);
     let observer = shared(&rehearsal);
-    while rehearsal.sent() < 20_000 {
-        std::thread::sleep(std::time::Duration::from_millis(1));
-    }
+    wait_for("20,000 sent bytes", || rehearsal.sent() >= 20_000);
     rehearsal.inject_fault(Fault::Silence);
     let waiting = observer.bytes_to_read().unwrap();
     assert!(

@@ -92,6 +92,15 @@ impl Rehearsal {
     }
 }
 
+/// Waits until `condition` holds. Panics after the time limit.
+pub fn wait_for(what: &str, mut condition: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !condition() {
+        assert!(start.elapsed() < LIMIT, "not reached: {what}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
 /// The present reading.
 pub fn latest(probe: &mut SerialProbe) -> Reading {
     probe.latest(Tick::default())
