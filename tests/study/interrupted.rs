@@ -12,40 +12,60 @@ const LONG: &str = "--draws 3000000 --threads 2";
 /// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(120);
 
-fn start(bench: &Bench, arguments: &str) -> Child {
+/// The running program. It is killed if a test ends early.
+struct Running(Option<Child>);
+
+impl Running {
+    fn child(&mut self) -> &mut Child {
+        self.0.as_mut().expect("running")
+    }
+
+    fn signal(&mut self, number: i32) {
+        // SAFETY: a child of ours that was not waited for yet, so its id is not reused.
+        let result = unsafe { libc::kill(self.child().id() as libc::pid_t, number) };
+        assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
+    }
+
+    fn end(mut self) -> Output {
+        let child = self.0.take().expect("running");
+        child.wait_with_output().expect("a child of ours")
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = self.0.as_mut() {
+            let _ = child.kill();
+            let _ = child.wait();
+        }
+    }
+}
+
+fn start(bench: &Bench, arguments: &str) -> Running {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
     command
         .current_dir(bench.path(""))
         .args(arguments.split_whitespace())
         .stdin(Stdio::null());
-    command
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("it starts")
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    Running(Some(command.spawn().expect("it starts")))
 }
 
 /// Waits until the file contains its header and several blocks of about 1.1 kB.
-fn until_written(child: &mut Child, file: &Path) {
+fn until_written(running: &mut Running, file: &Path) {
     let deadline = Instant::now() + TIME_LIMIT;
     while std::fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
         assert!(
-            child.try_wait().expect("a child of ours").is_none(),
-            "it ended early"
+            running
+                .child()
+                .try_wait()
+                .expect("a child of ours")
+                .is_none(),
+            "the program ended early"
         );
         assert!(Instant::now() < deadline, "nothing is written");
         std::thread::sleep(Duration::from_millis(10));
     }
-}
-
-fn signal(child: &Child, number: i32) {
-    // SAFETY: a child of ours that nobody has waited for yet, so its id is its own.
-    let result = unsafe { libc::kill(child.id() as libc::pid_t, number) };
-    assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
-}
-
-fn ended(child: Child) -> Output {
-    child.wait_with_output().expect("a child of ours")
 }
 
 /// Number of draws in complete blocks, and number of damaged lines.
@@ -69,10 +89,10 @@ fn lines(text: &str) -> (u64, usize) {
 fn signals_leave_a_complete_file_and_report_how_to_continue() {
     for number in [libc::SIGINT, libc::SIGTERM] {
         let bench = Bench::new();
-        let mut child = start(&bench, &format!("{XY} {LONG} --file a.study --json"));
-        until_written(&mut child, &bench.path("a.study"));
-        signal(&child, number);
-        let output = ended(child);
+        let mut running = start(&bench, &format!("{XY} {LONG} --file a.study --json"));
+        until_written(&mut running, &bench.path("a.study"));
+        running.signal(number);
+        let output = running.end();
         let message = String::from_utf8_lossy(&output.stderr);
         assert_eq!(
             (output.status.code(), output.stdout.len()),
@@ -92,10 +112,10 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
     }
     // Without a file the message states that nothing was stored.
     let bench = Bench::new();
-    let child = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
+    let mut running = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
     std::thread::sleep(Duration::from_millis(500));
-    signal(&child, libc::SIGINT);
-    let output = ended(child);
+    running.signal(libc::SIGINT);
+    let output = running.end();
     let message = String::from_utf8_lossy(&output.stderr);
     // On a loaded machine the signal may arrive before the program handles it; then the signal ends the program.
     assert!(
@@ -112,10 +132,10 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
 fn continues_after_a_killed_process() {
     let bench = Bench::new();
     let arguments = format!("{XY} --draws 40000 --threads 2 --json");
-    let mut child = start(&bench, &format!("{arguments} --file a.study"));
-    until_written(&mut child, &bench.path("a.study"));
-    signal(&child, libc::SIGKILL);
-    assert_eq!(ended(child).status.code(), None);
+    let mut running = start(&bench, &format!("{arguments} --file a.study"));
+    until_written(&mut running, &bench.path("a.study"));
+    running.signal(libc::SIGKILL);
+    assert_eq!(running.end().status.code(), None);
     let (kept, damaged) = lines(&bench.read("a.study"));
     assert!(
         (1000..40_000).contains(&kept) && damaged <= 1,
@@ -135,8 +155,8 @@ fn continues_after_a_killed_process() {
 #[test]
 fn rejects_a_file_that_another_process_uses() {
     let bench = Bench::new();
-    let mut child = start(&bench, &format!("{XY} {LONG} --file a.study"));
-    until_written(&mut child, &bench.path("a.study"));
+    let mut running = start(&bench, &format!("{XY} {LONG} --file a.study"));
+    until_written(&mut running, &bench.path("a.study"));
     for arguments in [
         format!("{XY} {LONG} --file a.study"),
         "model study --join a.study".into(),
@@ -147,8 +167,8 @@ fn rejects_a_file_that_another_process_uses() {
             "{answer:?}"
         );
     }
-    signal(&child, libc::SIGKILL);
-    ended(child);
+    running.signal(libc::SIGKILL);
+    running.end();
     assert!(
         bench
             .run("model study --join a.study")
