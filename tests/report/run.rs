@@ -1,5 +1,6 @@
 //! Plots and page of a run, written by the program.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
@@ -17,21 +18,26 @@ struct Run {
     answer: Value,
 }
 
+/// The JSON object of a command in a folder.
+fn answer_in(folder: &Path, arguments: &[&str]) -> Value {
+    let output = Command::new(env!("CARGO_BIN_EXE_bench"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
 impl Run {
     fn of(arguments: &[&str]) -> Run {
         let folder = tempfile::tempdir().unwrap();
-        let output = Command::new(env!("CARGO_BIN_EXE_bench"))
-            .args(arguments)
-            .current_dir(folder.path())
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
         Run {
-            answer: serde_json::from_slice(&output.stdout).unwrap(),
+            answer: answer_in(folder.path(), arguments),
             folder,
         }
     }
@@ -90,17 +96,33 @@ fn writes_plots_and_page_beside_the_recording_under_its_name() {
 }
 
 #[test]
-fn identify_does_not_overwrite_the_page() {
-    let again = Run::of(&[
-        "identify",
+fn identify_replaces_plots_and_page_of_the_run() {
+    let run = Run::of(&[
+        "chirp",
+        "--duration",
+        "10",
+        "--start",
+        "5",
+        "--stop",
+        "100",
         "--json",
-        &run()
-            .path(run().answer["recording"].as_str().unwrap())
-            .display()
-            .to_string(),
     ]);
-    assert_ne!(again.answer["report"], run().answer["report"]);
-    assert!(again.page().contains("detected"));
+    let recording = run.answer["recording"].as_str().unwrap();
+    let files = || -> BTreeSet<PathBuf> {
+        let entries = std::fs::read_dir(run.path(recording).parent().unwrap()).unwrap();
+        entries.map(|entry| entry.unwrap().path()).collect()
+    };
+    let files_of_the_run = files();
+    let page = run.page();
+    std::fs::write(run.path(run.answer["report"].as_str().unwrap()), "").unwrap();
+    let again = answer_in(run.folder.path(), &["identify", recording, "--json"]);
+    assert_eq!(
+        (&again["report"], &again["plots"]),
+        (&run.answer["report"], &run.answer["plots"])
+    );
+    assert_eq!(files(), files_of_the_run);
+    let verdict = format!("<strong>{}", again["cnmp"].as_str().unwrap());
+    assert!(page.contains(&verdict) && run.page().contains(&verdict));
 }
 
 #[test]
