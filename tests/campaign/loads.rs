@@ -71,7 +71,7 @@ fn required_weight_holds_the_operating_point_without_displacement_in_x() {
             assert!((loaded_m / point_m - 1.0).abs() < 1e-12, "{loaded_m}");
         }
     }
-    // 34 N at 8 % of L, which is the weight of 3.5 kg.
+    // 34 N at 8 % of L, the weight of 3.5 kg: the weight in the drawing of the thesis is in kilograms, not grams.
     let config = config(&[]);
     let kg = StageModel::of(&config)
         .expect("a stage")

@@ -3,7 +3,8 @@ use serde_json::Value;
 
 use crate::program::Bench;
 
-/// The model predicts a travel of 460 um, and the soft limit is 500 um. Rare peaks of the probe noise reach some 100 um, so that the run trips.
+/// The model predicts a travel of 460 um, and the soft limit is 500 um. Rare peaks of the probe noise reach some 100 um, so that
+/// the run trips.
 const TRIPS: &str = "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operating-point 8% --excitation multisine \
                      --set multisine.period_s=8 --shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
                      --set sim.probe_noise_rms_m=2.3e-5 --json";

@@ -54,7 +54,8 @@ fn shifts_a_curve_by_whole_turns_to_match_another() {
 
 #[test]
 fn responses_that_differ_by_a_turn_above_the_lowest_decade_keep_their_start() {
-    // The phase of S goes from 90 degrees to 0, that of T from 0 to below -540: they differ by a turn at most frequencies, but not at the lowest.
+    // The phase of S goes from 90 degrees to 0, that of T from 0 to below -540: they differ by a turn at most frequencies, but
+    // not at the lowest.
     let s: Vec<(f64, f64)> = (0..40)
         .map(|k| (f64::from(1 + k), 90.0 / f64::from(1 + k)))
         .collect();

@@ -115,9 +115,9 @@ fn sigmas_of_short_noisy_record_match_errors() {
     assert_sigma_matches(&short_runs(8, 16), "short records");
 }
 
-/// The noise of the floor has a peak at 5 Hz that is four bins wide to either side, while the noise is estimated from 16 bins: sigma is too
-/// small there by about a quarter. With the default half-width of 16 bins the noise would be estimated from 32 bins, and sigma would be
-/// smaller still.
+/// The noise of the floor has a peak at 5 Hz that is four bins wide to either side, while the noise is estimated from 16 bins:
+/// sigma is too small there by at most a quarter. With the default half-width of 16 bins the noise would be estimated from 32 bins,
+/// and sigma would be smaller still. The remedy is a longer record or a smaller half-width.
 #[test]
 fn at_least_80_percent_of_errors_are_within_two_sigma_at_the_floor_peak_of_a_short_record() {
     let mut peak = short_runs(100, 8);

@@ -76,9 +76,9 @@ fn intervals_of_modes_contain_the_truth_in_90_to_98_percent_of_the_seeds() {
     }
 }
 
-/// The fit also finds the six unmodelled modes of the simulated stage. Three of them are within 0.8 % of 282 Hz, each 1 % wide: only certain
-/// sums of their parameters are well determined, so that the minimum is a narrow valley. A search that stops before the minimum adds
-/// a spurious mode.
+/// The fit also finds the six unmodelled modes of the simulated stage. Three of them are within 0.8 % of 282 Hz, each 1 % wide:
+/// only certain sums of their parameters are well determined, so that the minimum is a narrow valley. A search that stops before
+/// the minimum adds a spurious mode.
 ///
 /// 8 seeds with 27 estimates each: the probability that one error exceeds 4.5 sigma is 1 in 700.
 #[test]

@@ -67,8 +67,8 @@ fn ends_of_the_band_agree_with_python() {
     let (ours, theirs) = (list(&answer, "changes"), list(&answers[0], "edges"));
     assert_eq!((ours.len(), theirs.len()), (2, 2));
     for (change, edge) in ours.iter().zip(theirs) {
-        // Both programs treat a pair as complex if its real part exceeds 1e-7 of its magnitude, which shifts the end by 1e-14. Rounding of the two
-        // matrix pencils adds to it.
+        // Both programs treat a pair as complex if its real part exceeds 1e-7 of its magnitude, which shifts the end by 1e-14.
+        // Rounding of the two matrix pencils adds to it.
         near(
             "an end of the band",
             number(&change["value"]) / 0.0475,

@@ -117,8 +117,8 @@ fn close_modes_veer_and_localise_with_asymmetry() {
     }
 }
 
-/// Section 2.3: with D > 0, at the veering point y2 = 1 and y3 = 0 in the third mode, and the opposite in the fourth. The heavier stage has
-/// the lower frequency, so that D < 0 exchanges the two.
+/// Section 2.3: with D > 0, at the veering point y2 = 1 and y3 = 0 in the third mode, and the opposite in the fourth. The heavier
+/// stage has the lower frequency, so that D < 0 exchanges the two.
 fn assert_localised(answer: &Value, asymmetry: &str) {
     let share =
         |mode: usize, coordinate: usize| number(&answer["closest"]["shares"][mode][coordinate]);
