@@ -264,12 +264,18 @@ fn model_modes_reports_the_sensitivity_bound() {
     let bench = Bench::new();
     let (modes, bounds) = (bench.json("model modes"), bench.json("model bounds"));
     assert_eq!(modes["bounds"], bounds["zeros"]);
-    assert!(
-        bench
-            .run("model modes")
-            .out
-            .contains("at most 530.4 rad/s for |S| < 0.5 with a peak below 2")
+    let zero = &list(&bounds, "zeros")[0];
+    // (1/0.5)^(Theta/(pi - Theta)) = 2 for Theta = 90 degrees: the zero is on the circle with the diameter from -j w0 to j w0.
+    let magnitude = number(&zero["re_rad_s"]).hypot(number(&zero["im_rad_s"]));
+    near(
+        "the bandwidth",
+        number(&zero["bandwidth_rad_s"]),
+        magnitude,
+        1e-9 * magnitude,
     );
+    let text = bench.run("model modes").out;
+    let bound = format!("at most {magnitude:.1} rad/s for |S| < 0.5 with a peak below 2");
+    assert!(text.contains(&bound), "`{bound}` is not in {text}");
 }
 
 #[test]
