@@ -54,7 +54,7 @@ impl<'a> Trace<'a> {
 pub enum Curve<'a> {
     /// Measured: a line with its band of two sigma, and its coherence.
     Measured(&'a Frf),
-    /// Of a model: a line.
+    /// Response of a model: a line.
     Model {
         /// Frequencies in hertz.
         frequency_hz: &'a [f64],

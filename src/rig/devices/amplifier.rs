@@ -32,7 +32,7 @@ pub enum AmplifierError {
     Simulated,
 }
 
-/// What the loop requires of an amplifier.
+/// Requirements of the loop for an amplifier.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Requirements {
     /// Rate of the set-points, in hertz.
@@ -51,7 +51,7 @@ impl Requirements {
     }
 }
 
-/// Where a device is on a CAN bus.
+/// Address of a device on a CAN bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CanAddress<'a> {
     /// The interface, as `ip link` names it.
@@ -67,7 +67,7 @@ pub type OpenAmplifier = (Box<dyn CurrentAmplifier>, String);
 
 /// The settings of an amplifier on a CAN bus: from them come its driver and its emulation.
 pub trait CanAmplifier {
-    /// Where it is on the bus.
+    /// Its address on the bus.
     fn address(&self) -> CanAddress<'_>;
 
     /// Resolution of the current, in amperes.

@@ -58,7 +58,7 @@ pub enum DevicesError {
         FIRST_READING.as_secs()
     )]
     NoReading {
-        /// What was missing.
+        /// The missing reading.
         what: &'static str,
         /// Bytes received.
         bytes: u64,

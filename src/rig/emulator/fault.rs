@@ -174,7 +174,7 @@ impl FaultRequest {
         qualified(text, devices).parse()
     }
 
-    /// What ends this fault.
+    /// The request that ends this fault.
     pub fn end(&self) -> FaultRequest {
         FaultRequest {
             text: format!("end of {}", self.text),
@@ -220,7 +220,7 @@ impl EmulatedFault {
         }
     }
 
-    /// What ends this fault.
+    /// The fault that ends this one.
     pub fn end(self) -> EmulatedFault {
         match self {
             EmulatedFault::None => EmulatedFault::None,

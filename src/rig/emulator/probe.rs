@@ -19,7 +19,7 @@ const STREAM_HZ: f64 = 4000.0;
 /// A polled probe measures more often than it is polled, so that each answer holds one or two values.
 const MEASUREMENTS_PER_ANSWER: f64 = 1.5;
 
-/// Where the emulated probe is connected.
+/// Connection of the emulated probe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProbeEndpoint {
     /// A pseudo terminal, with an optional link to the reader's side.
@@ -157,7 +157,7 @@ fn open_line(
     }
 }
 
-/// What the probe measures at a time, in its own metres: the inverse of position = gain * reading + offset.
+/// The measurement of the probe at a time, in its own metres: the inverse of position = gain * reading + offset.
 fn measurement(
     mut sensor: Sensor,
     mounting: Mounting,

@@ -21,7 +21,7 @@ pub(super) struct NonlinearPlant {
 }
 
 impl NonlinearPlant {
-    /// At rest at the operating point.
+    /// The plant at rest at the operating point.
     pub(super) fn new(plant: &PlantSettings, drive: Drive) -> Result<NonlinearPlant, PlantError> {
         let linear = ModalModel::of(&build(plant)?)?;
         let frequencies_rad_s = linear.modes.iter().map(|mode| mode.omega_rad_s);
