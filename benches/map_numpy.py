@@ -24,7 +24,7 @@ BENCH = sys.argv[1] if len(sys.argv) > 1 else "target/release/bench"
 
 
 def run(side, *more, cores):
-    grids = ["--operating-points", f"0:0.15:{side}", "--asymmetries", f"-0.1:0.1:{side}"]
+    grids = ["--operating-points", f"0%:15%:{side}", "--asymmetries", f"-0.1:0.1:{side}"]
     command = [BENCH, "model", "map", "--config", "chapter2", *grids, *more]
     return subprocess.run(
         command, check=True, capture_output=True, text=True, preexec_fn=lambda: os.sched_setaffinity(0, cores)

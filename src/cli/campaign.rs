@@ -12,7 +12,7 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
-use super::value_range::ValueRange;
+use super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{Config, Purpose, profiles};
 use crate::experiment::campaign::{Campaign, Evaluation, Grid, StageModel, Tolerances};
 use crate::experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
@@ -20,32 +20,36 @@ use crate::report::campaign_picture;
 use crate::rig::devices;
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
-use crate::util::quantity::{OfRatio, si};
+use crate::util::quantity::{OfRatio, OperatingPoint, Ratio, si};
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
 
 /// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("operating_point", |arg| arg.hide(true)))]
+#[command(mut_arg("asymmetry", |arg| arg.hide(true)))]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// Operating points, in % or as a ratio of the beam length
+    /// Operating points, FROM and TO with a unit: in % of the beam length (0%:8%:15) or as lengths (0mm:3.8mm:15)
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
         default_value = "0%:8%:15",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        value_parser = operating_points
     )]
-    operating_points: ValueRange,
-    /// Nominal mass asymmetries m2/m3 - 1 (without the asymmetry offset of the stage)
+    operating_points: ValueRange<OperatingPoint>,
+    /// Nominal mass asymmetries m2/m3 - 1 (without the asymmetry offset of the stage): -10%:10%:10 or -0.1:0.1:10
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
         default_value = "-10%:10%:10",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        value_parser = asymmetries
     )]
-    asymmetries: ValueRange,
+    asymmetries: ValueRange<Ratio>,
     /// Folder of the campaign; the same command continues an interrupted campaign
     #[arg(long, value_name = "DIR", default_value = "campaign")]
     out: PathBuf,
@@ -59,9 +63,9 @@ pub(super) struct Args {
     /// divided by m3, half of a mass step of 0.5 g]
     #[arg(long, value_name = "RATIO", value_parser = si::<OfRatio>)]
     asymmetry_tolerance: Option<f64>,
-    /// Accuracy with which an operating point can be set, as a ratio of the beam length
-    #[arg(long, value_name = "RATIO", default_value_t = 0.002, value_parser = si::<OfRatio>)]
-    operating_point_tolerance: f64,
+    /// Accuracy with which an operating point can be set, with a unit: in % of the beam length, or a length (0.1mm)
+    #[arg(long, value_name = "LENGTH", default_value = "0.2%", value_parser = OperatingPoint::with_unit)]
+    operating_point_tolerance: OperatingPoint,
     /// Number of points simulated in parallel [default: one for each processor]; the results do not depend on it
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -69,8 +73,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
-    let (points, asymmetries) = (args.operating_points.0.clone(), args.asymmetries.0.clone());
-    let grid = Grid::new(points, asymmetries, &config)?;
+    let grid = grid(args, &config)?;
     let tolerances = tolerances(args, &grid, &config)?;
     let on_devices = is_guided(args, &config);
     let mut campaign = Campaign::open(&args.out, &grid, &config, on_devices, args.keep_recordings)?;
@@ -84,6 +87,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     show(args, &config, &campaign.evaluate(tolerances)?)?;
     Ok(Outcome::Done)
+}
+
+fn grid(args: &Args, config: &Config) -> Result<Grid, CliError> {
+    let beam_length_m = StageModel::of(config)?.stage.beam_length_m;
+    let points = args.operating_points.ratios(beam_length_m)?;
+    Ok(Grid::new(points, args.asymmetries.ratios()?, config)?)
 }
 
 /// Measures the missing points until all are done, or a signal stops it.
@@ -217,24 +226,34 @@ fn is_guided(args: &Args, config: &Config) -> bool {
 }
 
 fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, CliError> {
-    let half_step = 0.5 * grid.mass_step(StageModel::of(config)?.stage);
+    let stage = StageModel::of(config)?.stage;
+    let half_step = 0.5 * grid.mass_step(stage);
     let asymmetry = args.asymmetry_tolerance.unwrap_or(half_step);
+    let operating_point = args.operating_point_tolerance.ratio(stage.beam_length_m);
+    let operating_point = operating_point.map_err(|error| CliError::Usage(error.to_string()))?;
     Ok(Tolerances {
-        asymmetry: ratio("--asymmetry-tolerance", asymmetry)?,
-        operating_point: ratio(
-            "--operating-point-tolerance",
-            args.operating_point_tolerance,
+        asymmetry: below_one(
+            asymmetry,
+            &format!(
+                "--asymmetry-tolerance is {asymmetry}; it is a ratio between 0 and 1, for example 0.4% or 0.004"
+            ),
+        )?,
+        operating_point: below_one(
+            operating_point,
+            &format!(
+                "--operating-point-tolerance is {}; it is between 0 and the beam length, for example 0.2% or 0.1mm",
+                args.operating_point_tolerance
+            ),
         )?,
     })
 }
 
-fn ratio(option: &str, value: f64) -> Result<f64, CliError> {
-    if value > 0.0 && value < 1.0 {
-        return Ok(value);
+/// A ratio above 0 and below 1.
+fn below_one(ratio: f64, refusal: &str) -> Result<f64, CliError> {
+    match ratio > 0.0 && ratio < 1.0 {
+        true => Ok(ratio),
+        false => Err(CliError::Usage(refusal.into())),
     }
-    Err(CliError::Usage(format!(
-        "{option} is {value}; it is a ratio between 0 and 1, for example 0.004"
-    )))
 }
 
 fn threads(args: &Args) -> usize {

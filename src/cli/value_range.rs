@@ -1,43 +1,79 @@
 //! A grid as it is typed: FROM:TO:COUNT.
 
-use std::str::FromStr;
+use std::fmt::Display;
 
-use crate::util::quantity::{OfRatio, si};
+use super::error::CliError;
+use crate::util::quantity::{OperatingPoint, QuantityError, Ratio};
 
 /// Largest number of values of a grid.
 const MOST: usize = 10_000;
 
 /// At least two values at equal distances, with both ends.
 #[derive(Clone, Debug)]
-pub(super) struct ValueRange(pub Vec<f64>);
-
-impl ValueRange {
-    pub fn ends(&self) -> [f64; 2] {
-        [self.0[0], self.0[self.0.len() - 1]]
-    }
+pub(super) struct ValueRange<T> {
+    from: T,
+    to: T,
+    count: usize,
 }
 
-impl FromStr for ValueRange {
-    type Err = String;
+/// A range of operating points, each with its unit. For clap.
+pub(super) fn operating_points(text: &str) -> Result<ValueRange<OperatingPoint>, String> {
+    ValueRange::parse(text, "0%:8%:15 or 0mm:3.8mm:15", OperatingPoint::with_unit)
+}
 
-    fn from_str(text: &str) -> Result<ValueRange, String> {
+/// A range of mass asymmetries. For clap.
+pub(super) fn asymmetries(text: &str) -> Result<ValueRange<Ratio>, String> {
+    ValueRange::parse(text, "-10%:10%:41", str::parse)
+}
+
+impl<T> ValueRange<T> {
+    fn parse(
+        text: &str,
+        example: &str,
+        value: impl Fn(&str) -> Result<T, QuantityError>,
+    ) -> Result<ValueRange<T>, String> {
         let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
-            return Err("write FROM:TO:COUNT, as in 0%:15%:31".into());
+            return Err(format!("write FROM:TO:COUNT, as in {example}"));
         };
-        let (from, to, count) = (ratio(from)?, ratio(to)?, count_of(count)?);
-        if from == to {
-            return Err(format!(
-                "an empty sweep: FROM and TO are both {from}; give two values"
-            ));
-        }
-        let last = (count - 1) as f64;
-        let inner = (0..count - 1).map(|k| from + (to - from) * k as f64 / last);
-        Ok(ValueRange(inner.chain([to]).collect()))
+        let value = |text| value(text).map_err(|error| error.to_string());
+        Ok(ValueRange {
+            from: value(from)?,
+            to: value(to)?,
+            count: count_of(count)?,
+        })
     }
 }
 
-fn ratio(text: &str) -> Result<f64, String> {
-    si::<OfRatio>(text).map_err(|e| e.to_string())
+impl ValueRange<OperatingPoint> {
+    /// The values of `--operating-points` as ratios of the beam length.
+    pub fn ratios(&self, beam_length_m: f64) -> Result<Vec<f64>, CliError> {
+        let ratio = |point: &OperatingPoint| {
+            let ratio = point.ratio(beam_length_m);
+            ratio.map_err(|error| CliError::Usage(error.to_string()))
+        };
+        self.spaced("--operating-points", ratio(&self.from)?, ratio(&self.to)?)
+    }
+}
+
+impl ValueRange<Ratio> {
+    /// The values of `--asymmetries`.
+    pub fn ratios(&self) -> Result<Vec<f64>, CliError> {
+        self.spaced("--asymmetries", self.from.si(), self.to.si())
+    }
+}
+
+impl<T: Display> ValueRange<T> {
+    fn spaced(&self, option: &str, from: f64, to: f64) -> Result<Vec<f64>, CliError> {
+        if from == to {
+            return Err(CliError::Usage(format!(
+                "{option}: an empty sweep, FROM ({}) and TO ({}) are equal; give two values",
+                self.from, self.to
+            )));
+        }
+        let last = (self.count - 1) as f64;
+        let inner = (0..self.count - 1).map(|k| from + (to - from) * k as f64 / last);
+        Ok(inner.chain([to]).collect())
+    }
 }
 
 fn count_of(text: &str) -> Result<usize, String> {

@@ -426,6 +426,35 @@ impl Quantity {
 pub struct OperatingPoint(Quantity);
 
 impl OperatingPoint {
+    /// An operating point whose unit must be typed, for options of which a bare number once was a ratio of the beam length.
+    /// Only 0 needs no unit.
+    ///
+    /// # Errors
+    /// If the text is not an operating point, or has no unit.
+    pub fn with_unit(text: &str) -> Result<OperatingPoint, QuantityError> {
+        let point: OperatingPoint = text.parse()?;
+        let (text, number) = (point.0.text(), point.0.number());
+        if !point.0.is_bare() || number == 0.0 {
+            return Ok(point);
+        }
+        // Without the rounding error of the multiplication.
+        let percent = (number * 1e12).round() / 1e10;
+        Err(QuantityError(format!(
+            "`{text}` has no unit: write {percent}% for a ratio of {text} of the beam length, or {text}m for metres"
+        )))
+    }
+
+    /// As a ratio of this beam length.
+    ///
+    /// # Errors
+    /// If its unit is not that of a length.
+    pub fn ratio(&self, beam_length_m: f64) -> Result<f64, QuantityError> {
+        match self.0.percentage() {
+            Some(share) => Ok(share),
+            None => Ok(self.metres(None)? / beam_length_m),
+        }
+    }
+
     /// The operating point in metres, on a plant with beams of this length.
     ///
     /// # Errors
@@ -541,6 +570,24 @@ mod tests {
                 .for_setting("interlock.soft_limit_m", Some(0.05))
                 .is_err()
         );
+    }
+
+    #[test]
+    fn an_operating_point_without_unit_is_refused_with_both_ways_to_write_it() {
+        let ratio = |text| OperatingPoint::with_unit(text)?.ratio(0.05);
+        for (text, expected) in [("8%", 0.08), ("0", 0.0), ("0%", 0.0), ("4mm", 0.004 / 0.05)] {
+            assert_eq!(ratio(text), Ok(expected), "{text}");
+        }
+        // 0.07 * 100 is 7.000000000000001.
+        for (text, percent, metres) in [("0.07", "7%", "0.07m"), ("-0.15", "-15%", "-0.15m")] {
+            let error = ratio(text).unwrap_err().to_string();
+            let words = format!(
+                "`{text}` has no unit: write {percent} for a ratio of {text} of the beam length, or {metres} for metres"
+            );
+            assert_eq!(error, words);
+        }
+        let error = ratio("5s").unwrap_err().to_string();
+        assert!(error.contains("a time in s; a length in m"), "{error}");
     }
 
     #[test]

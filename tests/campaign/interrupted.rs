@@ -204,8 +204,24 @@ fn rejects_invalid_campaigns_with_the_reason() {
             "20000 points",
         ),
         (
+            "campaign --operating-points 0:0.08:3",
+            "`0.08` has no unit: write 8% for a ratio of 0.08 of the beam length, or 0.08m for metres",
+        ),
+        (
             "campaign --asymmetry-tolerance 0",
             "--asymmetry-tolerance is 0",
+        ),
+        (
+            "campaign --operating-point-tolerance 0.002",
+            "`0.002` has no unit: write 0.2%",
+        ),
+        (
+            "campaign --operating-point-tolerance 5cm",
+            "unknown unit `cm`",
+        ),
+        (
+            "campaign --operating-point-tolerance 100%",
+            "--operating-point-tolerance is 100%; it is between 0 and the beam length",
         ),
         (
             "chirp --config xy --set sim.asymmetry_offset=0.01",

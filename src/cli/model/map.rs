@@ -7,34 +7,39 @@ use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
-use super::super::value_range::ValueRange;
+use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
+use crate::util::quantity::{OperatingPoint, Ratio};
 
 /// The largest picture in lines and characters, which fits 80 columns.
 const PICTURE: (usize, usize) = (60, 67);
 
 /// The grid.
 #[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("operating_point", |arg| arg.hide(true)))]
+#[command(mut_arg("asymmetry", |arg| arg.hide(true)))]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
-    /// Operating points as ratios of the beam length: 0:0.15:31, 0%:15%:31
+    /// Operating points, FROM and TO with a unit: in % of the beam length (0%:15%:31) or as lengths (0mm:7mm:31)
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
         default_value = "0%:15%:31",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        value_parser = operating_points
     )]
-    operating_points: ValueRange,
-    /// Mass asymmetries m2/m3 - 1: -0.1:0.1:41, -10%:10%:41
+    operating_points: ValueRange<OperatingPoint>,
+    /// Mass asymmetries m2/m3 - 1: -10%:10%:41 or -0.1:0.1:41
     #[arg(
         long,
         value_name = "FROM:TO:COUNT",
         default_value = "-10%:10%:41",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        value_parser = asymmetries
     )]
-    asymmetries: ValueRange,
+    asymmetries: ValueRange<Ratio>,
     #[command(flatten)]
     table: TableOptions,
 }
@@ -50,12 +55,14 @@ struct Report<'a> {
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
     let settings = settings(args)?;
-    let (points, asymmetries) = (&args.operating_points.0[..], &args.asymmetries.0[..]);
+    let points = args.operating_points.ratios(settings.beam_length_m)?;
+    let asymmetries = args.asymmetries.ratios()?;
+    check_ends(args, &settings, &points, &asymmetries)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let cnmp_pairs = zeros::cnmp_map(&settings, points, asymmetries, threads)?;
+    let cnmp_pairs = zeros::cnmp_map(&settings, &points, &asymmetries, threads)?;
     let report = Report {
-        operating_points: points,
-        asymmetries,
+        operating_points: &points,
+        asymmetries: &asymmetries,
         cnmp_pairs,
     };
     args.table.write(|| columns(&report))?;
@@ -65,14 +72,23 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 
 const FIXED: &str = "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
 
-/// The settings of the plant. Refuses grids whose ends are invalid.
+/// The settings of the plant, without what the grid varies.
 fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
         return Err(CliError::Usage(FIXED.into()));
     }
-    let settings = sr4dof(args, &[])?;
-    let (points, asymmetries) = (args.operating_points.ends(), args.asymmetries.ends());
-    for (point, asymmetry) in points.into_iter().zip(asymmetries) {
+    sr4dof(args, &[])
+}
+
+/// Refuses a grid whose ends are not allowed.
+fn check_ends(
+    args: &Args,
+    settings: &Sr4dofSettings,
+    points: &[f64],
+    asymmetries: &[f64],
+) -> Result<(), CliError> {
+    let ends = |values: &[f64]| [values[0], values[values.len() - 1]];
+    for (point, asymmetry) in ends(points).into_iter().zip(ends(asymmetries)) {
         let point_m = point * settings.beam_length_m;
         let settings = [
             OptionSetting::new("plant.operating_point_m", point_m, "--operating-points"),
@@ -80,7 +96,7 @@ fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
         ];
         sr4dof(args, &settings)?;
     }
-    Ok(settings)
+    Ok(())
 }
 
 fn sr4dof(args: &Args, settings: &[OptionSetting]) -> Result<Sr4dofSettings, CliError> {
