@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::error::CliError;
-use super::output::{print_message, print_note};
+use super::output::print_message;
 use super::table::wrap;
 use crate::experiment::campaign::{Operator, Question, Reply};
 use crate::util::quantity::Quantity;
@@ -78,21 +78,27 @@ impl Operator for TerminalOperator<'_> {
             };
             match reply(&line, question, self.beam_length_m) {
                 Ok(reply) => return reply,
-                Err(why) => print_message(&format!("  {why}\n")),
+                Err(why) => print_message(&wrap(&why, 2)),
             }
         }
     }
 
     fn tell(&mut self, text: &str) {
-        print_note(text);
+        print_message(&wrapped(&format!("bench: {text}")));
     }
+}
+
+/// Each line wrapped below its own indentation.
+fn wrapped(text: &str) -> String {
+    let indent = |line: &str| line.len() - line.trim_start().len();
+    text.lines().map(|line| wrap(line, indent(line))).collect()
 }
 
 /// The answers that a question accepts.
 fn choices(question: &Question) -> String {
     let mut choices = vec!["Enter when done"];
     if question.may_read {
-        choices.push("or the measured displacement in Y (for example 3.80mm)");
+        choices.push("instead the displacement in Y, if you measured it (for example 3.80mm)");
     }
     if question.may_confirm {
         choices.push("`right` to confirm the load");
@@ -100,14 +106,14 @@ fn choices(question: &Question) -> String {
     if question.may_skip {
         choices.push("`skip` to leave this point out");
     }
-    choices.push("`stop`");
+    choices.push("`stop` to end the campaign and continue it later");
     choices.join(", ")
 }
 
 /// The meaning of an answer, or why it is not accepted.
 fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<Reply, String> {
     let line = line.trim();
-    let reply = match line {
+    let reply = match line.to_ascii_lowercase().as_str() {
         "" => Some(Reply::Done(None)),
         "stop" => Some(Reply::Stop),
         "skip" if question.may_skip => Some(Reply::Skip),
@@ -115,7 +121,16 @@ fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<
         _ if question.may_read => displacement_m(line, beam_length_m).map(|m| Reply::Done(Some(m))),
         _ => None,
     };
-    reply.ok_or_else(|| format!("`{line}` is not accepted here: {}", choices(question)))
+    reply.ok_or_else(|| refusal(line, question))
+}
+
+/// Why a line is not an answer.
+fn refusal(line: &str, question: &Question) -> String {
+    let is_number = line.parse::<f64>().is_ok_and(f64::is_finite);
+    if question.may_read && is_number {
+        return format!("`{line}` has no unit: type {line}mm or {line}um");
+    }
+    format!("`{line}` is not accepted here: {}", choices(question))
 }
 
 /// A displacement with its unit. A bare number is refused: it may be in millimetres or in metres.
@@ -178,14 +193,16 @@ mod tests {
             ]
         );
         assert_eq!(
-            [open("skip"), open(" right ")],
+            [open("Skip"), open(" right ")],
             [Ok(Reply::Skip), Ok(Reply::Right)]
         );
         assert_eq!(
             [open("3.5mm"), open("-2mm"), open("8%")],
             [done(0.0035), done(-0.002), done(0.004)]
         );
-        for line in ["3.8", "yes", "nan", "infmm", "skip it"] {
+        let error = open("3.8").unwrap_err();
+        assert_eq!(error, "`3.8` has no unit: type 3.8mm or 3.8um");
+        for line in ["yes", "nan", "infmm", "skip it"] {
             assert!(
                 open(line)
                     .unwrap_err()

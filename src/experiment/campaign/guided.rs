@@ -16,7 +16,7 @@ use super::load::{Load, StageModel};
 use super::load_check::{Finding, LoadCheck};
 use super::point::PointResult;
 use super::rest_position::RestPosition;
-use crate::config::Config;
+use crate::config::{Config, Sr4dofSettings};
 
 /// A question to the operator.
 #[derive(Clone, Debug, PartialEq)]
@@ -136,7 +136,8 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
 
     fn unloaded_position(&mut self) -> Result<Option<RestPosition>, CampaignError> {
         let question = Question {
-            text: "begin with the unloaded stage: remove every weight from the cable and every added mass from stages 2 and 3"
+            text: "begin with the unloaded stage:\n  remove every weight from the cable and every added mass from stages 2 and 3\n  then keep clear: \
+                the stage is measured at rest, without current"
                 .into(),
             may_read: false,
             may_confirm: false,
@@ -161,7 +162,12 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
             point,
             model,
             load,
-            question: self.load_question(point, number, &load.instructions(&state.load)),
+            question: self.load_question(
+                point,
+                number,
+                model.stage,
+                &load.instructions(&state.load),
+            ),
             read_m: None,
             failed: None,
         };
@@ -235,13 +241,21 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         self.keep(visit.point, result).map(Some)
     }
 
-    fn load_question(&self, point: GridPoint, number: &str, instructions: &[String]) -> Question {
+    fn load_question(
+        &self,
+        point: GridPoint,
+        number: &str,
+        stage: &Sr4dofSettings,
+        instructions: &[String],
+    ) -> Question {
         let operating_point = 100.0 * self.grid.operating_points[point.row];
+        let displacement_mm = 1e3 * stage.operating_point_m;
         let asymmetry = 100.0 * self.grid.asymmetries[point.column];
         let instructions = instructions.join("\n  ");
         Question {
             text: format!(
-                "{number}: Y1o = {operating_point:.2} % of L, m2/m3 - 1 = {asymmetry:+.2} %\n  {instructions}"
+                "{number}: Y1o = {displacement_mm:.3} mm ({operating_point:.2} % of L), m2/m3 - 1 = {asymmetry:+.2} %\n  \
+                 {instructions}\n  then keep clear: the stage is measured at rest, and a chirp moves it"
             ),
             may_read: true,
             may_confirm: false,
@@ -295,9 +309,12 @@ fn failed_question(check: &LoadCheck, result: Option<&PointResult>) -> Question 
     let failures: Vec<String> = reason.into_iter().chain(check.failures()).collect();
     Question {
         text: format!(
-            "the load is not as requested:\n  {}\ncorrect it; if the model is wrong at every point, correct [plant] and \
-             campaign.frequency_tolerance_ratio",
-            failures.join("\n  ")
+            "a check of the load failed:\n  {}\nthis point needs:\n  {}\n\
+             if the load differs: correct it and press Enter, the point is measured again\n\
+             if the load is correct: type `right`\n\
+             if this happens at every point: type `stop` and correct [plant] or campaign.frequency_tolerance_ratio",
+            failures.join("\n  "),
+            check.load.totals().join("\n  ")
         ),
         may_read: true,
         may_confirm: true,

@@ -8,8 +8,8 @@ use crate::config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
 
 /// Standard gravity in m/s^2.
 const GRAVITY_M_PER_S2: f64 = 9.80665;
-/// A mass below half of this is treated as zero, in kilograms.
-const NEGLIGIBLE_KG: f64 = 0.0005;
+/// A mass below this is treated as zero, in kilograms: half of a mass step.
+const NEGLIGIBLE_KG: f64 = MASS_STEP_KG / 2.0;
 
 /// Masses that are added to the stage as it was built, in kilograms.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -92,6 +92,19 @@ impl<'a> StageModel<'a> {
 }
 
 impl Load {
+    /// The load without a change: one line for the weight and one for each stage.
+    pub fn totals(&self) -> [String; 3] {
+        [
+            total(
+                weight_name(self.hung_kg < 0.0),
+                self.hung_kg.abs(),
+                Unit::Kilogram,
+            ),
+            total("on stage 2", self.on_m2_kg, Unit::Gram),
+            total("on stage 3", self.on_m3_kg, Unit::Gram),
+        ]
+    }
+
     /// Instructions to change the load from `before`: one line for the weight and one for each stage.
     pub fn instructions(&self, before: &Load) -> [String; 3] {
         [
@@ -104,17 +117,20 @@ impl Load {
     fn weight_instruction(&self, before: &Load) -> String {
         // If no weight is needed, the side is that of the weight to remove.
         let is_down = self.hung_kg < 0.0 || self.hung_kg == 0.0 && before.hung_kg < 0.0;
-        let name = if is_down {
-            "weight in -Y"
-        } else {
-            "weight in +Y"
-        };
+        let name = weight_name(is_down);
         let (now_kg, before_kg) = (self.hung_kg.abs(), before.hung_kg.abs());
         if self.hung_kg * before.hung_kg < 0.0 {
             let line = instruction(name, now_kg, 0.0, Unit::Kilogram);
             return format!("remove the weight from the other side; {line}");
         }
         instruction(name, now_kg, before_kg, Unit::Kilogram)
+    }
+}
+
+fn weight_name(is_down: bool) -> &'static str {
+    match is_down {
+        true => "weight in -Y",
+        false => "weight in +Y",
     }
 }
 
@@ -135,16 +151,18 @@ impl Unit {
 
 /// The total mass and its change.
 fn instruction(name: &str, now_kg: f64, before_kg: f64, unit: Unit) -> String {
-    let limit_kg = NEGLIGIBLE_KG / 2.0;
-    let total = match now_kg < limit_kg {
-        true => "nothing".to_string(),
-        false => format!("{} in total", unit.amount(now_kg)),
-    };
     let change_kg = now_kg - before_kg;
     let change = match change_kg {
-        _ if change_kg > limit_kg => format!("add {}", unit.amount(change_kg)),
-        _ if change_kg < -limit_kg => format!("remove {}", unit.amount(-change_kg)),
+        _ if change_kg > NEGLIGIBLE_KG => format!("add {}", unit.amount(change_kg)),
+        _ if change_kg < -NEGLIGIBLE_KG => format!("remove {}", unit.amount(-change_kg)),
         _ => "unchanged".to_string(),
     };
-    format!("{name}: {total} ({change})")
+    format!("{} ({change})", total(name, now_kg, unit))
+}
+
+fn total(name: &str, kg: f64, unit: Unit) -> String {
+    match kg < NEGLIGIBLE_KG {
+        true => format!("{name}: nothing"),
+        false => format!("{name}: {} in total", unit.amount(kg)),
+    }
 }
