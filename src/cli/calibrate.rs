@@ -12,7 +12,7 @@ use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
-use crate::config::{Config, Purpose};
+use crate::config::{Config, OptionSetting, Purpose};
 use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{RunSummary, Runner};
 use crate::rig::calibration::{
@@ -94,7 +94,11 @@ fn plan_text(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> Strin
 fn config(args: &Args) -> Result<Config, CliError> {
     let amplitude = args.amplitude.as_ref();
     let amplitude = given("calibrate.amplitude_a", "--amplitude", amplitude);
-    let config = args.bench.load(Purpose::Chirp, amplitude.as_slice())?;
+    let settings: Vec<OptionSetting> = amplitude
+        .into_iter()
+        .chain(args.run.seed.setting())
+        .collect();
+    let config = args.bench.load(Purpose::Chirp, &settings)?;
     Ok(calibration::settings(config))
 }
 

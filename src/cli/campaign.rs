@@ -8,7 +8,7 @@ use std::sync::atomic::AtomicBool;
 use super::campaign_output::Report;
 use super::error::CliError;
 use super::operator::TerminalOperator;
-use super::options::BenchOptions;
+use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
@@ -32,6 +32,8 @@ const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
+    #[command(flatten)]
+    seed: SeedOption,
     /// Operating points, FROM and TO with a unit: in % of the beam length (0%:8%:15) or as lengths (0mm:3.8mm:15)
     #[arg(
         long,
@@ -190,9 +192,24 @@ fn config(args: &Args) -> Result<Config, CliError> {
             "--operating-point and --asymmetry set what a campaign varies: leave them out, or use `bench chirp`".into(),
         ));
     }
-    let config = at_rate_of_thesis(&args.bench).load(Purpose::Chirp, &[])?;
+    let bench = at_rate_of_thesis(&args.bench);
+    let config = bench.load(Purpose::Chirp, args.seed.setting().as_slice())?;
     check_mode(args, &config)?;
+    if is_guided(args, &config) {
+        args.seed.refuse_on_devices()?;
+        refuse_threads(args)?;
+    }
     Ok(config)
+}
+
+/// Refuses `--threads` on devices, where it has no effect.
+fn refuse_threads(args: &Args) -> Result<(), CliError> {
+    match args.threads {
+        None => Ok(()),
+        Some(_) => Err(CliError::Usage(
+            "--threads is for the simulated stage; on devices one point is measured after the other: leave it out, or add --simulate".into(),
+        )),
+    }
 }
 
 /// The default profile at the rate of section 5.2.2, unless another rate is set.

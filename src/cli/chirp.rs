@@ -55,6 +55,7 @@ impl Args {
         let sweep = self.sweep.map(word);
         let kind = self.excitation.map(word);
         let mut settings = self.band.settings();
+        settings.extend(self.run.seed.setting());
         settings.extend(duration);
         settings.extend(sweep.map(|word| word_setting("chirp.sweep", "--sweep", word)));
         settings.extend(kind.map(|word| word_setting("excitation.kind", "--excitation", word)));
@@ -64,7 +65,30 @@ impl Args {
     /// The configuration with the requested amplitude over frequency.
     fn config(&self) -> Result<Config, CliError> {
         let config = self.bench.load(Purpose::Chirp, &self.settings())?;
+        self.refuse_unused(&config)?;
         self.band.shaped(config)
+    }
+
+    /// Refuses options of a chirp that have no effect on another kind of excitation.
+    fn refuse_unused(&self, config: &Config) -> Result<(), CliError> {
+        let kind = config.excitation.kind;
+        if kind == ExcitationKind::Chirp {
+            return Ok(());
+        }
+        let (name, chosen) = (kind.name(), config.chosen_excitation());
+        let key = chosen.design.length(&chosen.shared).key;
+        let unused = match (&self.duration, self.sweep) {
+            (Some(duration), _) => {
+                format!(
+                    "--duration {duration} is the length of a chirp; --set {key}=N changes that of `{name}`"
+                )
+            }
+            (None, Some(_)) => format!(
+                "--sweep goes with --excitation chirp only, not with `{name}`: leave it out"
+            ),
+            (None, None) => return Ok(()),
+        };
+        Err(CliError::Usage(unused))
     }
 }
 

@@ -8,11 +8,11 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::options::BenchOptions;
+use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_result};
 use super::table::labelled;
-use crate::config::{Purpose, profiles};
+use crate::config::{Config, Purpose, profiles};
 
 /// What to do with the configuration.
 #[derive(Clone, Debug, clap::Args)]
@@ -24,9 +24,9 @@ pub(super) struct Args {
 #[derive(Clone, Debug, Subcommand)]
 enum ConfigCommand {
     /// Print the effective settings as TOML (or JSON)
-    Show(BenchOptions),
+    Show(ConfigArgs),
     /// Check whether the settings are valid
-    Check(BenchOptions),
+    Check(ConfigArgs),
     /// Print the JSON schema of a configuration
     Schema,
     /// List the profiles that --config accepts by name: built-in profiles and your own
@@ -37,6 +37,21 @@ enum ConfigCommand {
     },
     /// Write a configuration file with comments for your own stage
     Init(InitArgs),
+}
+
+/// The options of a run that are settings.
+#[derive(Clone, Debug, clap::Args)]
+struct ConfigArgs {
+    #[command(flatten)]
+    bench: BenchOptions,
+    #[command(flatten)]
+    seed: SeedOption,
+}
+
+impl ConfigArgs {
+    fn load(&self, purpose: Purpose) -> Result<Config, CliError> {
+        self.bench.load(purpose, self.seed.setting().as_slice())
+    }
 }
 
 /// What kind of file, and where.
@@ -93,8 +108,8 @@ impl Profile {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
-        ConfigCommand::Show(options) => show(options)?,
-        ConfigCommand::Check(options) => check(options)?,
+        ConfigCommand::Show(args) => show(args)?,
+        ConfigCommand::Check(args) => check(args)?,
         ConfigCommand::Schema => print_json(&crate::config::schema())?,
         ConfigCommand::Profiles { json } => list_profiles(*json)?,
         ConfigCommand::Init(args) => init(args)?,
@@ -102,17 +117,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Done)
 }
 
-fn show(options: &BenchOptions) -> Result<(), CliError> {
-    let config = options.load(Purpose::Model, &[])?;
+fn show(args: &ConfigArgs) -> Result<(), CliError> {
+    let config = args.load(Purpose::Model)?;
     let toml = to_toml(&config)?;
-    print_result(options.json, &config, |_| toml)
+    print_result(args.bench.json, &config, |_| toml)
 }
 
-fn check(options: &BenchOptions) -> Result<(), CliError> {
-    let config = options.load(Purpose::All, &[])?;
+fn check(args: &ConfigArgs) -> Result<(), CliError> {
+    let config = args.load(Purpose::All)?;
     let title = &config.title;
     let result = serde_json::json!({ "valid": true, "title": title });
-    print_result(options.json, &result, |_| format!("valid: {title}\n"))
+    print_result(args.bench.json, &result, |_| format!("valid: {title}\n"))
 }
 
 fn list_profiles(json: bool) -> Result<(), CliError> {
@@ -158,7 +173,7 @@ fn init(args: &InitArgs) -> Result<(), CliError> {
 }
 
 /// The whole effective configuration, as in a recording.
-fn to_toml(config: &crate::config::Config) -> Result<String, CliError> {
+fn to_toml(config: &Config) -> Result<String, CliError> {
     toml::to_string(config)
         .map_err(|e| CliError::Failed(format!("cannot write the configuration as TOML: {e}")))
 }

@@ -166,6 +166,7 @@ impl Args {
             given(SPEED_KEY, "--speed", self.speed.as_ref()),
         ];
         settings.extend(options.into_iter().flatten());
+        settings.extend(self.run.seed.setting());
         Ok(settings)
     }
 

@@ -140,7 +140,6 @@ fn same_options(args: &Args) -> String {
         sets.collect(),
         option("--operating-point", bench.operating_point.as_ref()),
         option("--asymmetry", bench.asymmetry.as_ref()),
-        option("--seed", bench.seed),
         option("--out", folder),
     ]
     .concat()

@@ -10,7 +10,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::error::CliError;
-use super::options::BenchOptions;
+use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_message, print_note};
 use crate::config::{Config, OptionSetting, Purpose};
@@ -29,6 +29,8 @@ const PERIOD: Duration = Duration::from_millis(2);
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
+    #[command(flatten)]
+    seed: SeedOption,
     /// Devices to emulate: amplifier, probe, or both (on the same simulated stage)
     #[arg(required = true, value_name = "amplifier|probe")]
     devices: Vec<EmulatedDevice>,
@@ -88,12 +90,11 @@ impl Args {
 
     /// The settings that the options replace.
     fn settings(&self) -> Vec<OptionSetting> {
-        let Some(name) = &self.interface else {
-            return Vec::new();
-        };
-        let option = format!("--interface {name}");
-        let key = "amplifier.device.interface";
-        vec![OptionSetting::new(key, name.as_str(), option)]
+        let interface = self.interface.as_ref().map(|name| {
+            let option = format!("--interface {name}");
+            OptionSetting::new("amplifier.device.interface", name.as_str(), option)
+        });
+        interface.into_iter().chain(self.seed.setting()).collect()
     }
 
     /// Refuses options of a device that is not emulated, and invalid values.

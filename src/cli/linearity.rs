@@ -71,7 +71,8 @@ impl Args {
     /// The settings with the planned amplitude.
     fn planned(&self) -> Result<Config, CliError> {
         let lines = LINES.map(|(key, value)| OptionSetting::new(key, value, "bench linearity"));
-        let settings = [&lines[..], &self.band.settings()].concat();
+        let mut settings = [&lines[..], &self.band.settings()].concat();
+        settings.extend(self.run.seed.setting());
         let config = self.bench.load(Purpose::Chirp, &settings)?;
         self.band.shaped(config)
     }

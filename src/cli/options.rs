@@ -22,12 +22,37 @@ pub(super) struct BenchOptions {
     /// Mass asymmetry m2/m3 - 1: 10% or 0.1
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
     pub asymmetry: Option<Ratio>,
-    /// Seed of the random generator (noise and disturbance of the simulated stage)
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
-    pub seed: Option<u64>,
     /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     pub json: bool,
+}
+
+/// The seed, for commands whose result depends on it.
+#[derive(Clone, Debug, Default, Args)]
+pub(super) struct SeedOption {
+    /// Seed of the random generator (noise and disturbance of the simulated stage)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    seed: Option<u64>,
+}
+
+impl SeedOption {
+    /// The setting that the option stands for, if it is given.
+    pub fn setting(&self) -> Option<OptionSetting> {
+        let seed = self.seed?;
+        // The parser of the option allows no larger one.
+        let setting = OptionSetting::new("sim.seed", seed as i64, format!("--seed {seed}"));
+        Some(setting)
+    }
+
+    /// Refuses the option for a run on devices, where it has no effect.
+    pub fn refuse_on_devices(&self) -> Result<(), CliError> {
+        match self.seed {
+            None => Ok(()),
+            Some(seed) => Err(CliError::Usage(format!(
+                "--seed {seed} is for the simulated stage and has no effect on devices: leave it out, or add --simulate"
+            ))),
+        }
+    }
 }
 
 impl BenchOptions {
@@ -43,10 +68,9 @@ impl BenchOptions {
         let mut source = Source {
             config: self.config.clone(),
             sets: self.sets.clone(),
-            options: self.seed.map(seed).into_iter().collect(),
+            options: more.to_vec(),
             purpose,
         };
-        source.options.extend_from_slice(more);
         if self.asymmetry.is_some() || self.operating_point.is_some() {
             let plant = load(&source)?.plant;
             source.options.extend(self.asymmetry_setting(&plant)?);
@@ -91,11 +115,6 @@ pub(super) fn given<D>(
     let quantity = quantity?;
     let option = format!("{option} {quantity}");
     Some(OptionSetting::new(key, quantity.si(), option))
-}
-
-fn seed(seed: u64) -> OptionSetting {
-    // The parser of the option allows no larger one.
-    OptionSetting::new("sim.seed", seed as i64, format!("--seed {seed}"))
 }
 
 /// Refuses an option for a setting that the model does not have.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::CliError;
+use super::options::SeedOption;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
@@ -18,6 +19,8 @@ use crate::util::progress::Progress;
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct RunOptions {
+    #[command(flatten)]
+    pub seed: SeedOption,
     /// Pace of the loop [default: virtual on the simulated stage, realtime on devices]
     #[arg(long, value_name = "PACE")]
     pace: Option<Pace>,
@@ -33,7 +36,8 @@ pub(super) struct RunOptions {
 }
 
 impl RunOptions {
-    fn is_simulated(&self, config: &Config) -> bool {
+    /// Whether the run is on the simulated stage.
+    pub fn is_simulated(&self, config: &Config) -> bool {
         self.simulate || devices::is_simulated(config)
     }
 
@@ -51,6 +55,9 @@ impl RunOptions {
 
     /// Rig, pace and folder of a run.
     pub fn setup(&self, config: &Config) -> Result<Setup, CliError> {
+        if !self.is_simulated(config) {
+            self.seed.refuse_on_devices()?;
+        }
         Ok(Setup {
             pace: self.pace(config)?,
             simulate: self.simulate,

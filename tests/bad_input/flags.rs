@@ -95,10 +95,17 @@ fn rejects_invalid_flags_with_value_and_limit() {
         ("model modes --asymmetry -100%", &["is -1", "-0.9 to 9"]),
         ("model modes --asymmetry 3mm", &["`3mm`", "10% or 0.1"]),
         (
-            "model modes --seed 18446744073709551615",
+            "chirp --seed 18446744073709551615",
             &["18446744073709551615", "--seed"],
         ),
-        ("model modes --seed -1", &["-1"]),
+        ("chirp --seed -1", &["-1"]),
+        (
+            "calibrate --config lab --seed 3",
+            &["--seed 3 is for the simulated stage", "--simulate"],
+        ),
+        // A command without random numbers has no seed.
+        ("model modes --seed 1", &["unexpected argument", "--seed"]),
+        ("margins --seed 1", &["unexpected argument", "--seed"]),
         (
             "model locus --vary plant.mass_asymmetry --from 1 --to 1",
             &["empty sweep", "both 1"],

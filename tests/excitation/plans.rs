@@ -133,6 +133,17 @@ fn rejects_plan_beyond_interlock_with_value_limit_and_remedy() {
             &["multisine.period_s", "ten"],
         ),
         (
+            "--excitation multisine --duration 60s",
+            &[
+                "--duration 60s is the length of a chirp",
+                "multisine.period",
+            ],
+        ),
+        (
+            "--excitation prbs --sweep linear",
+            &["--sweep goes with --excitation chirp only", "`prbs`"],
+        ),
+        (
             "--excitation prbs --set prbs.clock_divider=2",
             &["prbs.clock_divider", "250 Hz", "400 Hz"],
         ),

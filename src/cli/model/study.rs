@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
-use super::super::options::BenchOptions;
+use super::super::options::{BenchOptions, SeedOption};
 use super::super::outcome::Outcome;
 use super::super::output::{print_note, print_result};
 use super::super::progress::ProgressLine;
@@ -18,16 +18,19 @@ use crate::util::progress::Progress;
 
 /// The settings that vary, and the number of draws.
 #[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("seed", |arg| arg.help("Seed of the random generator that makes the draws")))]
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
+    #[command(flatten)]
+    seed: SeedOption,
     /// A setting of the plant and its tolerance (repeatable): KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT. The
     /// deviation is added to the setting. It is in the unit of the setting, or in %: of the beam length for an operating
     /// point, of 1 for a ratio, of the nominal value otherwise. * in the key stands for any characters:
     /// plant.secondary_mass_deviation.*=+-0.15
     #[arg(long, value_name = "KEY=TOLERANCE", required_unless_present = "join")]
     vary: Vec<Tolerance>,
-    /// Number of draws; --seed selects them
+    /// Number of draws
     #[arg(long, value_name = "N", default_value_t = 10_000)]
     draws: u64,
     /// Compute only shard I of N; combine the shards with --join
@@ -75,7 +78,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The results of the draws that this process has to do; incomplete if it is stopped.
 fn drawn(args: &Args) -> Result<Results, CliError> {
-    let config = args.bench.load(Purpose::Model, &[])?;
+    let config = args
+        .bench
+        .load(Purpose::Model, args.seed.setting().as_slice())?;
     let plan = Plan::new(&config, &args.vary, args.draws, args.damped)?;
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let (mut file, mut results) = match &args.file {
