@@ -6,7 +6,9 @@ use super::analysis_output;
 use super::chirp::{outcome, outputs};
 pub(super) use super::control_options::Args;
 use super::error::CliError;
-use super::margins::{Pole, closed_loop, pole_list, require_modulus_margin, text as margins_text};
+use super::margins::{
+    Pole, closed_loop, pole_list, require_modulus_margin, require_stability, text as margins_text,
+};
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::run_options::{close, exit, run_text};
@@ -47,6 +49,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
     let predicted = predicted(&config, &closed_loop)?;
+    if !args.run.is_simulated(&config) {
+        require_stability(&config, &predicted.margins)?;
+    }
     let plan = Plan::control(config.clone())?;
     if !args.bench.json {
         let poles = pole_list(&closed_loop.poles(), &config);

@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::margins::{closed_loop, require_modulus_margin};
+use super::margins::{closed_loop, require_modulus_margin, require_stability};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_result;
@@ -13,6 +13,7 @@ use crate::config::{Config, Purpose};
 use crate::control::Margins;
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
 use crate::experiment::{Plan, predicted_extremes};
+use crate::rig::devices;
 
 /// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]
@@ -126,6 +127,9 @@ fn count_text((severity, count): &(Severity, usize)) -> String {
 fn loop_margins(config: &Config) -> Result<Margins, CliError> {
     let margins = closed_loop(config)?.margins();
     require_modulus_margin(config, &margins)?;
+    if !devices::is_simulated(config) {
+        require_stability(config, &margins)?;
+    }
     Plan::control(config.clone())?.program()?;
     Ok(margins)
 }

@@ -18,9 +18,14 @@ pub enum CliError {
     Experiment(ExperimentError),
     /// The stability margin of the loop is too small.
     #[error(
-        "refused: {0}; choose a controller designed for this rate and delay (--controller FILE), or lower control.min_modulus_margin if you know better; nothing was moved"
+        "refused: {why}; choose a controller designed for this rate and delay (--controller FILE), or {alternative}; nothing was moved"
     )]
-    Margin(String),
+    Margin {
+        /// What is too small, with its limit.
+        why: String,
+        /// What else allows the run.
+        alternative: &'static str,
+    },
     /// Wrong options or arguments.
     #[error("{0}")]
     Usage(String),
@@ -103,7 +108,7 @@ impl CliError {
             CliError::Study(error) => {
                 matches!(error, StudyError::File { .. } | StudyError::Shards(_))
             }
-            CliError::Margin(_) | CliError::Usage(_) => false,
+            CliError::Margin { .. } | CliError::Usage(_) => false,
         };
         match is_failure {
             true => Outcome::Failed,
@@ -116,7 +121,7 @@ impl CliError {
         match self {
             CliError::Experiment(error) => experiment_kind(error),
             CliError::Usage(_) => ErrorKind::Usage,
-            CliError::Margin(_) => ErrorKind::Margin,
+            CliError::Margin { .. } => ErrorKind::Margin,
             CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
             CliError::Campaign(_) => ErrorKind::Campaign,

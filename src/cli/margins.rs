@@ -148,9 +148,27 @@ pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Resu
         _ => return Ok(()),
     };
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
-    Err(CliError::Margin(format!(
-        "with the {name} controller at {rate_hz} Hz {found}, at least {least} is required (control.min_modulus_margin)"
-    )))
+    Err(CliError::Margin {
+        why: format!(
+            "with the {name} controller at {rate_hz} Hz {found}, at least {least} is required (control.min_modulus_margin)"
+        ),
+        alternative: "lower control.min_modulus_margin if you know better",
+    })
+}
+
+/// Refuses an unstable loop on devices, whatever `control.min_modulus_margin` is.
+pub(super) fn require_stability(config: &Config, margins: &Margins) -> Result<(), CliError> {
+    if margins.stable {
+        return Ok(());
+    }
+    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
+    Err(CliError::Margin {
+        why: format!(
+            "with the {name} controller at {rate_hz} Hz the closed loop is unstable by the model, and such a loop is \
+             never run on devices"
+        ),
+        alternative: "add --simulate to run it on the simulated stage",
+    })
 }
 
 /// Rates and delays of the signal path as text.

@@ -11,7 +11,7 @@ use crate::excitation::ReferenceSettings;
 pub struct ControlSettings {
     /// Name of a controller (`fast`, `slow`, ...), or the path of a TOML file with sections.
     pub controller: String,
-    /// A loop with a smaller modulus margin (1/max|S|), or an unstable one, is refused; 0 refuses none.
+    /// A loop with a smaller modulus margin (1/max|S|), or an unstable one, is refused; 0 refuses none on the simulated stage. On devices an unstable loop is always refused.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_modulus_margin: f64,
     /// Time with zero current before the loop closes, in seconds. The mean position over this time is the rest position; the reference is relative to it.

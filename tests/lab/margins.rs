@@ -146,7 +146,26 @@ fn rejects_controller_below_the_modulus_margin_limit() {
         code == 2 && errors.contains("0.69") && errors.contains("0.75"),
         "{errors}"
     );
-    // With min_modulus_margin = 0 the run starts; the interlocks still trip.
+    // On devices an unstable loop is refused even without a threshold.
+    let devices = [
+        "control",
+        "--config",
+        "lab",
+        "--fast",
+        "--set",
+        "control.min_modulus_margin=0",
+    ];
+    let (code, _, errors) = bench(folder.path(), &devices);
+    assert_eq!(code, 2, "{errors}");
+    for word in [
+        "unstable by the model",
+        "never run on devices",
+        "--simulate",
+        "nothing was moved",
+    ] {
+        assert!(errors.contains(word), "{word}: {errors}");
+    }
+    // On the simulated stage with min_modulus_margin = 0 the run starts; the interlocks still trip.
     let (code, report, _) = control(&["--fast", "--set", "control.min_modulus_margin=0"]);
     assert_eq!((code, report["outcome"].as_str()), (1, Some("tripped")));
 }
