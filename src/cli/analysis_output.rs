@@ -9,7 +9,7 @@ use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
 use crate::experiment::analyse_with_progress;
 use crate::recording::Recording;
-use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles};
+use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use crate::util::progress::Progress;
 
 impl From<OutputError> for CliError {
@@ -21,11 +21,11 @@ impl From<OutputError> for CliError {
 /// Steps of the progress of an analysis.
 const STEPS: u64 = 1000;
 
-/// Analyses a recording and writes the result files into the folder of `beside`, with names that begin with its name.
+/// Analyses a recording and writes the result files.
 pub(super) fn analyse_and_write(
     recording: &Recording,
     config: &Config,
-    beside: &Path,
+    results: ResultFiles<'_>,
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
@@ -35,7 +35,7 @@ pub(super) fn analyse_and_write(
         ControlFlow::Continue(())
     })?;
     let run = BenchRun::new(recording, &analysis, config);
-    Ok(AnalysisOutputs::write(&run, beside)?)
+    Ok(AnalysisOutputs::write(&run, results)?)
 }
 
 /// Files, delay, modes, zeros and verdict.

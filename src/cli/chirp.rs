@@ -20,7 +20,7 @@ use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::Extremes;
 use crate::experiment::{ExcitationPlan, Plan, RunSummary, abandon_on_signal, predicted_extremes};
 use crate::recording::Recording;
-use crate::report::run_pages::AnalysisOutputs;
+use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
 use crate::util::progress::Progress;
 use crate::util::quantity::Time;
@@ -171,7 +171,11 @@ fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     let (recording, config) = (path.to_path_buf(), config.clone());
     let work = move || {
         let opened = Recording::open(&recording)?;
-        analyse_and_write(&opened, &config, &recording, &progress)
+        let results = ResultFiles {
+            beside: &recording,
+            existing: ExistingFile::Replace,
+        };
+        analyse_and_write(&opened, &config, results, &progress)
     };
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));

@@ -15,7 +15,7 @@ use super::run_options::trip_text;
 use crate::config::Config;
 use crate::experiment::{Ending, Plan, RunKind, TripSummary};
 use crate::recording::Recording;
-use crate::report::run_pages::AnalysisOutputs;
+use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::util::progress::Progress;
 
 /// The recording, and where the results go.
@@ -90,9 +90,21 @@ fn analysed(
     args: &Args,
 ) -> Result<AnalysisOutputs, CliError> {
     let beside = in_folder(args.out.as_deref(), &args.recording)?;
+    let results = ResultFiles {
+        beside: &beside,
+        existing: existing_file(&beside, &args.recording),
+    };
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
-    analyse_and_write(recording, config, &beside, &progress)
+    analyse_and_write(recording, config, results, &progress)
+}
+
+/// Beside the recording, existing results are its own. In another folder they may be those of a file of the same name.
+fn existing_file(beside: &Path, recording: &Path) -> ExistingFile {
+    match beside.canonicalize().ok() == recording.canonicalize().ok() {
+        true => ExistingFile::Replace,
+        false => ExistingFile::Keep,
+    }
 }
 
 impl Report {

@@ -13,7 +13,9 @@ use crate::experiment::analyse_external;
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::frf_csv;
 use crate::identify::periodic::Repetition;
-use crate::report::run_pages::{ExternalRecord, ModalSummary, PageFiles, write_frf};
+use crate::report::run_pages::{
+    ExistingFile, ExternalRecord, ModalSummary, PageFiles, ResultFiles,
+};
 use crate::util::quantity::{Frequency, OfFrequency, Time, si};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
@@ -169,7 +171,8 @@ fn names(path: &Path) -> Result<String, CliError> {
     Ok(external_csv::names(path)?.join(", "))
 }
 
-/// Analyses a CSV and writes the results under its name: beside it, or to the requested folder.
+/// Analyses a CSV and writes the results under its name: beside it, or to the requested folder. Existing files are kept: they may
+/// be the results of other columns, of another band or of another file.
 pub(super) fn run(
     path: &Path,
     out: Option<&Path>,
@@ -190,17 +193,21 @@ pub(super) fn run(
         rate_hz: signals.rate_hz,
         samples: signals.len(),
     };
-    let report = Report::write(&record, path, &in_folder(out, path)?, band_hz)?;
+    let results = ResultFiles {
+        beside: &in_folder(out, path)?,
+        existing: ExistingFile::Keep,
+    };
+    let report = Report::write(&record, path, results, band_hz)?;
     print_result(json, &report, Report::text)?;
     Ok(Outcome::Done)
 }
 
 impl Report {
-    /// Writes the files of an analysed CSV under the name of `beside`.
+    /// Writes the files of an analysed CSV.
     fn write(
         record: &ExternalRecord,
         path: &Path,
-        beside: &Path,
+        results: ResultFiles<'_>,
         band_hz: (f64, f64),
     ) -> Result<Report, CliError> {
         let (analysis, input, output) = (record.analysis, record.input, record.output);
@@ -218,8 +225,8 @@ impl Report {
             rate_hz: record.rate_hz,
             band_hz,
             periods: analysis.periods,
-            frf_csv: write_frf(beside, "frf", &analysis.frf, &magnitude)?,
-            pages: PageFiles::write(&record.report(), beside)?,
+            frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
+            pages: PageFiles::write(&record.report(), results)?,
             frequencies: analysis.frf.len(),
             coherence_median: analysis.frf.median_coherence(),
             summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),

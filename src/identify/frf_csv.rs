@@ -10,7 +10,6 @@ use nalgebra::Complex;
 use thiserror::Error;
 
 use super::Frf;
-use crate::util::atomic_file::write_atomic;
 
 /// Name of the magnitude column of a response from current to displacement.
 pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";
@@ -22,10 +21,10 @@ pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,mag
 
 const COLUMNS: usize = 7;
 
-/// Why an FRF cannot be written or read.
+/// Why an FRF cannot be read.
 #[derive(Debug, Error)]
 pub enum FrfCsvError {
-    /// The file cannot be read or written.
+    /// The file cannot be read.
     #[error("{0}: {1}")]
     File(PathBuf, io::Error),
     /// The text is not an FRF.
@@ -66,15 +65,6 @@ fn row(frf: &Frf, k: usize) -> [String; COLUMNS] {
         frf.phase_sigma_rad[k].to_degrees().to_string(),
         frf.resolution_hz[k].to_string(),
     ]
-}
-
-/// Writes the FRF into a file, which is replaced as a whole if it exists; `magnitude` names the magnitude column.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write(path: &Path, frf: &Frf, magnitude: &str) -> Result<(), FrfCsvError> {
-    write_atomic(path, &to_string(frf, magnitude))
-        .map_err(|source| FrfCsvError::File(path.to_owned(), source))
 }
 
 /// Reads an FRF in metres per ampere from a file.

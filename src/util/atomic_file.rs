@@ -1,7 +1,7 @@
 //! Files that are complete or absent.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// Writes a file under another name, brings it to the disk and renames it. After a crash the file is the old or the new one,
@@ -25,4 +25,47 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
         _ => Path::new("."),
     };
     File::open(folder)?.sync_all()
+}
+
+/// Writes a file and overwrites none: if the name is taken, the file is `STEM-2.EXT`, `STEM-3.EXT`, ... Returns its path.
+///
+/// # Errors
+/// Those of the file system. The incomplete file is removed.
+pub fn write_new(path: &Path, text: &str) -> std::io::Result<PathBuf> {
+    let (mut file, path) = create_free(path)?;
+    let written = file
+        .write_all(text.as_bytes())
+        .and_then(|()| file.sync_all());
+    if let Err(error) = written {
+        // The error of writing is the one to report.
+        let _ = std::fs::remove_file(&path);
+        return Err(error);
+    }
+    Ok(path)
+}
+
+/// Creates the file under the first free name.
+fn create_free(path: &Path) -> std::io::Result<(File, PathBuf)> {
+    let mut name = path.to_owned();
+    let mut number = 1;
+    loop {
+        match File::create_new(&name) {
+            Ok(file) => return Ok((file, name)),
+            Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
+            Err(_) => {
+                number += 1;
+                name = numbered(path, number);
+            }
+        }
+    }
+}
+
+/// `STEM-NUMBER.EXT`.
+fn numbered(path: &Path, number: u32) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = format!("{stem}-{number}");
+    match path.extension() {
+        Some(extension) => path.with_file_name(format!("{name}.{}", extension.to_string_lossy())),
+        None => path.with_file_name(name),
+    }
 }

@@ -2,6 +2,7 @@
 
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
+use bench::util::atomic_file::write_atomic;
 use nalgebra::Complex;
 
 use crate::stage;
@@ -62,7 +63,7 @@ fn measured_response_is_unchanged_after_writing_and_reading() {
     let path = directory.path().join("frf.csv");
     let signals = stage::with_noise(&stage::clean_run(), 1);
     let frf = local::estimate(&signals, (0.5, 450.0), &EstimatorSettings::default()).unwrap();
-    frf_csv::write(&path, &frf, METRES_PER_AMPERE).unwrap();
+    write_atomic(&path, &frf_csv::to_string(&frf, METRES_PER_AMPERE)).unwrap();
     let back = frf_csv::read(&path).unwrap();
     let exact = |frf: &Frf| {
         (
@@ -85,8 +86,9 @@ fn replaces_an_existing_file_as_a_whole() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("frf.csv");
     let (first, second) = (frf(&[(1e-4, 0.0), (2e-4, 0.1)]), frf(&[(2e-4, 0.0)]));
-    frf_csv::write(&path, &first, METRES_PER_AMPERE).unwrap();
-    frf_csv::write(&path, &second, METRES_PER_AMPERE).unwrap();
+    for frf in [&first, &second] {
+        write_atomic(&path, &frf_csv::to_string(frf, METRES_PER_AMPERE)).unwrap();
+    }
     assert_eq!(frf_csv::read(&path).unwrap().len(), second.len());
     let files = std::fs::read_dir(directory.path()).unwrap().count();
     assert_eq!(files, 1, "no partial file is left");

@@ -21,7 +21,8 @@ use crate::identify::{Frf, Unit};
 pub use bench_run::BenchRun;
 pub use external::ExternalRecord;
 pub use outputs::{
-    AnalysisOutputs, AnalysisStatus, LoopOutputs, ModalSummary, OutputError, PageFiles, write_frf,
+    AnalysisOutputs, AnalysisStatus, ExistingFile, LoopOutputs, ModalSummary, OutputError,
+    PageFiles, ResultFiles,
 };
 pub use page::page;
 pub use plots::{Plot, PlotKind, plots};

@@ -11,12 +11,12 @@ use super::page::page;
 use super::plots::{PlotKind, plots};
 use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::Frf;
-use crate::identify::frf_csv::{self, FrfCsvError, METRES_PER_AMPERE, RATIO};
+use crate::identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{FittedMode, ModalFit, ModelOrder};
 use crate::identify::verdict::{Cnmp, UncertainZero, Verdict};
 use crate::report::ReportError;
-use crate::util::atomic_file::write_atomic;
+use crate::util::atomic_file::{write_atomic, write_new};
 
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -24,12 +24,49 @@ pub enum OutputError {
     /// A plot cannot be drawn.
     #[error(transparent)]
     Plot(#[from] ReportError),
-    /// An FRF cannot be written.
-    #[error(transparent)]
-    Frf(#[from] FrfCsvError),
-    /// Another file cannot be written.
+    /// A file cannot be written.
     #[error("cannot write {0}: {1}; free some space or choose another folder")]
     File(PathBuf, std::io::Error),
+}
+
+/// What happens to an existing file with the name of a result.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExistingFile {
+    /// It is replaced: it is the same result of an earlier analysis of the same recording.
+    Replace,
+    /// It is kept, because it may be the result of another analysis: the new file is `STEM_what-2.ext`, `STEM_what-3.ext`, ...
+    Keep,
+}
+
+/// The files of the results of one analysis: `STEM_what.ext` beside a file, with its stem.
+#[derive(Clone, Copy, Debug)]
+pub struct ResultFiles<'a> {
+    /// The analysed file, or its name in the folder of the results.
+    pub beside: &'a Path,
+    /// What happens to existing files.
+    pub existing: ExistingFile,
+}
+
+impl ResultFiles<'_> {
+    /// Writes an FRF; `magnitude` names its magnitude column. Returns the path of the file.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write_frf(&self, what: &str, frf: &Frf, magnitude: &str) -> Result<String, OutputError> {
+        self.write(what, "csv", &frf_csv::to_string(frf, magnitude))
+    }
+
+    fn write(&self, what: &str, extension: &str, text: &str) -> Result<String, OutputError> {
+        let stem = self.beside.file_stem().unwrap_or_default();
+        let name = format!("{}_{what}.{extension}", stem.to_string_lossy());
+        let path = self.beside.with_file_name(name);
+        let written = match self.existing {
+            ExistingFile::Replace => write_atomic(&path, text).map(|()| path.clone()),
+            ExistingFile::Keep => write_new(&path, text),
+        };
+        let written = written.map_err(|error| OutputError::File(path, error))?;
+        Ok(written.display().to_string())
+    }
 }
 
 /// Plots by kind; `None` where the data give none.
@@ -57,56 +94,25 @@ impl Default for PageFiles {
 }
 
 impl PageFiles {
-    /// Draws a record and writes its plots and its page into the folder of `beside`, with names that begin with its
-    /// stem.
+    /// Draws a record and writes its plots and its page.
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(report: &RecordReport<'_>, beside: &Path) -> Result<PageFiles, OutputError> {
+    pub fn write(
+        report: &RecordReport<'_>,
+        results: ResultFiles<'_>,
+    ) -> Result<PageFiles, OutputError> {
         let plots = plots(report)?;
         let mut files = PageFiles::default();
         for plot in &plots {
-            let path = write_text(beside, plot.kind.name(), "svg", &plot.svg)?;
+            let path = results.write(plot.kind.name(), "svg", &plot.svg)?;
             files.plots.insert(plot.kind.name(), Some(path));
         }
         files.plot = files.plots.get("bode").cloned().flatten();
         let page = page(report, &plots);
-        files.report = Some(write_text(beside, "report", "html", &page)?);
+        files.report = Some(results.write("report", "html", &page)?);
         Ok(files)
     }
-}
-
-/// `STEM_what.ext` beside `path`, with its stem. The results of an earlier analysis of the same record are replaced.
-fn path_beside(path: &Path, what: &str, extension: &str) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}_{what}.{extension}"))
-}
-
-fn write_text(
-    beside: &Path,
-    what: &str,
-    extension: &str,
-    text: &str,
-) -> Result<String, OutputError> {
-    let path = path_beside(beside, what, extension);
-    write_atomic(&path, text).map_err(|error| OutputError::File(path.clone(), error))?;
-    Ok(path.display().to_string())
-}
-
-/// Writes an FRF into the folder of `beside`, with a name that begins with its stem; `magnitude` names its magnitude
-/// column.
-///
-/// # Errors
-/// When the file cannot be written.
-pub fn write_frf(
-    beside: &Path,
-    what: &str,
-    frf: &Frf,
-    magnitude: &str,
-) -> Result<String, OutputError> {
-    let path = path_beside(beside, what, "csv");
-    frf_csv::write(&path, frf, magnitude)?;
-    Ok(path.display().to_string())
 }
 
 /// Modes, zeros and verdict; the names in JSON must not change.
@@ -175,12 +181,15 @@ pub struct LoopOutputs {
 }
 
 impl LoopOutputs {
-    fn write(closed: &ClosedResponses, beside: &Path) -> Result<LoopOutputs, OutputError> {
+    fn write(
+        closed: &ClosedResponses,
+        results: ResultFiles<'_>,
+    ) -> Result<LoopOutputs, OutputError> {
         let margins = &closed.margins;
         Ok(LoopOutputs {
-            loop_csv: write_frf(beside, "loop", &closed.loop_gain, RATIO)?,
-            sensitivity_csv: write_frf(beside, "sensitivity", &closed.sensitivity, RATIO)?,
-            complementary_csv: write_frf(beside, "complementary", &closed.complementary, RATIO)?,
+            loop_csv: results.write_frf("loop", &closed.loop_gain, RATIO)?,
+            sensitivity_csv: results.write_frf("sensitivity", &closed.sensitivity, RATIO)?,
+            complementary_csv: results.write_frf("complementary", &closed.complementary, RATIO)?,
             crossover_rad_s: margins.crossover_rad_s,
             phase_margin_deg: margins.phase_margin_deg.map(|margin| margin.value),
             phase_margin_sigma_deg: margins.phase_margin_deg.map(|margin| margin.sigma),
@@ -240,28 +249,27 @@ pub struct AnalysisOutputs {
 }
 
 impl AnalysisOutputs {
-    /// Writes the files of an analysed run into the folder of `beside`, with names that begin with its stem.
+    /// Writes the files of an analysed run.
     ///
     /// # Errors
     /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(run: &BenchRun<'_>, beside: &Path) -> Result<AnalysisOutputs, OutputError> {
+    pub fn write(
+        run: &BenchRun<'_>,
+        results: ResultFiles<'_>,
+    ) -> Result<AnalysisOutputs, OutputError> {
         let analysis = run.analysis;
         let without_delay = analysis.frf.without_delay(analysis.measured_delay_s());
-        let frf_csv = write_frf(beside, "frf", &analysis.frf, METRES_PER_AMPERE)?;
-        let frf_without_delay_csv = write_frf(
-            beside,
-            "frf_without_delay",
-            &without_delay,
-            METRES_PER_AMPERE,
-        )?;
-        let pages = PageFiles::write(&run.report()?, beside)?;
+        let frf_csv = results.write_frf("frf", &analysis.frf, METRES_PER_AMPERE)?;
+        let frf_without_delay_csv =
+            results.write_frf("frf_without_delay", &without_delay, METRES_PER_AMPERE)?;
+        let pages = PageFiles::write(&run.report()?, results)?;
         let closed = analysis.closed.as_ref();
         Ok(AnalysisOutputs {
             frf_csv: Some(frf_csv),
             frf_without_delay_csv: Some(frf_without_delay_csv),
             pages,
             closed: closed
-                .map(|closed| LoopOutputs::write(closed, beside))
+                .map(|closed| LoopOutputs::write(closed, results))
                 .transpose()?,
             ..AnalysisOutputs::numbers(analysis)
         })
