@@ -126,6 +126,23 @@ fn identify_replaces_plots_and_page_of_the_run() {
 }
 
 #[test]
+fn identify_keeps_existing_results_in_another_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let recording = run().path(run().answer["recording"].as_str().unwrap());
+    let recording = recording.display().to_string();
+    std::fs::create_dir(folder.path().join("out")).unwrap();
+    let stem = Path::new(&recording).file_stem().unwrap().to_string_lossy();
+    let existing = folder.path().join(format!("out/{stem}_report.html"));
+    std::fs::write(&existing, "of another run").unwrap();
+    let answer = answer_in(
+        folder.path(),
+        &["identify", &recording, "--json", "--out", "out"],
+    );
+    assert_eq!(answer["report"], format!("out/{stem}_report-2.html"));
+    assert_eq!(std::fs::read_to_string(existing).unwrap(), "of another run");
+}
+
+#[test]
 fn labels_axes_with_quantity_and_unit() {
     let labels: [(&str, &[&str]); 5] = [
         (
