@@ -10,6 +10,9 @@ const MAX_TICKS: f64 = 2e7;
 /// The errors in the relations between settings that serve the purpose.
 pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     let mut errors = Errors(relations::plant(config));
+    if purpose != Purpose::Recorded {
+        errors.0.extend(config.plant.check_damping());
+    }
     travel(config, &mut errors);
     force(&config.motor, &mut errors);
     staleness(config, &mut errors);

@@ -54,7 +54,8 @@ const LATER_TABLES: [&str; 6] = [
     "campaign",
 ];
 
-/// The configuration in a recording. It is complete, except for tables that its version may not have had.
+/// The configuration in a recording. It is complete, except for tables that its version may not have had. Measured damping
+/// ratios are not checked: earlier versions accepted all of them.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
@@ -65,7 +66,7 @@ pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut recorded = Layer::parse(name.to_string(), text.to_string())?;
     renamed::translate(&mut recorded.table);
     layers.push(recorded);
-    checked(&layers, &[], Purpose::Model)
+    checked(&layers, &[], Purpose::Recorded)
 }
 
 fn checked(

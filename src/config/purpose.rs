@@ -3,7 +3,7 @@
 /// The use of a configuration: relations between settings that the command does not use are not checked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Purpose {
-    /// Models, margins, replay.
+    /// Models, margins.
     #[default]
     Model,
     /// An excitation.
@@ -12,6 +12,8 @@ pub enum Purpose {
     Control,
     /// All commands.
     All,
+    /// Reading, replay and identification of a recorded run, also of one that would be refused as a new run.
+    Recorded,
 }
 
 impl Purpose {

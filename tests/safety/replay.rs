@@ -2,7 +2,10 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use bench::config::{AmplitudePoint, Config, ReferenceSettings, Sweep};
+use bench::config::{
+    AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
+    whole,
+};
 use bench::excitation::{SineReference, StepReference};
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
@@ -87,6 +90,47 @@ fn chirps_and_closed_loops_replay_bit_for_bit() {
         assert!(moving > 4000, "only {moving} non-zero commands to compare");
         assert_identical(&path, plan.kind.name());
     }
+}
+
+/// The damping of the profile, 0.009 at 179 rad/s, with another second measurement.
+fn set_second_damping(config: &mut Config, omega_rad_s: f64, ratio: f64) {
+    let PlantSettings::Sr4dof(settings) = &mut config.plant else {
+        panic!("the profile is an SR4DoF")
+    };
+    let first = DampingPoint {
+        omega_rad_s: 179.0,
+        ratio: 0.009,
+    };
+    let second = DampingPoint { omega_rad_s, ratio };
+    settings.damping = DampingSettings::Measured { first, second };
+}
+
+/// Below 0.009 x 179/520 = 0.0031 the coefficient of the stiffness is negative. Earlier versions recorded such runs; a new run is
+/// refused (tests/config_settings/rejected.rs).
+#[test]
+fn recording_with_refused_damping_is_read_replayed_and_identified() {
+    let mut plan = short_chirp(Sweep::Linear);
+    set_second_damping(&mut plan.config, 520.0, 0.003);
+    plan.config.chirp.duration_s = 10.0;
+    (plan.config.chirp.start_hz, plan.config.chirp.stop_hz) = (5.0, 100.0);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = record(&plan, &[], folder.path());
+    assert_identical(&path, "negative damping");
+    let recording = Recording::open(&path).expect("a recording");
+    let read = Plan::of(&recording).expect("a plan");
+    assert_eq!(read.config.plant, plan.config.plant);
+    let analysis = experiment::analyse(&recording, &read.config).expect("an analysis");
+    assert!(analysis.frf.len() > 100, "{}", analysis.frf.len());
+}
+
+/// Two ratios at one frequency.
+#[test]
+fn recorded_configuration_with_undetermined_damping_is_read() {
+    let mut plan = short_chirp(Sweep::Linear);
+    set_second_damping(&mut plan.config, 179.0, 0.004);
+    let text = plan.config_toml().expect("TOML");
+    let read = whole("a recording", &text).expect("a configuration");
+    assert_eq!(read.plant, plan.config.plant);
 }
 
 #[test]

@@ -178,14 +178,17 @@ impl PlantSettings {
         self.as_model().mass_asymmetry()
     }
 
-    /// Errors in the relations between settings, each of which is within its range.
+    /// Errors in the relations between settings, each of which is within its range; without those of the damping.
     pub(crate) fn check(&self) -> Vec<Finding> {
-        let model = self.as_model();
-        let damping = model.damping_settings().and_then(DampingSettings::check);
         let mut findings: Vec<Finding> = self.check_operating_point().into_iter().collect();
-        findings.extend(damping);
-        findings.extend(model.check());
+        findings.extend(self.as_model().check());
         findings
+    }
+
+    /// The error in measured damping ratios that do not determine a positive damping.
+    pub(crate) fn check_damping(&self) -> Option<Finding> {
+        let settings = self.as_model().damping_settings();
+        settings.and_then(DampingSettings::check)
     }
 
     fn check_operating_point(&self) -> Option<Finding> {
