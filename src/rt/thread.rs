@@ -96,7 +96,9 @@ pub fn prepare(
             Err(_) => LoopOutcome::default(),
         }
     })?;
-    let scheduling = reported.recv().map_err(std::io::Error::other)?;
+    let ended =
+        |_| std::io::Error::other("the thread of the loop ended before it reported its scheduling");
+    let scheduling = reported.recv().map_err(ended)?;
     Ok(PreparedLoop {
         thread,
         start,
