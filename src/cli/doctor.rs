@@ -130,7 +130,8 @@ fn loop_margins(config: &Config) -> Result<Margins, CliError> {
     if !devices::is_simulated(config) {
         require_stability(config, &margins)?;
     }
-    Plan::control(config.clone())?.program()?;
+    // Refuses a controller or a reference that cannot be built.
+    Plan::control(config.clone())?;
     Ok(margins)
 }
 
