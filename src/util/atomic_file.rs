@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-/// Writes a file under another name, brings it to the disk and renames it. After a crash the file is the old or the new one,
-/// complete.
+/// Writes a file under another name, brings its content to the disk and renames it. After a crash the file is the old or the
+/// new one, complete.
 ///
 /// # Errors
 /// Those of the file system.
@@ -14,17 +14,31 @@ pub fn write_atomic(path: &Path, text: &str) -> std::io::Result<()> {
     let mut file = File::create(&partial)?;
     file.write_all(text.as_bytes())?;
     file.sync_all()?;
-    std::fs::rename(&partial, path)?;
+    std::fs::rename(&partial, path)
+}
+
+/// As [`write_atomic`], and brings the name in its folder to the disk: after a power failure the file is present.
+///
+/// # Errors
+/// Those of the file system.
+pub fn write_durable(path: &Path, text: &str) -> std::io::Result<()> {
+    write_atomic(path, text)?;
     sync_folder(path)
 }
 
-/// Brings the name of a file in its folder to the disk.
+/// Brings the name of a file in its folder to the disk, where the file system supports that for a folder.
 fn sync_folder(path: &Path) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    File::open(folder)?.sync_all()
+    let Err(error) = File::open(folder)?.sync_all() else {
+        return Ok(());
+    };
+    match error.raw_os_error() {
+        Some(libc::EINVAL | libc::ENOTSUP) => Ok(()),
+        _ => Err(error),
+    }
 }
 
 /// Writes a file and overwrites none: if the name is taken, the file is `STEM-2.EXT`, `STEM-3.EXT`, ... Returns its path.

@@ -15,7 +15,7 @@ use super::error::{CampaignError, file_error};
 use super::grid::{Grid, GridPoint};
 use super::point::PointResult;
 use crate::config::Config;
-use crate::util::atomic_file::write_atomic;
+use crate::util::atomic_file::write_durable;
 use crate::util::checkpoint::{FileAction, checksum, differences, lock};
 
 const FORMAT: &str = "bench campaign 1";
@@ -156,7 +156,7 @@ fn name(point: GridPoint) -> String {
 }
 
 fn write(path: &Path, text: &str) -> Result<(), CampaignError> {
-    write_atomic(path, text).map_err(|e| file_error(FileAction::Write, path, &e))
+    write_durable(path, text).map_err(|e| file_error(FileAction::Write, path, &e))
 }
 
 fn check_or_write_header(folder: &Path, header: &str) -> Result<(), CampaignError> {
