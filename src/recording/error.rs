@@ -14,17 +14,21 @@ pub enum RecordingError {
         /// The file that exists.
         path: PathBuf,
     },
-    /// The file could not be created or read.
-    #[error("{}: cannot {action} the recording: {source}; {remedy}", path.display())]
-    File {
+    /// The file could not be created.
+    #[error("{}: cannot create the recording: {source}; check that its directory exists and may be written to", path.display())]
+    Create {
         /// The file.
         path: PathBuf,
-        /// The action that failed.
-        action: &'static str,
         /// The error of the operating system.
         source: io::Error,
-        /// What to do about it.
-        remedy: &'static str,
+    },
+    /// The file could not be read.
+    #[error("{}: cannot read the recording: {source}; check that it is a file and that you may read it", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
     },
     /// Data could not be written.
     #[error("{}: writing failed after {ticks} ticks: {}; {}", path.display(), why(source), remedy_of_writing(source))]
@@ -54,13 +58,33 @@ pub enum RecordingError {
         /// What happened to the thread.
         what: String,
     },
-    /// The file is missing, or it is not a recording with ticks.
-    #[error("{}: {why}", path.display())]
-    Refused {
+    /// The file does not exist.
+    #[error("{}: no such file; check the name; recordings are in the folder recordings/ unless --out named another", path.display())]
+    Missing {
         /// The file.
         path: PathBuf,
-        /// What is wrong, with the remedy.
-        why: String,
+    },
+    /// The file does not begin like an MCAP file.
+    #[error("{}: not an MCAP file; give a recording made by bench (*.mcap)", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// An MCAP file of another program.
+    #[error("{}: an MCAP file without bench's channel /loop ({channels}); give a recording made by bench", path.display())]
+    OtherProgram {
+        /// The file.
+        path: PathBuf,
+        /// Its channels.
+        channels: String,
+    },
+    /// A recording without ticks.
+    #[error("{}: the recording holds no ticks ({}): the loop did not run; record again", path.display(), state(*is_cut))]
+    Empty {
+        /// The file.
+        path: PathBuf,
+        /// Whether the file ends early.
+        is_cut: bool,
     },
     /// The content of the file was changed, or parts of it are missing.
     #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; \
@@ -77,15 +101,10 @@ pub enum RecordingError {
     },
 }
 
-impl RecordingError {
-    /// The file could not be read.
-    pub(super) fn read(path: impl Into<PathBuf>, source: io::Error) -> RecordingError {
-        RecordingError::File {
-            path: path.into(),
-            action: "read",
-            source,
-            remedy: "check that it is a file and that you may read it",
-        }
+fn state(is_cut: bool) -> &'static str {
+    match is_cut {
+        true => "it was cut off before its first half second was written",
+        false => "it is complete",
     }
 }
 

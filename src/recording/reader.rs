@@ -234,20 +234,12 @@ impl RecordingContents {
 
 fn open(path: &Path) -> Result<File, RecordingError> {
     File::open(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => refused(path, MISSING),
-        _ => RecordingError::read(path, source),
+        io::ErrorKind::NotFound => RecordingError::Missing { path: path.into() },
+        _ => RecordingError::Read {
+            path: path.into(),
+            source,
+        },
     })
-}
-
-const MISSING: &str = "no such file; check the name; recordings are in the folder recordings/ unless --out named another";
-
-const NOT_MCAP: &str = "not an MCAP file; give a recording made by bench (*.mcap)";
-
-fn refused(path: &Path, why: impl Into<String>) -> RecordingError {
-    RecordingError::Refused {
-        path: path.into(),
-        why: why.into(),
-    }
 }
 
 /// The cut at which a walk ended early, or why the file cannot be used.
@@ -269,8 +261,13 @@ fn judge(
                 what,
             });
         }
-        Stop::NotMcap => return Err(refused(path, NOT_MCAP)),
-        Stop::Read(source) => return Err(RecordingError::read(path, source)),
+        Stop::NotMcap => return Err(RecordingError::NotMcap { path: path.into() }),
+        Stop::Read(source) => {
+            return Err(RecordingError::Read {
+                path: path.into(),
+                source,
+            });
+        }
     };
     Ok(Cut {
         at_byte,
@@ -284,31 +281,28 @@ fn require_ticks(
     path: &Path,
     contents: &Contents,
     found: &RecordingContents,
-    cut: bool,
+    is_cut: bool,
 ) -> Result<(), RecordingError> {
     if found.account.ticks() > 0 {
         return Ok(());
     }
-    let cut_at_its_start = cut && contents.channels.is_empty();
-    if !contents.has_loop() && !cut_at_its_start {
-        return Err(refused(path, of_another_program(contents)));
+    let path = path.to_path_buf();
+    let is_cut_at_its_start = is_cut && contents.channels.is_empty();
+    if contents.has_loop() || is_cut_at_its_start {
+        return Err(RecordingError::Empty { path, is_cut });
     }
-    let state = match cut {
-        true => "it was cut off before its first half second was written",
-        false => "it is complete",
-    };
-    let why = format!("the recording holds no ticks ({state}): the loop did not run; record again");
-    Err(refused(path, why))
+    let channels = channels(contents);
+    Err(RecordingError::OtherProgram { path, channels })
 }
 
-fn of_another_program(contents: &Contents) -> String {
+/// The channels as text.
+fn channels(contents: &Contents) -> String {
     let channels = contents.channels.values();
     let names: Vec<_> = channels
         .map(|(topic, schema)| format!("{topic} of {schema}"))
         .collect();
-    let found = match names.is_empty() {
+    match names.is_empty() {
         true => "it has no channels".into(),
         false => format!("it has {}", names.join(", ")),
-    };
-    format!("an MCAP file without bench's channel /loop ({found}); give a recording made by bench")
+    }
 }

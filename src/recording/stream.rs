@@ -62,7 +62,10 @@ impl Stream {
         match stepped {
             Ok(true) => Ok(()),
             _ if !self.chunk.is_empty() => Ok(()),
-            Err(Stop::Read(source)) => Err(RecordingError::read(&self.path, source)),
+            Err(Stop::Read(source)) => Err(RecordingError::Read {
+                path: self.path.clone(),
+                source,
+            }),
             _ => Err(self.changed()),
         }
     }

@@ -87,11 +87,9 @@ impl Recorder {
     pub fn create(path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
-            _ => RecordingError::File {
+            _ => RecordingError::Create {
                 path: path.into(),
-                action: "create",
                 source,
-                remedy: "check that its directory exists and may be written to",
             },
         })?;
         Recorder::over(Box::new(file), path, header)
