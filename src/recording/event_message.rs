@@ -113,39 +113,45 @@ fn state(field: &'static str, name: &str) -> Result<State, UnknownValue> {
     found.ok_or_else(|| unknown(field, name))
 }
 
-/// Trips with a value and a limit; [`Trip::reason`] identifies them.
-const TRIPS: [fn(f64, f64) -> Trip; 9] = [
-    |position_m, limit_m| Trip::Travel {
-        position_m,
-        limit_m,
-    },
-    |command_a, limit_a| Trip::PeakCurrent { command_a, limit_a },
-    |thermal_a, limit_a| Trip::ContinuousCurrent { thermal_a, limit_a },
-    |_, _| Trip::CommandNotFinite,
-    |_, _| Trip::ProbeInvalid,
-    |age_s, limit_s| Trip::ProbeStale { age_s, limit_s },
-    |unchanged_s, limit_s| Trip::ProbeStuck {
-        unchanged_s,
-        limit_s,
-    },
-    |actual_a, command_a| Trip::CurrentNotFollowed {
-        actual_a,
-        command_a,
-    },
-    // Exact: every u32 is a double.
-    |count, limit| Trip::Overruns {
-        count: count as u32,
-        limit: limit as u32,
-    },
-];
-
+/// The trip whose [`Trip::reason`] the message states.
 fn trip(message: &Message) -> Result<Trip, UnknownValue> {
-    let amplifier = Trip::Amplifier {
-        code: message.code,
-        text: None,
-    };
-    let trips = TRIPS.iter().map(|trip| trip(message.value, message.limit));
-    let mut trips = trips.chain([amplifier]);
-    let trip = trips.find(|trip| trip.reason() == message.reason);
-    trip.ok_or_else(|| unknown("reason", &message.reason))
+    let (value, limit) = (message.value, message.limit);
+    Ok(match message.reason.as_str() {
+        "travel" => Trip::Travel {
+            position_m: value,
+            limit_m: limit,
+        },
+        "peak_current" => Trip::PeakCurrent {
+            command_a: value,
+            limit_a: limit,
+        },
+        "continuous_current" => Trip::ContinuousCurrent {
+            thermal_a: value,
+            limit_a: limit,
+        },
+        "command_not_finite" => Trip::CommandNotFinite,
+        "probe_invalid" => Trip::ProbeInvalid,
+        "probe_stale" => Trip::ProbeStale {
+            age_s: value,
+            limit_s: limit,
+        },
+        "probe_stuck" => Trip::ProbeStuck {
+            unchanged_s: value,
+            limit_s: limit,
+        },
+        "current_not_followed" => Trip::CurrentNotFollowed {
+            actual_a: value,
+            command_a: limit,
+        },
+        // Exact: every u32 is a double.
+        "overruns" => Trip::Overruns {
+            count: value as u32,
+            limit: limit as u32,
+        },
+        "amplifier" => Trip::Amplifier {
+            code: message.code,
+            text: None,
+        },
+        other => return Err(unknown("reason", other)),
+    })
 }
