@@ -78,34 +78,29 @@ impl<'a> Evaluation<'a> {
         let measured = Region::of(stage, &grid.operating_points, searched)?;
         let region = Region::of(stage, &map_rows(grid, tolerances), searched)?;
         let judgements = judgements(grid, done);
-        let mut evaluation = Evaluation {
+        let offset = estimate_offset(&measured, &judgements);
+        // Asymmetries in whole mass steps within those of the grid.
+        let (low, high) = ends(&grid.asymmetries);
+        let candidates = mass_steps(low, high, grid.mass_step(stage));
+        let (first, last) = ends(&grid.operating_points);
+        let recommendation = recommend(
+            &region,
+            [first, last],
+            &candidates,
+            offset.as_ref().map_or([0.0, 0.0], |offset| offset.interval),
+            tolerances,
+            &judgements,
+        );
+        Ok(Evaluation {
             stage,
             grid,
             points: compared(stage, config.sim.asymmetry_offset, grid, done, &measured)?,
             region,
             contradicted: disagreeing(&measured, &judgements, 0.0),
-            offset: estimate_offset(&measured, &judgements),
+            offset,
             tolerances,
-            recommendation: None,
-        };
-        evaluation.recommendation = evaluation.recommend(&judgements);
-        Ok(evaluation)
-    }
-
-    /// The best asymmetry in whole mass steps within those of the grid.
-    fn recommend(&self, judgements: &[Judgement]) -> Option<Recommendation> {
-        let (low, high) = ends(&self.grid.asymmetries);
-        let (first, last) = ends(&self.grid.operating_points);
-        let candidates = mass_steps(low, high, self.grid.mass_step(self.stage));
-        let offset = self.offset.as_ref();
-        recommend(
-            &self.region,
-            [first, last],
-            &candidates,
-            offset.map_or([0.0, 0.0], |offset| offset.interval),
-            self.tolerances,
-            judgements,
-        )
+            recommendation,
+        })
     }
 
     /// The number of points with a verdict.
