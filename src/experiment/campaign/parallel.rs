@@ -40,7 +40,6 @@ pub(super) fn measure_in_parallel<E: Send>(
         failed: AtomicBool::new(false),
         stop,
     };
-    let mut outcome = Ok(());
     std::thread::scope(|scope| {
         let (sender, results) = channel();
         for _ in 0..threads.clamp(1, points.len().max(1)) {
@@ -48,14 +47,15 @@ pub(super) fn measure_in_parallel<E: Send>(
             scope.spawn(move || measure_until_empty(queue, measure, &sender));
         }
         drop(sender);
+        let mut outcome = Ok(());
         // Results that arrive after an error are kept as well.
         for result in results {
             let taken = take_result(result, &mut take);
             queue.failed.fetch_or(taken.is_err(), Ordering::Relaxed);
-            outcome = std::mem::replace(&mut outcome, Ok(())).and(taken);
+            outcome = outcome.and(taken);
         }
-    });
-    outcome
+        outcome
+    })
 }
 
 fn take_result<E>(
