@@ -58,10 +58,6 @@ impl VescSettings {
     }
 }
 
-fn text_of(error: impl ToString) -> String {
-    error.to_string()
-}
-
 const SILENT: u32 = 1;
 const BUS_OFF: u32 = 2;
 const BUS_FAILED: u32 = 3;
@@ -139,18 +135,20 @@ impl Vesc {
     /// Claims the VESC and starts to monitor its STATUS.
     pub fn open(settings: VescSettings, host: Box<dyn Host>) -> Result<Vesc, String> {
         settings.check()?;
-        let claim = host.claim(settings.node).map_err(text_of)?;
+        let claim = host.claim(settings.node).map_err(|e| e.to_string())?;
         let status = [status_id(settings.node)];
-        let bus = host.endpoint(&status).map_err(text_of)?;
+        let bus = host.endpoint(&status).map_err(|e| e.to_string())?;
         let shared = Arc::new(Shared::default());
         let watch = Watch {
-            bus: host.endpoint(&status).map_err(text_of)?,
+            bus: host.endpoint(&status).map_err(|e| e.to_string())?,
             shared: Arc::clone(&shared),
             timeout_ns: settings.status_timeout.as_nanos() as u64,
             heard_ns: host.now_ns(),
         };
         Ok(Vesc {
-            _watch: host.start("can-vesc", Box::new(watch)).map_err(text_of)?,
+            _watch: host
+                .start("can-vesc", Box::new(watch))
+                .map_err(|e| e.to_string())?,
             bus,
             host,
             shared,

@@ -128,9 +128,11 @@ impl Monitor {
     /// Processes an event of the bus.
     pub(super) fn handle(&mut self, event: &BusEvent, now_ns: u64) {
         match event {
-            BusEvent::Condition(condition) => faults::of_condition(*condition)
-                .into_iter()
-                .for_each(|code| self.shared.latch(code)),
+            BusEvent::Condition(condition) => {
+                if let Some(code) = faults::of_condition(*condition) {
+                    self.shared.latch(code);
+                }
+            }
             BusEvent::Frame(frame) => self.handle_frame(frame, now_ns),
         }
     }
