@@ -214,7 +214,9 @@ impl<'a> Server<'a> {
                 print_message(&format!("fault KIND, quit, help; the kinds are\n{kinds}"));
             }
             ["fault", fault] => {
-                let _ = self.inject(fault).map_err(|why| print_note(&why));
+                if let Err(why) = self.inject(fault) {
+                    print_note(&why);
+                }
             }
             _ => print_note(&format!(
                 "`{line}` is not a command; the commands are fault KIND, quit, help"
