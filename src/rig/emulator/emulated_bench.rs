@@ -176,17 +176,29 @@ impl Emulator {
         let fault = request.fault;
         self.faults += u64::from(fault != fault.end());
         self.write(fault.device(), LogEvent::Fault, request.text.clone());
-        let (probe_fault, amplifier_fault) = match fault {
-            EmulatedFault::Probe(fault) => (Some(fault), None),
-            EmulatedFault::Amplifier(fault) => (None, Some(fault)),
-            EmulatedFault::None => (Some(Fault::None), Some(AmplifierFault::NONE)),
-        };
-        if let (Some(probe), Some(fault)) = (&self.probe, probe_fault) {
+        match fault {
+            EmulatedFault::Probe(fault) => {
+                self.inject_into_probe(fault);
+                Ok(())
+            }
+            EmulatedFault::Amplifier(fault) => self.inject_into_amplifier(fault),
+            EmulatedFault::None => {
+                self.inject_into_probe(Fault::None);
+                self.inject_into_amplifier(AmplifierFault::NONE)
+            }
+        }
+    }
+
+    fn inject_into_probe(&self, fault: Fault) {
+        if let Some(probe) = &self.probe {
             probe.inject(fault);
         }
-        match (&self.amplifier, amplifier_fault) {
-            (Some(amplifier), Some(fault)) => amplifier.inject(fault),
-            _ => Ok(()),
+    }
+
+    fn inject_into_amplifier(&self, fault: AmplifierFault) -> Result<(), EmulatorError> {
+        match &self.amplifier {
+            Some(amplifier) => amplifier.inject(fault),
+            None => Ok(()),
         }
     }
 
