@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::error::CliError;
 use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
-use super::output::{print_json, print_result};
+use super::output::{print_json, print_result, print_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose, profiles};
 
@@ -119,8 +119,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 fn show(args: &ConfigArgs) -> Result<(), CliError> {
     let config = args.load(Purpose::Model)?;
-    let toml = to_toml(&config)?;
-    print_result(args.bench.json, &config, |_| toml)
+    match args.bench.json {
+        true => print_json(&config),
+        false => print_text(&to_toml(&config)?),
+    }
 }
 
 fn check(args: &ConfigArgs) -> Result<(), CliError> {
