@@ -140,8 +140,11 @@ fn rejects_plan_beyond_interlock_with_value_limit_and_remedy() {
             ],
         ),
         (
-            "--excitation prbs --sweep linear",
-            &["--sweep goes with --excitation chirp only", "`prbs`"],
+            "--excitation stepped_sine --sweep linear",
+            &[
+                "--sweep goes with --excitation chirp only",
+                "`stepped_sine`",
+            ],
         ),
         (
             "--excitation prbs --set prbs.clock_divider=2",
