@@ -34,7 +34,12 @@ fn check_and_control(c: &mut Criterion) {
         .expect("embedded");
     let controller = Controller::new(&sections, 2e-4);
     let mut state = controller.at_rest();
-    let mut interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let mut interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
     let mut number = 0;
     c.bench_function("tick: check + fast controller", |b| {
         b.iter(|| {
@@ -53,7 +58,7 @@ fn check_and_control(c: &mut Criterion) {
             let checked = interlocks.check_reading(black_box(&reading), now);
             let command_a = controller.update(&mut state, -reading.position_m);
             let passed = interlocks.check_command(command_a);
-            interlocks.record_current(command_a);
+            interlocks.record_current(command_a, command_a);
             black_box((checked.is_ok(), passed.is_ok(), command_a))
         });
     });
@@ -105,7 +110,12 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
         progress,
     };
     let rig = Box::new(SimulatedRig::new(config).expect("valid"));
-    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
     let servo = Servo::new(rig, interlocks, connections);
     for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
         assert!(requests.push(order).is_ok());

@@ -55,7 +55,12 @@ fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Erro
         interval: 5000,
         count: 4,
     });
-    let mut interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+    let mut interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
     let mut rig = SimulatedRig::new(config)?;
     let period_ns = (config.servo.period_s() * 1e9) as u64;
     let (mut now, mut input) = (Tick::default(), ProgramInput::default());
@@ -70,7 +75,7 @@ fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Erro
         let requested_a = program.decide(&input).requested_a;
         interlocks.check_command(requested_a).map_err(refused)?;
         let command_a = rig.command(requested_a)?;
-        interlocks.record_current(command_a);
+        interlocks.record_current(command_a, command_a);
         positions_m.push(reading.position_m);
         commands_a.push(command_a);
     }

@@ -49,6 +49,8 @@ fn tick(n: u64) -> TickRecord {
         ][n as usize % 4],
         flags: n as u32 % 32,
         missed_ticks: 0,
+        raw_position_m: [None, Some(f64::NEG_INFINITY), Some(-1e-6 * n as f64)][n as usize % 3],
+        raw_command_a: [None, Some(0.0), Some(5e-324)][n as usize % 3],
         actual_a: [None, Some(-0.0), Some(1e-3 * n as f64)][n as usize % 3],
     }
 }
@@ -76,6 +78,8 @@ fn row(t: &TickRecord) -> Value {
         hex(t.requested_a),
         hex(t.command_a),
         t.actual_a.map(hex),
+        t.raw_position_m.map(hex),
+        t.raw_command_a.map(hex),
         validity,
         t.state.name()
     ])

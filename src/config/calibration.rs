@@ -74,6 +74,9 @@ pub struct CalibrationSettings {
     pub when_expired: OnInvalidCalibration,
     /// What happens if it was made with other devices.
     pub when_other_devices: OnInvalidCalibration,
+    /// Name of the person who confirms gains beyond 0.75 to 1.25. Without it, such a calibration is refused.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub accepted_by: Option<String>,
 }
 
 /// What happens if a calibration is not valid.

@@ -5,10 +5,11 @@ use std::path::Path;
 
 use super::plan_error::PlanError;
 use super::swept_reference;
-use crate::config::{Config, whole};
+use crate::config::{self, Config, whole};
 use crate::control::ControllerText;
 use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
 use crate::recording::Recording;
+use crate::rig::calibration::{Calibration, Correction};
 use crate::rt::program::{Control, Excite, Program};
 
 /// Name of the attachment with the controller.
@@ -62,7 +63,7 @@ pub struct Plan {
     /// The controller, for a closed loop.
     pub controller: Option<ControllerText>,
     /// The calibration in use.
-    pub calibration: Option<String>,
+    pub calibration: Option<Calibration>,
     /// Descriptions of the devices, for the metadata of the recording.
     pub devices: Vec<(&'static str, String)>,
     /// Extremes of a swept reference by the model.
@@ -125,9 +126,12 @@ impl Plan {
             name: config.control.controller.clone(),
             text,
         });
+        let calibration = attached_text(recording, CALIBRATION);
+        let calibration =
+            calibration.map(|text| config::typed("the calibration of the recording", &text));
         Ok(Plan {
             controller,
-            calibration: attached_text(recording, CALIBRATION),
+            calibration: calibration.transpose()?,
             reference: attached_text(recording, REFERENCE),
             ..Plan::excitation(kind(recording)?, config)
         })
@@ -186,17 +190,26 @@ impl Plan {
         toml::to_string(&self.config).map_err(|e| PlanError::Text(e.to_string()))
     }
 
+    /// The correction by the calibration in use.
+    pub fn correction(&self) -> Option<Correction> {
+        self.calibration.as_ref().map(Correction::from)
+    }
+
     /// The files that the configuration names, as name, media type and text.
-    pub fn attachments(&self) -> Vec<(&'static str, &'static str, &str)> {
-        let controller = self.controller.as_ref().map(|found| found.text.as_str());
+    pub fn attachments(&self) -> Result<Vec<(&'static str, &'static str, String)>, PlanError> {
+        let controller = self.controller.as_ref().map(|found| found.text.clone());
+        let calibration = self.calibration.as_ref().map(Calibration::to_toml);
+        let calibration = calibration
+            .transpose()
+            .map_err(|error| PlanError::Text(error.to_string()))?;
         let attachments = [
             (CONTROLLER, "application/toml", controller),
-            (REFERENCE, "text/csv", self.reference.as_deref()),
-            (CALIBRATION, "application/toml", self.calibration.as_deref()),
+            (REFERENCE, "text/csv", self.reference.clone()),
+            (CALIBRATION, "application/toml", calibration),
         ];
         let present = attachments.into_iter();
         let present = present.filter_map(|(name, media, text)| Some((name, media, text?)));
-        present.collect()
+        Ok(present.collect())
     }
 }
 

@@ -3,6 +3,7 @@
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use rtrb::{Consumer, Producer, RingBuffer};
 
+use crate::rig::calibration::Correction;
 use crate::rt::clock::{Clock, TickTiming};
 use crate::rt::publisher::Publisher;
 use crate::rt::record::{TickRecord, flag};
@@ -11,13 +12,14 @@ use crate::rt::record::{TickRecord, flag};
 #[derive(Clone, Copy, Default)]
 pub(super) struct RecordedTick {
     pub(super) record: TickRecord,
-    /// The amplifier reported a fault, refused the command or returned an invalid value.
+    /// The amplifier reported a fault or itself disabled, refused the command, or returned another value than expected.
     pub(super) amplifier_tripped: bool,
 }
 
 /// Returns the recorded probe readings, and accepts or rejects commands like the recorded amplifier.
 pub(super) struct RecordedRig {
     now: RecordedTick,
+    correction: Option<Correction>,
     ticks: Consumer<RecordedTick>,
     enables: Consumer<bool>,
     clears: Consumer<()>,
@@ -45,13 +47,14 @@ const REFUSED: DeviceError = DeviceError {
 };
 
 impl RecordedRig {
-    /// A disabled rig, and its feed.
-    pub(super) fn new() -> (RecordedRig, RigFeed) {
+    /// A disabled rig, and its feed. `correction` is that of the loop.
+    pub(super) fn new(correction: Option<Correction>) -> (RecordedRig, RigFeed) {
         let (to_rig, ticks) = RingBuffer::new(SLOTS);
         let (enabled, enables) = RingBuffer::new(SLOTS);
         let (cleared, clears) = RingBuffer::new(SLOTS);
         let rig = RecordedRig {
             now: RecordedTick::default(),
+            correction,
             ticks,
             enables,
             clears,
@@ -77,13 +80,18 @@ impl CurrentAmplifier for RecordedRig {
 
     /// Returns the recorded command for the recorded request. Another request is returned unchanged; the comparison
     /// detects it.
-    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+    fn command(&mut self, set_point_a: f64) -> Result<f64, DeviceError> {
         if self.now.amplifier_tripped {
             return Err(REFUSED);
         }
         let record = &self.now.record;
-        let same = current_a.to_bits() == record.requested_a.to_bits();
-        Ok(if same { record.command_a } else { current_a })
+        let recorded_a = match self.correction {
+            None => record.requested_a,
+            Some(correction) => correction.set_point_a(record.requested_a),
+        };
+        let accepted_a = record.raw_command_a.unwrap_or(record.command_a);
+        let is_same = set_point_a.to_bits() == recorded_a.to_bits();
+        Ok(if is_same { accepted_a } else { set_point_a })
     }
 
     fn disable(&mut self) {
@@ -119,7 +127,7 @@ impl DisplacementProbe for RecordedRig {
         }
         let record = &self.now.record;
         Reading {
-            position_m: record.position_m,
+            position_m: record.raw_position_m.unwrap_or(record.position_m),
             sequence: record.probe_sequence,
             age_ns: record.probe_age_ns,
             validity: record.validity,

@@ -69,9 +69,11 @@ pub struct Replayed {
 /// Replays a recording.
 pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     require_no_gap(recording)?;
-    let mut replay = Replay::new(&Plan::of(recording)?)?;
     let mut events = recording.events().iter().peekable();
-    for record in recording.ticks()? {
+    let mut ticks = recording.ticks()?.peekable();
+    let has_raw = matches!(ticks.peek(), Some(Ok(record)) if record.raw_position_m.is_some());
+    let mut replay = Replay::new(&Plan::of(recording)?, has_raw)?;
+    for record in ticks {
         let record = record?;
         let amplifier_tripped = replay.feed_events(&mut events, record.tick);
         replay.tick(&RecordedTick {
@@ -102,13 +104,21 @@ struct Replay {
 }
 
 impl Replay {
-    fn new(plan: &Plan) -> Result<Replay, PlanError> {
+    /// `has_raw`: the recording contains the readings before the correction. Without a calibration, and in recordings of older
+    /// versions, the recorded readings are those that the interlocks judged.
+    fn new(plan: &Plan, has_raw: bool) -> Result<Replay, PlanError> {
         let (connections, outside) = connect(SLOTS_PER_TICK);
-        let (rig, feed) = RecordedRig::new();
+        let correction = plan.correction().filter(|_| has_raw);
+        let (rig, feed) = RecordedRig::new(correction);
         let config = &plan.config;
-        let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+        let interlocks = Interlocks::new(
+            &config.interlock,
+            &config.amplifier,
+            &config.motor,
+            &config.servo,
+        );
         Ok(Replay {
-            servo: Servo::new(Box::new(rig), interlocks, connections),
+            servo: Servo::new(Box::new(rig), interlocks, connections).with_correction(correction),
             outside,
             feed,
             program: Some(plan.program()?),
@@ -187,7 +197,12 @@ fn push<T>(ring: &mut Producer<T>, entry: T) {
 }
 
 fn is_amplifier_trip(event: &Event) -> bool {
-    matches!(event.kind, EventKind::Trip(Trip::Amplifier { .. }))
+    matches!(
+        event.kind,
+        EventKind::Trip(
+            Trip::Amplifier { .. } | Trip::AmplifierDisabled | Trip::SetPointNotAccepted { .. }
+        )
+    )
 }
 
 /// The decisions of the loop in a tick, bit for bit.

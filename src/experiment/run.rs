@@ -16,7 +16,6 @@ use super::file_name;
 use super::plan::{KIND, Plan};
 use super::run_error::RunError;
 use super::signals::{runtime, signals};
-use crate::config::Config;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
@@ -89,7 +88,7 @@ fn prepare_run(
     let total_ticks = program.ticks();
     let (connections, mut outside) = connect(RING_SLOTS);
     queue_start(&mut outside.requests, program);
-    let servo_loop = prepare_loop(&plan.config, rig, connections, pace)?;
+    let servo_loop = prepare_loop(plan, rig, connections, pace)?;
     let recorder = create_recording(plan, pace, servo_loop.scheduling(), folder)?;
     Ok(PreparedRun {
         servo_loop,
@@ -109,13 +108,19 @@ fn queue_start(requests: &mut Producer<Request>, program: Box<dyn Program>) {
 }
 
 fn prepare_loop(
-    config: &Config,
+    plan: &Plan,
     rig: Box<dyn Rig>,
     connections: Connections,
     pace: Pace,
 ) -> Result<PreparedLoop, RunError> {
-    let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
-    let servo = Servo::new(rig, interlocks, connections);
+    let config = &plan.config;
+    let interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
+    let servo = Servo::new(rig, interlocks, connections).with_correction(plan.correction());
     let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
     prepare(servo, &config.servo, pace, tail_ticks)
         .map_err(RunError::system("start the thread of the loop"))
@@ -136,7 +141,7 @@ fn create_recording(
     create_folder(folder)?;
     let path = file_name::recording(folder, &plan.label(), SystemTime::now());
     let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
-    for (name, media_type, text) in plan.attachments() {
+    for (name, media_type, text) in plan.attachments()? {
         let attached = recorder.attach(name, media_type, text.as_bytes());
         attached.map_err(RunError::Create)?;
     }

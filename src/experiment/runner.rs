@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-use bench_hal::Rig;
 use serde::Serialize;
 
 use super::error::ExperimentError;
 use super::plan::Plan;
 use super::run::{Run, run};
 use crate::config::Config;
-use crate::rig::calibration::{CalibratedRig, Calibration, load_calibration};
+use crate::rig::calibration::{Calibration, load_calibration};
 use crate::rig::devices::{self, OpenRig};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
@@ -97,32 +96,31 @@ impl Runner {
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
         let opened = self.setup.open(&plan.config)?;
-        let (plan, rig) = calibrated(plan, opened, calibration)?;
+        let plan = calibrated(plan, &opened, calibration)?;
         self.progress.begin(phase, 0);
         let mut update = |done, total| self.progress.set(done, total);
         let (pace, folder) = (self.setup.pace, &self.setup.folder);
-        Ok(run(&plan, rig, pace, folder, &mut update)?)
+        Ok(run(&plan, opened.rig, pace, folder, &mut update)?)
     }
 }
 
-/// The rig, corrected by the given or the configured calibration, and the plan with devices and calibration added.
+/// The plan with the devices, and with the given or the configured calibration.
 fn calibrated(
     plan: &Plan,
-    opened: OpenRig,
+    opened: &OpenRig,
     given: Option<Calibration>,
-) -> Result<(Plan, Box<dyn Rig>), ExperimentError> {
+) -> Result<Plan, ExperimentError> {
     let calibration = match given {
         Some(calibration) => Some(calibration),
-        None => configured_calibration(&plan.config, &opened)?,
+        None => configured_calibration(&plan.config, opened)?,
     };
     let mut plan = plan.clone();
-    plan.devices = vec![("amplifier", opened.amplifier), ("probe", opened.probe)];
-    let Some(calibration) = calibration else {
-        return Ok((plan, opened.rig));
-    };
-    plan.calibration = Some(calibration.to_toml()?);
-    let rig = CalibratedRig::new(opened.rig, &calibration);
-    Ok((plan, Box::new(rig)))
+    plan.devices = vec![
+        ("amplifier", opened.amplifier.clone()),
+        ("probe", opened.probe.clone()),
+    ];
+    plan.calibration = calibration;
+    Ok(plan)
 }
 
 fn configured_calibration(
@@ -134,6 +132,8 @@ fn configured_calibration(
     let Some((calibration, warnings)) = loaded else {
         return Ok(None);
     };
+    let file = settings.file.as_deref().unwrap_or_default();
+    calibration.check(file, settings, config.interlock.current_error_a)?;
     for warning in warnings {
         tracing::warn!("{warning}");
     }

@@ -139,6 +139,11 @@ fn trip(message: &Message) -> Result<Trip, UnknownValue> {
             unchanged_s: value,
             limit_s: limit,
         },
+        "set_point_not_accepted" => Trip::SetPointNotAccepted {
+            accepted_a: value,
+            expected_a: limit,
+        },
+        "amplifier_disabled" => Trip::AmplifierDisabled,
         "current_not_followed" => Trip::CurrentNotFollowed {
             actual_a: value,
             command_a: limit,

@@ -106,6 +106,10 @@ messages! {
         field "14" (uint32) missed_ticks,
         /// Measured current, if the amplifier measures it.
         field "15" (double, optional) actual_a,
+        /// Reading of the probe before the correction, if a calibration is in use.
+        field "16" (double, optional) raw_position_m,
+        /// Set-point of the amplifier before the correction, if a calibration is in use.
+        field "17" (double, optional) raw_command_a,
     }
     /// A change, on channel `/event`. The meaning of the fields depends on `kind`.
     Event {
@@ -212,6 +216,8 @@ impl From<&TickRecord> for Loop {
             flags: record.flags,
             missed_ticks: record.missed_ticks,
             actual_a: record.actual_a,
+            raw_position_m: record.raw_position_m,
+            raw_command_a: record.raw_command_a,
         }
     }
 }
@@ -237,6 +243,8 @@ impl TryFrom<&Loop> for TickRecord {
             flags: message.flags,
             missed_ticks: message.missed_ticks,
             actual_a: message.actual_a,
+            raw_position_m: message.raw_position_m,
+            raw_command_a: message.raw_command_a,
         })
     }
 }

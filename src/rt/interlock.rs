@@ -9,7 +9,7 @@ use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
 use super::following_error::FollowingError;
-use crate::config::{InterlockSettings, LoopSettings, MotorSettings};
+use crate::config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
 
 /// The limits, and the state that their checks need.
 #[derive(Clone, Debug)]
@@ -17,6 +17,10 @@ pub struct Interlocks {
     limits: Limits,
     thermal_a2: f64,
     last_command_a: f64,
+    /// The set-point that the amplifier accepted last.
+    last_accepted_a: f64,
+    /// The current that heats the motor since the last tick.
+    heating_a: f64,
     fresh: Freshness,
     overruns: Overruns,
     following: FollowingError,
@@ -27,6 +31,8 @@ pub struct Interlocks {
 struct Limits {
     soft_limit_m: f64,
     peak_current_a: f64,
+    amplifier_limit_a: f64,
+    accepted_error_a: f64,
     continuous_current_a: f64,
     /// Sampling period over the thermal time constant of the motor.
     cooling: f64,
@@ -58,12 +64,19 @@ struct Freshness {
 
 impl Interlocks {
     /// Interlocks with a cold motor.
-    pub fn new(settings: &InterlockSettings, motor: &MotorSettings, servo: &LoopSettings) -> Self {
+    pub fn new(
+        settings: &InterlockSettings,
+        amplifier: &AmplifierSettings,
+        motor: &MotorSettings,
+        servo: &LoopSettings,
+    ) -> Self {
         let window_ns = nanoseconds(settings.current_error_s);
         Interlocks {
             limits: Limits {
                 soft_limit_m: settings.soft_limit_m,
                 peak_current_a: motor.peak_current_a(),
+                amplifier_limit_a: amplifier.current_limit_a,
+                accepted_error_a: settings.current_error_a,
                 continuous_current_a: motor.continuous_current_a(),
                 cooling: servo.period_s() / motor.thermal_time_constant_s,
                 stale_ns: nanoseconds(settings.probe_stale_s),
@@ -73,6 +86,8 @@ impl Interlocks {
             },
             thermal_a2: 0.0,
             last_command_a: 0.0,
+            last_accepted_a: 0.0,
+            heating_a: 0.0,
             fresh: Freshness::default(),
             following: FollowingError::new(settings.current_error_a, window_ns),
             overruns: Overruns::new(settings.overruns_per_s, servo.rate_hz),
@@ -86,15 +101,23 @@ impl Interlocks {
             return Err(Trip::ProbeInvalid);
         }
         self.check_age(reading, now)?;
+        self.check_travel(reading.position_m)?;
+        self.check_stuck(now)
+    }
+
+    /// Checks a position against the soft limit. Runs in the tick: must not allocate or block.
+    pub fn check_travel(&self, position_m: f64) -> Result<(), Trip> {
         let limit_m = self.limits.soft_limit_m;
-        let position_m = reading.position_m;
-        if position_m.abs() > limit_m {
-            return Err(Trip::Travel {
+        if !position_m.is_finite() {
+            return Err(Trip::ProbeInvalid);
+        }
+        match position_m.abs() > limit_m {
+            true => Err(Trip::Travel {
                 position_m,
                 limit_m,
-            });
+            }),
+            false => Ok(()),
         }
-        self.check_stuck(now)
     }
 
     fn check_age(&self, reading: &Reading, now: Tick) -> Result<(), Trip> {
@@ -132,7 +155,7 @@ impl Interlocks {
         if missed == 0 {
             return Ok(());
         }
-        self.heat(self.last_command_a, f64::from(missed));
+        self.heat(self.heating_a, f64::from(missed));
         let count = self.overruns.add(missed, now.scheduled_ns);
         let limit = self.limits.overruns_per_s;
         match count > limit {
@@ -176,9 +199,28 @@ impl Interlocks {
         Ok(())
     }
 
-    /// Stores the current that flows from this tick on. Runs in the tick: must not allocate or block.
-    pub fn record_current(&mut self, command_a: f64) {
-        self.heat(command_a, 1.0);
+    /// Checks the set-point that the amplifier accepted: it must lie between the previous one and the one sent, because an
+    /// amplifier may limit its size and its slope. Runs in the tick: must not allocate or block.
+    pub fn check_accepted(&self, set_point_a: f64, accepted_a: f64) -> Result<(), Trip> {
+        let limit_a = self.limits.amplifier_limit_a;
+        let expected_a = set_point_a.max(-limit_a).min(limit_a);
+        let lowest_a = expected_a.min(self.last_accepted_a) - self.limits.accepted_error_a;
+        let highest_a = expected_a.max(self.last_accepted_a) + self.limits.accepted_error_a;
+        match (lowest_a..=highest_a).contains(&accepted_a) {
+            true => Ok(()),
+            false => Err(Trip::SetPointNotAccepted {
+                accepted_a,
+                expected_a,
+            }),
+        }
+    }
+
+    /// Stores the current that flows from this tick on, and the set-point of the amplifier that gives it. The motor is heated by
+    /// the larger of both: one of them is wrong if they differ. Runs in the tick: must not allocate or block.
+    pub fn record_current(&mut self, command_a: f64, set_point_a: f64) {
+        self.last_accepted_a = set_point_a;
+        self.heating_a = command_a.abs().max(set_point_a.abs());
+        self.heat(self.heating_a, 1.0);
         self.last_command_a = command_a;
     }
 

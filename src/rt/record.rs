@@ -24,6 +24,11 @@ pub struct TickRecord {
     pub requested_a: f64,
     /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited.
     pub command_a: f64,
+    /// Reading of the probe in metres before the correction by a calibration; `None` if no calibration is in use.
+    pub raw_position_m: Option<f64>,
+    /// Set-point in amperes as the amplifier accepted it, before the correction by a calibration; `None` if no calibration is
+    /// in use.
+    pub raw_command_a: Option<f64>,
     /// The current in amperes that the amplifier measures, if it measures one: as of its last status.
     pub actual_a: Option<f64>,
     /// The probe's own count of measurements.

@@ -12,6 +12,7 @@ use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
 use super::record::{EventKind, REQUESTS_PER_TICK, RequestKind, TickRecord, flag};
+use crate::rig::calibration::Correction;
 
 /// The current is unknown if the driver returns a value that is not finite.
 const NOT_FINITE: DeviceError = DeviceError {
@@ -53,12 +54,15 @@ pub struct Progress {
 /// The loop and its state between ticks.
 pub struct Servo {
     rig: Box<dyn Rig>,
+    correction: Option<Correction>,
     interlocks: Interlocks,
     state: State,
     program: Option<Box<dyn Program>>,
     run_tick: u64,
     /// Current in amperes that the amplifier gives since the last tick.
     applied_a: f64,
+    /// The same current as set-point of the amplifier, before the correction.
+    raw_command_a: f64,
     connections: Connections,
     trip: Option<(Trip, u64)>,
     completed: bool,
@@ -82,16 +86,24 @@ impl Servo {
     pub fn new(rig: Box<dyn Rig>, interlocks: Interlocks, connections: Connections) -> Self {
         Servo {
             rig,
+            correction: None,
             interlocks,
             state: State::Disarmed,
             program: None,
             run_tick: 0,
             applied_a: 0.0,
+            raw_command_a: 0.0,
             connections,
             trip: None,
             completed: false,
             took_slow_request: false,
         }
+    }
+
+    /// The loop with the correction of a calibration. The interlocks judge readings and set-points before and after it.
+    pub fn with_correction(mut self, correction: Option<Correction>) -> Self {
+        self.correction = correction;
+        self
     }
 
     /// Executes one tick. It does not allocate, lock or print; its only system calls are those of the clock and of
@@ -102,19 +114,32 @@ impl Servo {
     pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
         let now = timing.tick;
         self.take_requests(now.number);
-        let reading = self.rig.latest(now); // read
-        let checked = self.check(&reading, timing); // check
+        let raw = self.rig.latest(now); // read
+        let reading = self.corrected(raw);
+        let checked = self.check(&raw, &reading, timing); // check
         let decision = self.decide(&reading, checked, now.number); // decide
         self.write(decision.requested_a, now.number); // write
         let done_ns = clock.now_ns(now);
-        let record = self.record(timing, done_ns, &reading, &decision);
+        let record = self.record(timing, done_ns, &raw, &reading, &decision);
         self.connections.publisher.record(record); // publish
         self.finish_run(now.number);
     }
 
-    fn check(&mut self, reading: &Reading, timing: &TickTiming) -> Result<(), Trip> {
+    fn corrected(&self, raw: Reading) -> Reading {
+        match self.correction {
+            None => raw,
+            Some(correction) => Reading {
+                position_m: correction.position_m(raw.position_m),
+                ..raw
+            },
+        }
+    }
+
+    /// Judges the reading of the probe as it is, and its corrected position: the stricter of both decides.
+    fn check(&mut self, raw: &Reading, reading: &Reading, timing: &TickTiming) -> Result<(), Trip> {
         let missed = self.interlocks.check_timing(timing.missed, timing.tick);
-        let reading = self.interlocks.check_reading(reading, timing.tick);
+        let raw = self.interlocks.check_reading(raw, timing.tick);
+        let corrected = self.interlocks.check_travel(reading.position_m);
         let actual_a = self.rig.actual_current_a().filter(|_| self.is_on());
         let current = self.interlocks.check_current(actual_a, timing.tick);
         match self.rig.status() {
@@ -122,7 +147,12 @@ impl Servo {
                 code: i64::from(code),
                 text: self.rig.explain(code),
             }),
-            _ => missed.and(reading).and(current),
+            AmplifierStatus::Disabled if self.state == State::Running => {
+                Err(Trip::AmplifierDisabled)
+            }
+            AmplifierStatus::Disabled | AmplifierStatus::Enabled => {
+                missed.and(raw).and(corrected).and(current)
+            }
         }
     }
 
@@ -143,30 +173,45 @@ impl Servo {
 
     /// Commands the requested current if the interlocks allow it; otherwise switches everything off.
     fn write(&mut self, requested_a: f64, tick: u64) {
-        self.applied_a = 0.0;
+        (self.applied_a, self.raw_command_a) = (0.0, 0.0);
         if self.is_on() {
-            match self.command(requested_a) {
-                Ok(given_a) => self.applied_a = given_a,
-                Err(trip) => self.trip(trip, tick),
+            if let Err(trip) = self.command(requested_a) {
+                self.trip(trip, tick);
             }
         }
-        self.interlocks.record_current(self.applied_a);
+        self.interlocks
+            .record_current(self.applied_a, self.raw_command_a);
     }
 
-    /// The current that the amplifier gives for a request.
-    fn command(&mut self, requested_a: f64) -> Result<f64, Trip> {
+    /// Commands a current. The interlocks judge the current, the set-point that gives it, and what the amplifier accepts.
+    fn command(&mut self, requested_a: f64) -> Result<(), Trip> {
         self.interlocks.check_command(requested_a)?;
-        let given_a = self.rig.command(requested_a)?;
-        match given_a.is_finite() {
-            true => Ok(given_a),
-            false => Err(NOT_FINITE.into()),
+        let set_point_a = match self.correction {
+            None => requested_a,
+            Some(correction) => {
+                let set_point_a = correction.set_point_a(requested_a);
+                self.interlocks.check_command(set_point_a)?;
+                set_point_a
+            }
+        };
+        let accepted_a = self.rig.command(set_point_a)?;
+        if !accepted_a.is_finite() {
+            return Err(NOT_FINITE.into());
         }
+        self.interlocks.check_accepted(set_point_a, accepted_a)?;
+        self.raw_command_a = accepted_a;
+        self.applied_a = match self.correction {
+            None => accepted_a,
+            Some(correction) => correction.current_a(accepted_a),
+        };
+        Ok(())
     }
 
     fn record(
         &self,
         timing: &TickTiming,
         done_ns: u64,
+        raw: &Reading,
         reading: &Reading,
         decision: &Decision,
     ) -> TickRecord {
@@ -179,6 +224,8 @@ impl Servo {
             position_m: reading.position_m,
             requested_a: decision.requested_a,
             command_a: self.applied_a,
+            raw_position_m: self.correction.map(|_| raw.position_m),
+            raw_command_a: self.correction.map(|_| self.raw_command_a),
             actual_a: self.rig.actual_current_a(),
             probe_sequence: reading.sequence,
             probe_age_ns: reading.age_ns,

@@ -46,6 +46,13 @@ pub enum Trip {
         /// The limit.
         limit_s: f64,
     },
+    /// The amplifier accepted a set-point that is not between the previous one and the one sent.
+    SetPointNotAccepted {
+        /// The accepted set-point.
+        accepted_a: f64,
+        /// The set-point sent, limited to the current limit of the amplifier.
+        expected_a: f64,
+    },
     /// The measured current does not follow the commands.
     CurrentNotFollowed {
         /// The measured current.
@@ -60,6 +67,8 @@ pub enum Trip {
         /// The limit.
         limit: u32,
     },
+    /// The amplifier reported itself disabled during a run.
+    AmplifierDisabled,
     /// The amplifier reported a fault or refused a command; the code is the device's own.
     Amplifier {
         /// The device's number.
@@ -108,6 +117,11 @@ impl Trip {
                 "probe_stuck",
                 "check the probe and the motor's connection; the limit is interlock.probe_stuck_s",
             ),
+            Trip::SetPointNotAccepted { .. } => (
+                "set_point_not_accepted",
+                "check the scale and the current limit of the drive against amplifier.current_limit_a; \
+                 the limit of the difference is interlock.current_error_a",
+            ),
             Trip::CurrentNotFollowed { .. } => (
                 "current_not_followed",
                 "check that the drive takes set-points (its mode, another master on the bus); \
@@ -116,6 +130,10 @@ impl Trip {
             Trip::Overruns { .. } => (
                 "overruns",
                 "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s",
+            ),
+            Trip::AmplifierDisabled => (
+                "amplifier_disabled",
+                "check the enable input and the supply of the drive, and whether another master disabled it",
             ),
             Trip::Amplifier { text, .. } => {
                 const UNKNOWN: &str =
@@ -149,12 +167,19 @@ impl Trip {
                 unchanged_s,
                 limit_s,
             } => Some((unchanged_s, limit_s)),
+            Trip::SetPointNotAccepted {
+                accepted_a,
+                expected_a,
+            } => Some((accepted_a, expected_a)),
             Trip::CurrentNotFollowed {
                 actual_a,
                 command_a,
             } => Some((actual_a, command_a)),
             Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
-            Trip::CommandNotFinite | Trip::ProbeInvalid | Trip::Amplifier { .. } => None,
+            Trip::CommandNotFinite
+            | Trip::ProbeInvalid
+            | Trip::AmplifierDisabled
+            | Trip::Amplifier { .. } => None,
         }
     }
 }
@@ -196,6 +221,13 @@ impl fmt::Display for Trip {
                 unchanged_s * 1e3,
                 limit_s * 1e3
             ),
+            Trip::SetPointNotAccepted {
+                accepted_a,
+                expected_a,
+            } => write!(
+                f,
+                "the amplifier accepted a set-point of {accepted_a:.3} A where {expected_a:.3} A was expected"
+            ),
             Trip::CurrentNotFollowed {
                 actual_a,
                 command_a,
@@ -207,6 +239,9 @@ impl fmt::Display for Trip {
                 f,
                 "{count} ticks missed within a second, {limit} are allowed"
             ),
+            Trip::AmplifierDisabled => {
+                f.write_str("the amplifier reports itself disabled during the run")
+            }
             Trip::Amplifier {
                 code,
                 text: Some(text),

@@ -139,6 +139,51 @@ fn expired_or_mismatched_calibration_warns_or_fails_as_configured() {
 }
 
 #[test]
+fn gains_beyond_25_percent_need_a_name_and_large_current_offsets_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (_, text) = calibrate(folder.path());
+    let probe_gain = text.split_once("[probe]").expect("a table").1;
+    let probe_gain = probe_gain.split_once("\ngain = ").expect("a key").1;
+    let probe_gain = format!("\ngain = {}", probe_gain.lines().next().expect("a value"));
+    let current =
+        |gain: f64| text.replace("current_gain = 1.0", &format!("current_gain = {gain:?}"));
+    let probe = |gain: f64| text.replacen(&probe_gain, &format!("\ngain = {gain:?}"), 1);
+    let offset = text.replace("current_offset_a = 0.0", "current_offset_a = 0.9");
+    // Text, place in the message, exit code without and with a name.
+    let cases = [
+        (current(0.76), "", 0, 0),
+        (current(1.24), "", 0, 0),
+        (probe(1.24), "", 0, 0),
+        (current(0.74), "amplifier.current_gain = 0.74", 2, 0),
+        (current(1.26), "amplifier.current_gain = 1.26", 2, 0),
+        (probe(0.74), "probe.gain = 0.74", 2, 0),
+        (probe(0.0), "probe.gain = 0.0", 2, 0),
+        (offset, "amplifier.current_offset_a = 0.9", 2, 2),
+    ];
+    for (text, place, without_name, with_name) in cases {
+        std::fs::write(folder.path().join("edited.toml"), text).expect("a good disk");
+        let run = [
+            "control",
+            "--duration",
+            "1",
+            "--set",
+            "calibration.file=edited.toml",
+        ];
+        let named = [&run[..], &["--set", "calibration.accepted_by=A. Smith"]].concat();
+        for (arguments, expected) in [(&run[..], without_name), (&named[..], with_name)] {
+            let (code, _, errors) = bench(folder.path(), arguments);
+            assert_eq!(
+                code == 2,
+                expected == 2,
+                "{place} {arguments:?}: {code} {errors}"
+            );
+            let is_explained = errors.contains(place) && errors.contains("nothing was moved");
+            assert!(expected == 0 || is_explained, "{errors}");
+        }
+    }
+}
+
+#[test]
 fn rejects_invalid_calibration_file_with_its_name() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (_, text) = calibrate(folder.path());

@@ -6,7 +6,7 @@ use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench::experiment::{self, Plan};
 use bench::recording::Recording;
 use bench::rig::calibration::{
-    AmplifierCalibration, CalibratedRig, Calibration, ChainCalibration, ProbeCalibration,
+    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
@@ -23,8 +23,11 @@ fn config() -> Config {
 }
 
 fn recorded(rig: Box<dyn Rig>, config: &Config, folder: &Path) -> Recording {
-    let plan = Plan::calibrate(config.clone());
-    let run = experiment::run(&plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    recording_of(&Plan::calibrate(config.clone()), rig, folder)
+}
+
+fn recording_of(plan: &Plan, rig: Box<dyn Rig>, folder: &Path) -> Recording {
+    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     assert!(run.ended.completed, "{:?}", run.ended);
     run.finish("{}").expect("a good disk");
@@ -213,8 +216,10 @@ fn calibrated_rig_has_unit_gain_and_no_offset() {
         },
     };
     let rig = SkewedRig::new(SimulatedRig::new(&config).expect("a rig"), skew);
-    let rig = CalibratedRig::new(Box::new(rig), &calibration);
-    let second = fit_of(&recorded(Box::new(rig), &config, folder.path()), &config).expect("a fit");
+    let mut plan = Plan::calibrate(config.clone());
+    plan.calibration = Some(calibration);
+    let recording = recording_of(&plan, Box::new(rig), folder.path());
+    let second = fit_of(&recording, &config).expect("a fit");
     assert!(
         (second.compliance_m_per_a / COMPLIANCE_M_PER_A - 1.0).abs() < 2e-4,
         "{second:?}"

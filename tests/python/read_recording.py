@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 DOUBLES = ("reference_m", "position_m", "requested_a", "command_a")
+OPTIONAL = ("actual_a", "raw_position_m", "raw_command_a")
 NUMBERS = ("tick", "scheduled_ns", "woke_ns", "done_ns", "probe_sequence", "probe_age_ns", "flags", "missed_ticks")
 
 
@@ -28,11 +29,11 @@ def name(message, field):
 
 
 def row(message):
-    """One tick, in the order NUMBERS, DOUBLES, actual_a (None where the amplifier does not say), validity, state."""
+    """One tick, in the order NUMBERS, DOUBLES, OPTIONAL (None if absent), validity, state."""
     numbers = [getattr(message, n) for n in NUMBERS]
     doubles = [bits(getattr(message, n)) for n in DOUBLES]
-    actual = [bits(message.actual_a) if message.HasField("actual_a") else None]
-    return numbers + doubles + actual + [name(message, "validity"), name(message, "state")]
+    optional = [bits(getattr(message, n)) if message.HasField(n) else None for n in OPTIONAL]
+    return numbers + doubles + optional + [name(message, "validity"), name(message, "state")]
 
 
 def event(message):

@@ -46,6 +46,8 @@ pub fn tick(number: u64) -> TickRecord {
         state: State::Running,
         flags: 1,
         missed_ticks: 0,
+        raw_position_m: None,
+        raw_command_a: None,
         actual_a: None,
     }
 }
@@ -89,17 +91,20 @@ pub fn write(path: &Path, run: &[LoopMessage]) -> Totals {
 }
 
 /// All bits of a tick, because -0.0 == 0.0 and NaN != NaN.
-pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], Option<u64>) {
+pub fn bits(t: &TickRecord) -> (TickRecord, [u64; 4], [Option<u64>; 3]) {
     let floats = [t.reference_m, t.position_m, t.requested_a, t.command_a].map(f64::to_bits);
     let rest = TickRecord {
         reference_m: 0.0,
         position_m: 0.0,
         requested_a: 0.0,
         command_a: 0.0,
+        raw_position_m: None,
+        raw_command_a: None,
         actual_a: None,
         ..*t
     };
-    (rest, floats, t.actual_a.map(f64::to_bits))
+    let optional = [t.raw_position_m, t.raw_command_a, t.actual_a];
+    (rest, floats, optional.map(|value| value.map(f64::to_bits)))
 }
 
 pub fn ticks_of(run: &[LoopMessage]) -> Vec<TickRecord> {

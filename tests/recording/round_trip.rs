@@ -65,6 +65,8 @@ fn tick_fields_round_trip_bit_for_bit() {
         state: states[n / 4 % 4],
         flags: u32::MAX >> n,
         missed_ticks: 0,
+        raw_position_m: n.is_multiple_of(3).then_some(doubles[(n + 5) % 7]),
+        raw_command_a: n.is_multiple_of(3).then_some(doubles[(n + 6) % 7]),
         actual_a: n.is_multiple_of(2).then_some(doubles[(n + 4) % 7]),
     };
     let put: Vec<_> = (0..28).map(odd).collect();
@@ -112,6 +114,11 @@ fn events_of_every_kind_round_trip_in_order() {
             actual_a: -0.75,
             command_a: 0.25,
         },
+        Trip::SetPointNotAccepted {
+            accepted_a: 9.0,
+            expected_a: -0.5,
+        },
+        Trip::AmplifierDisabled,
         Trip::Amplifier {
             code: i64::MIN,
             text: None,

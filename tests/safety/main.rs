@@ -1,6 +1,7 @@
 //! Safety requirements of the loop. Each test has been seen to fail with the guarded line broken.
 mod arming;
 mod bumpless;
+mod calibrated;
 use bench_test_support::faulty_rig;
 mod late_ticks;
 mod replay;

@@ -9,12 +9,14 @@ use bench::config::{
 use bench::excitation::{SineReference, StepReference};
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
+use bench::rig::calibration::Correction;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::record::{EventKind, LoopMessage, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench_hal::Validity;
 
+use crate::calibrated::calibration;
 use crate::faulty_rig::{Fault, FaultyRig};
 use crate::rig::{Bench, stage};
 
@@ -134,6 +136,34 @@ fn recorded_configuration_with_undetermined_damping_is_read() {
 }
 
 #[test]
+fn calibrated_runs_replay_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    // The position -0.9 reading is within the limit of 0.9 mm; the reading of 0.95 mm itself is not.
+    let beyond = [(4000..4001, Fault::Position(0.00095))];
+    let cases: [(&[_], Option<u64>); 2] = [(&[], None), (&beyond, Some(4000))];
+    for (faults, tripped_at) in cases {
+        let mut plan = short_chirp(Sweep::Linear);
+        plan.calibration = Some(calibration(&Correction {
+            current_gain: 0.93,
+            current_offset_a: 0.004,
+            probe_gain: -0.9,
+            probe_offset_m: 13e-6,
+        }));
+        let path = record(&plan, faults, folder.path());
+        let recording = Recording::open(&path).expect("a recording");
+        let trips = recording.events().iter();
+        let trips = trips.filter(|event| matches!(event.kind, EventKind::Trip(_)));
+        assert_eq!(trips.map(|event| event.tick).next(), tripped_at);
+        for record in recording.ticks().expect("readable") {
+            let record = record.expect("readable");
+            let raw_m = record.raw_position_m.expect("the reading is recorded");
+            assert!((record.position_m - (13e-6 - 0.9 * raw_m)).abs() < 1e-18);
+        }
+        assert_identical(&path, "calibrated");
+    }
+}
+
+#[test]
 fn tripped_runs_replay_bit_for_bit() {
     const AT: u64 = 4000;
     let once = |fault| [(AT..AT + 1, fault)];
@@ -147,6 +177,12 @@ fn tripped_runs_replay_bit_for_bit() {
         (once(Fault::AmplifierFault(77)), AT, "amplifier"),
         (once(Fault::RefusedCommand(78)), AT, "amplifier"),
         (once(Fault::ReturnedCurrent(f64::NAN)), AT, "amplifier"),
+        (
+            once(Fault::ReturnedCurrent(9.0)),
+            AT,
+            "set_point_not_accepted",
+        ),
+        (once(Fault::ReportsDisabled), AT, "amplifier_disabled"),
         ([(0..1, Fault::RefusedEnable(79))], 0, "amplifier"),
     ];
     for (faults, at, reason) in cases {
@@ -316,7 +352,7 @@ fn refused_and_accepted_clear_requests_replay_bit_for_bit() {
     };
     let path = folder.path().join("cleared.mcap");
     let mut recorder = Recorder::create(&path, &header).expect("a new file");
-    for (name, kind, text) in plan.attachments() {
+    for (name, kind, text) in plan.attachments().expect("texts") {
         recorder
             .attach(name, kind, text.as_bytes())
             .expect("a good disk");

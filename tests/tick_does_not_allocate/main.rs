@@ -33,6 +33,8 @@ fn all_trips() -> Vec<(&'static str, Fault, f64)> {
         ("amplifier", Fault::RefusedCommand(4), 0.01),
         ("amplifier", Fault::RefusedEnable(5), 0.01),
         ("amplifier", Fault::ReturnedCurrent(f64::NAN), 0.01),
+        ("set_point_not_accepted", Fault::ReturnedCurrent(3.0), 0.01),
+        ("amplifier_disabled", Fault::ReportsDisabled, 0.01),
         ("current_not_followed", Fault::MeasuredOffset(1.0), 0.01),
     ]
 }

@@ -41,7 +41,12 @@ impl TestLoop {
             publisher: Publisher::new(publisher),
             progress: Arc::new(Progress::default()),
         };
-        let interlocks = Interlocks::new(&config.interlock, &config.motor, &config.servo);
+        let interlocks = Interlocks::new(
+            &config.interlock,
+            &config.amplifier,
+            &config.motor,
+            &config.servo,
+        );
         TestLoop {
             servo: Servo::new(Box::new(rig), interlocks, connections),
             requests,

@@ -109,11 +109,19 @@ fn static_steps(
     let summary = RunSummary::of(&mut run)?;
     let recording = Recording::open(&run.path)?;
     let calibration = match fitted(&summary, &recording, config) {
-        Ok(fit) => Ok(calibration(config, &fit, &recording)?),
+        Ok(fit) => checked(calibration(config, &fit, &recording)?, config),
         Err(why) => Err(why),
     };
     close(run, &summary)?;
     Ok((summary, calibration))
+}
+
+/// The measured calibration, if a run may use it.
+fn checked(calibration: Calibration, config: &Config) -> Result<Calibration, String> {
+    let (settings, current_error_a) = (&config.calibration, config.interlock.current_error_a);
+    let checked = calibration.check("as measured", settings, current_error_a);
+    checked.map_err(|error| error.to_string())?;
+    Ok(calibration)
 }
 
 fn fitted(

@@ -99,6 +99,30 @@ pub enum CalibrationError {
     /// The calibration cannot be written.
     #[error("the calibration cannot be written as TOML: {0}")]
     Text(String),
+    /// A gain so far from 1 that an error is more likely.
+    #[error(
+        "calibration {file}: {key} = {gain:.4} is beyond 0.75 to 1.25; check scale and wiring of the device and repeat `bench calibrate`, or set calibration.accepted_by = \"NAME\" to confirm the value with your name; nothing was moved"
+    )]
+    Gain {
+        /// The file.
+        file: String,
+        /// The key in the file.
+        key: &'static str,
+        /// Its value.
+        gain: f64,
+    },
+    /// An offset of the current that the check of the measured current could not tell from a drive that does not follow.
+    #[error(
+        "calibration {file}: amplifier.current_offset_a = {offset_a:.4} A exceeds interlock.current_error_a = {limit_a} A; correct the offset of the drive and repeat `bench calibrate`; nothing was moved"
+    )]
+    Offset {
+        /// The file.
+        file: String,
+        /// The offset.
+        offset_a: f64,
+        /// The limit.
+        limit_a: f64,
+    },
     /// Too old, or of other devices.
     #[error(
         "calibration {file}: {why}; repeat `bench calibrate`, or set {setting} = \"warn\"; nothing was moved"
@@ -203,7 +227,42 @@ fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Opti
     ))
 }
 
+/// Largest deviation of a gain from 1 (or -1 for a reversed probe) that needs no confirmation.
+const GAIN_TOLERANCE: f64 = 0.25;
+
 impl Calibration {
+    /// Refuses gains beyond 1 +- 0.25 that nobody confirmed with a name, and an offset of the current beyond `current_error_a`,
+    /// the limit within which the measured current must follow the commands. The probe may be reversed. `file` names the
+    /// calibration in the error.
+    pub fn check(
+        &self,
+        file: &str,
+        settings: &CalibrationSettings,
+        current_error_a: f64,
+    ) -> Result<(), CalibrationError> {
+        let gains = [
+            ("amplifier.current_gain", self.amplifier.current_gain, 1.0),
+            ("probe.gain", self.probe.gain, self.probe.gain.signum()),
+        ];
+        let is_confirmed = settings.accepted_by.is_some();
+        let is_near = |gain: f64, nominal: f64| (gain - nominal).abs() <= GAIN_TOLERANCE;
+        let wrong = gains.into_iter();
+        let mut wrong = wrong.filter(|(_, gain, nominal)| !is_near(*gain, *nominal));
+        if let (Some((key, gain, _)), false) = (wrong.next(), is_confirmed) {
+            let file = file.into();
+            return Err(CalibrationError::Gain { file, key, gain });
+        }
+        let offset_a = self.amplifier.current_offset_a;
+        match offset_a.abs() <= current_error_a {
+            true => Ok(()),
+            false => Err(CalibrationError::Offset {
+                file: file.into(),
+                offset_a,
+                limit_a: current_error_a,
+            }),
+        }
+    }
+
     /// The text of the file.
     pub fn to_toml(&self) -> Result<String, CalibrationError> {
         toml::to_string(self).map_err(|e| CalibrationError::Text(e.to_string()))

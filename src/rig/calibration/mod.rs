@@ -3,8 +3,9 @@
 //! ```text
 //!  bench calibrate: staircase -> recording -> fit -> Calibration (a file)
 //!                                                         |
-//!  [calibration] file = ... -----> valid? of these devices? --> CalibratedRig: position = gain * reading + offset,
-//!                                                               command to the amplifier = (current - offset) / gain
+//!  [calibration] file = ... -----> valid? of these devices? --> Correction in the loop, above the interlocks:
+//!                                                               position = gain * reading + offset,
+//!                                                               set-point of the amplifier = (current - offset) / gain
 //! ```
 //!
 //! # What small static steps can determine
@@ -14,11 +15,11 @@
 //! amplifier follows if it measures its current. The scale of the probe follows only from an independently known
 //! displacement: the compliance of the model, if the stiffness of the springs is known better than the scale of the probe.
 
+mod correction;
 mod file;
-mod rig;
 
+pub use correction::Correction;
 pub use file::{
     AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration,
     load_calibration,
 };
-pub use rig::CalibratedRig;

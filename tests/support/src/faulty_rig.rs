@@ -22,6 +22,8 @@ pub enum Fault {
     Stuck,
     /// The amplifier reports a fault with this code.
     AmplifierFault(u32),
+    /// The amplifier reports itself disabled.
+    ReportsDisabled,
     /// The amplifier refuses a command with this code.
     RefusedCommand(i64),
     /// The amplifier refuses to be enabled, with this code.
@@ -140,14 +142,12 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn status(&self) -> AmplifierStatus {
-        let code = self.find(self.now(), |fault| {
-            if let Fault::AmplifierFault(code) = fault {
-                Some(*code)
-            } else {
-                None
-            }
+        let status = self.find(self.now(), |fault| match fault {
+            Fault::AmplifierFault(code) => Some(AmplifierStatus::Fault(*code)),
+            Fault::ReportsDisabled => Some(AmplifierStatus::Disabled),
+            _ => None,
         });
-        code.map_or(self.inner.status(), AmplifierStatus::Fault)
+        status.unwrap_or(self.inner.status())
     }
 }
 
@@ -167,6 +167,7 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
                 Fault::RepeatedSample => reading.sequence = self.last.sequence,
                 Fault::Stuck => reading.position_m = self.last.position_m,
                 Fault::AmplifierFault(_)
+                | Fault::ReportsDisabled
                 | Fault::RefusedCommand(_)
                 | Fault::RefusedEnable(_)
                 | Fault::ReturnedCurrent(_)

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use bench::config::{Config, Source, load};
 use bench::recording::{Header, Recorder, Recording};
+use bench::rig::calibration::Correction;
 use bench::rt::arming::State;
 use bench::rt::clock::{TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
@@ -176,7 +177,12 @@ pub fn endless(current_a: impl FnMut(u64) -> f64 + Send + 'static) -> Box<dyn Pr
 
 /// The interlocks of a configuration.
 pub fn interlocks(config: &Config) -> Interlocks {
-    Interlocks::new(&config.interlock, &config.motor, &config.servo)
+    Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    )
 }
 
 /// The loop, its rings, and everything it has published.
@@ -225,6 +231,14 @@ impl Bench {
     }
 
     /// A stage at rest, disarmed.
+    /// The same loop with a correction between its program and the rig.
+    pub fn with_correction(self, correction: Correction) -> Bench {
+        Bench {
+            servo: self.servo.with_correction(Some(correction)),
+            ..self
+        }
+    }
+
     pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
         Bench::around(config, FaultyRig::new(StillRig::default(), faults))
     }
