@@ -7,13 +7,13 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
-use tokio::signal::unix::{Signal, SignalKind, signal};
 
 use super::error::CliError;
 use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_message, print_note};
 use crate::config::{Config, OptionSetting, Purpose};
+use crate::experiment::StopSignals;
 use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
@@ -172,13 +172,12 @@ impl<'a> Server<'a> {
     }
 
     /// Serves until a signal, `quit`, or the end of the duration.
-    async fn serve(&mut self, [mut interrupt, mut terminate]: [Signal; 2]) -> Result<(), CliError> {
+    async fn serve(&mut self, mut signals: StopSignals) -> Result<(), CliError> {
         let mut period = tokio::time::interval(PERIOD);
         while !self.is_over {
             tokio::select! {
                 _ = period.tick() => self.step()?,
-                _ = interrupt.recv() => self.is_over = true,
-                _ = terminate.recv() => self.is_over = true,
+                () = signals.received() => self.is_over = true,
             }
         }
         self.report()
@@ -243,17 +242,14 @@ impl<'a> Server<'a> {
     }
 }
 
-/// Receives Ctrl-C and SIGTERM from now on, so that everything that is served is removed in order.
-fn watch_signals() -> std::io::Result<(Runtime, [Signal; 2])> {
+/// Receives the signals that end a run from now on, so that everything that is served is removed in order.
+fn watch_signals() -> std::io::Result<(Runtime, StopSignals)> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
     let signals = {
         let _context = runtime.enter();
-        [
-            signal(SignalKind::interrupt())?,
-            signal(SignalKind::terminate())?,
-        ]
+        StopSignals::listen()?
     };
     Ok((runtime, signals))
 }

@@ -9,13 +9,12 @@ use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
 use rtrb::Producer;
-use tokio::signal::unix::Signal;
 
 use super::connections::{OutsideEnds, connect};
 use super::file_name;
 use super::plan::{KIND, Plan};
 use super::run_error::RunError;
-use super::signals::{runtime, signals};
+use super::signals::{StopSignals, runtime};
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
@@ -229,7 +228,7 @@ impl Supervisor {
         const WHAT: &str = "start the supervisor of the run";
         let runtime = runtime().map_err(RunError::system(WHAT))?;
         runtime.block_on(async {
-            let signals = signals().map_err(RunError::system(WHAT))?;
+            let signals = StopSignals::listen().map_err(RunError::system(WHAT))?;
             let thread = prepared.begin();
             self.until_finished(&thread, signals, watch).await;
             Ok(thread.join())
@@ -239,15 +238,14 @@ impl Supervisor {
     async fn until_finished(
         &mut self,
         thread: &JoinHandle<LoopOutcome>,
-        (mut interrupt, mut terminate): (Signal, Signal),
+        mut signals: StopSignals,
         mut watch: impl FnMut(),
     ) {
         let mut beat = tokio::time::interval(SUPERVISION_PERIOD);
         while !thread.is_finished() {
             tokio::select! {
                 _ = beat.tick() => watch(),
-                _ = interrupt.recv() => self.stop(),
-                _ = terminate.recv() => self.stop(),
+                () = signals.received() => self.stop(),
             }
             if self.health.failed() {
                 self.stop();

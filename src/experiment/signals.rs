@@ -1,6 +1,8 @@
-//! Interrupt and terminate signals: a long computation can be stopped, and files stay complete.
+//! Signals that end a run or a long computation, so that the motor is off and files are complete.
 
+use std::future::poll_fn;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
 
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -10,12 +12,45 @@ use super::run_error::RunError;
 
 const START: &str = "start the analysis";
 
-/// Installs process-wide handlers for SIGINT (Ctrl-C) and SIGTERM.
-pub(super) fn signals() -> std::io::Result<(Signal, Signal)> {
-    Ok((
-        signal(SignalKind::interrupt())?,
-        signal(SignalKind::terminate())?,
-    ))
+/// The signals that end a run: SIGINT (Ctrl-C), SIGTERM, SIGQUIT (Ctrl-\\) and SIGHUP (a closed terminal or connection).
+/// SIGHUP is left alone where it is ignored, as by `nohup`.
+pub struct StopSignals(Vec<Signal>);
+
+impl StopSignals {
+    /// Installs process-wide handlers. Must be called within a tokio runtime.
+    pub fn listen() -> std::io::Result<StopSignals> {
+        let mut kinds = vec![
+            SignalKind::interrupt(),
+            SignalKind::terminate(),
+            SignalKind::quit(),
+        ];
+        if !is_ignored(SignalKind::hangup()) {
+            kinds.push(SignalKind::hangup());
+        }
+        let signals: std::io::Result<_> = kinds.into_iter().map(signal).collect();
+        Ok(StopSignals(signals?))
+    }
+
+    /// Waits for the next of the signals.
+    pub async fn received(&mut self) {
+        poll_fn(|context| {
+            let mut signals = self.0.iter_mut();
+            match signals.any(|signal| signal.poll_recv(context).is_ready()) {
+                true => Poll::Ready(()),
+                false => Poll::Pending,
+            }
+        })
+        .await
+    }
+}
+
+/// Whether this process ignores a signal: bit `number - 1` of `SigIgn` [Linux, proc_pid_status(5)].
+fn is_ignored(kind: SignalKind) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mut lines = status.lines();
+    let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
+    mask.is_some_and(|mask| mask >> (kind.as_raw_value() - 1) & 1 == 1)
 }
 
 /// Does `work` on a thread and returns its result; `None` if a signal arrives before it is done. The thread is then
@@ -25,14 +60,13 @@ pub fn abandon_on_signal<T: Send + 'static>(
 ) -> Result<Option<T>, RunError> {
     let runtime = runtime().map_err(RunError::system(START))?;
     runtime.block_on(async {
-        let (mut interrupt, mut terminate) = signals().map_err(RunError::system(START))?;
+        let mut signals = StopSignals::listen().map_err(RunError::system(START))?;
         let (sender, result) = tokio::sync::oneshot::channel();
         let thread = analysis_thread().spawn(move || drop(sender.send(work())));
         thread.map_err(RunError::system(START))?;
         tokio::select! {
             result = result => result.map(Some).map_err(thread_panicked),
-            _ = interrupt.recv() => Ok(None),
-            _ = terminate.recv() => Ok(None),
+            () = signals.received() => Ok(None),
         }
     })
 }
@@ -43,7 +77,7 @@ pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Re
     let stop = AtomicBool::new(false);
     std::thread::scope(|scope| {
         runtime.block_on(async {
-            let (mut interrupt, mut terminate) = signals().map_err(RunError::system(START))?;
+            let mut signals = StopSignals::listen().map_err(RunError::system(START))?;
             let (sender, mut result) = tokio::sync::oneshot::channel();
             let send = || drop(sender.send(work(&stop)));
             let thread = analysis_thread().spawn_scoped(scope, send);
@@ -51,8 +85,7 @@ pub fn stop_on_signal<T: Send>(work: impl FnOnce(&AtomicBool) -> T + Send) -> Re
             loop {
                 tokio::select! {
                     result = &mut result => return result.map_err(thread_panicked),
-                    _ = interrupt.recv() => stop.store(true, Ordering::Relaxed),
-                    _ = terminate.recv() => stop.store(true, Ordering::Relaxed),
+                    () = signals.received() => stop.store(true, Ordering::Relaxed),
                 }
             }
         })
@@ -97,9 +130,9 @@ mod tests {
     }
 
     #[test]
-    fn ctrl_c_and_sigterm_end_the_wait_and_not_the_process() {
+    fn each_stop_signal_end_the_wait_and_not_the_process() {
         let _alone = one_at_a_time();
-        for number in [libc::SIGINT, libc::SIGTERM] {
+        for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let (release, held) = std::sync::mpsc::channel::<()>();
             let outcome = abandon_on_signal(move || {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
@@ -112,9 +145,9 @@ mod tests {
     }
 
     #[test]
-    fn ctrl_c_and_sigterm_set_the_flag_and_wait_for_the_work() {
+    fn each_stop_signal_set_the_flag_and_wait_for_the_work() {
         let _alone = one_at_a_time();
-        for number in [libc::SIGINT, libc::SIGTERM] {
+        for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let ended = stop_on_signal(|stop| {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
                 unsafe { libc::raise(number) };

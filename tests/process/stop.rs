@@ -1,14 +1,32 @@
-//! Ctrl-C and SIGTERM.
+//! The signals that stop a run.
+use std::path::Path;
+use std::process::{Command, Stdio};
+
 use bench::recording::Recording;
 use bench::rt::arming::State;
 use bench::rt::record::{EventKind, RequestKind, TickRecord};
 
 use crate::common::{LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks};
 
+/// Starts a run through `env`, which sets whether SIGHUP is ignored.
+fn start_with(run: LongRun, disposition: &str, folder: &Path) -> Running {
+    let mut command = Command::new("env");
+    command
+        .arg(disposition)
+        .arg(env!("CARGO_BIN_EXE_bench"))
+        .args(arguments_of(run))
+        .arg("--out")
+        .arg(folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    Running::of(&mut command)
+}
+
 /// A run stopped by a signal ends at zero current, with a complete recording and report.
 fn stopped_by(signal: i32, run: LongRun) {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut running = Running::start(&arguments_of(run), folder.path());
+    // These tests may themselves run with SIGHUP ignored.
+    let mut running = start_with(run, "--default-signal=HUP", folder.path());
     // The loop closes half a second after the start, the chirp begins after a tenth.
     running.until_slept(RATE_HZ);
     running.signal(signal);
@@ -99,6 +117,35 @@ fn sigterm_stops_a_closed_loop_with_zero_current_and_complete_recording() {
 #[test]
 fn sigterm_stops_a_chirp_with_zero_current_and_complete_recording() {
     stopped_by(libc::SIGTERM, LongRun::Chirp);
+}
+
+#[test]
+fn a_dropped_connection_stops_a_closed_loop_with_zero_current_and_complete_recording() {
+    stopped_by(libc::SIGHUP, LongRun::Control);
+}
+
+#[test]
+fn sigquit_stops_a_closed_loop_with_zero_current_and_complete_recording() {
+    stopped_by(libc::SIGQUIT, LongRun::Control);
+}
+
+#[test]
+fn hang_up_does_not_stop_a_run_that_ignores_it() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut running = start_with(LongRun::Control, "--ignore-signal=HUP", folder.path());
+    running.until_slept(RATE_HZ / 10);
+    running.signal(libc::SIGHUP);
+    running.until_slept(RATE_HZ);
+    running.signal(libc::SIGINT);
+    let output = running.end();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let recording = Recording::open(&recording_in(folder.path())).expect("a recording");
+    assert!(!recording.truncated());
+    assert!(
+        recording.last_tick() > RATE_HZ / 2,
+        "{}",
+        recording.last_tick()
+    );
 }
 
 #[test]
