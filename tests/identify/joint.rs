@@ -1,7 +1,7 @@
 //! Identification in closed loop, on a loop simulated independently of the library.
 
-use bench::identify::EstimatorSettings;
 use bench::identify::joint::estimate;
+use bench::identify::{EstimatorSettings, Frf, local};
 use bench_test_support::feedback_loop::{BAND_HZ, loop_gain, plant, run};
 use nalgebra::Complex;
 
@@ -25,6 +25,33 @@ fn noiseless_plant_loop_and_sensitivities_equal_the_model() {
             assert!(off < 3e-4, "{name} at {f} Hz: off by {off}");
         }
     }
+}
+
+/// Just below the resonance |L| is near 1, and H1 is biased by the noise that the controller feeds back. Ten runs; the bound is
+/// three standard errors of their mean. The statistical suite has sixty runs.
+#[test]
+fn noise_fed_back_by_the_controller_biases_h1_but_not_the_plant() {
+    let (frequency_hz, settings) = (19.5, EstimatorSettings::default());
+    let runs: Vec<_> = (0..10).map(|seed| run(0.6, seed)).collect();
+    let relative = |frf: &Frf| {
+        let at = frf.frequency_hz.partition_point(|f| *f < frequency_hz);
+        frf.response[at] / plant(frf.frequency_hz[at]) - 1.0
+    };
+    let mean = |errors: &[Complex<f64>]| errors.iter().sum::<Complex<f64>>() / errors.len() as f64;
+    let joint = runs
+        .iter()
+        .map(|run| relative(&estimate(run, BAND_HZ, &settings).unwrap().plant));
+    let joint: Vec<Complex<f64>> = joint.collect();
+    let direct = runs
+        .iter()
+        .map(|run| relative(&local::estimate(&run.signals, BAND_HZ, &settings).unwrap()));
+    let direct: Vec<Complex<f64>> = direct.collect();
+    let squares: f64 = joint.iter().map(Complex::norm_sqr).sum();
+    let bound = 3.0 * squares.sqrt() / joint.len() as f64;
+    let (joint, direct) = (mean(&joint).norm(), mean(&direct).norm());
+    println!("joint {joint:.3}, H1 {direct:.3}, bound {bound:.3}");
+    assert!(joint < bound && bound < 0.37, "{joint} within {bound}");
+    assert!(direct > bound, "H1 is expected to be biased: {direct}");
 }
 
 #[test]
