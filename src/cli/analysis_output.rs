@@ -10,6 +10,7 @@ use crate::config::Config;
 use crate::experiment::analyse_with_progress;
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
+use crate::util::decimal::Decimal;
 use crate::util::progress::Progress;
 
 impl From<OutputError> for CliError {
@@ -82,9 +83,9 @@ fn delay_text(outputs: &AnalysisOutputs) -> String {
     };
     format!(
         "  delay      {:.3} ms from command to reading: {:.3} ms as configured,\n             {:+.4} ± {:.4} ms in addition, from the phases\n{without}",
-        (delay_s + excess_s) * 1e3,
+        Decimal((delay_s + excess_s) * 1e3),
         delay_s * 1e3,
-        excess_s * 1e3,
+        Decimal(excess_s * 1e3),
         2.0 * sigma_s * 1e3
     )
 }

@@ -18,6 +18,7 @@ use crate::experiment::{RunSummary, Runner};
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
+use crate::util::decimal::Decimal;
 use crate::util::progress::Progress;
 use crate::util::quantity::Current;
 
@@ -150,7 +151,7 @@ fn probe_text(probe: &ProbeCalibration) -> String {
         "  probe         {}\n                gain {:+.5}, offset {:+.3} um, noise {:.4} um RMS\n",
         probe.device,
         probe.gain,
-        probe.offset_m * 1e6,
+        Decimal(probe.offset_m * 1e6),
         probe.noise_rms_m * 1e6,
     )
 }
@@ -162,16 +163,16 @@ fn current_text(amplifier: &AmplifierCalibration) -> String {
     format!(
         "{:.5} A per A commanded, {:+.2} mA at zero",
         amplifier.current_gain,
-        amplifier.current_offset_a * 1e3
+        Decimal(amplifier.current_offset_a * 1e3)
     )
 }
 
 fn chain_text(chain: &ChainCalibration) -> String {
     format!(
         "  compliance    {:+.3} ± {:.3} um/A, by the model {:+.3} um/A\n  linearity     {:.4} % from a straight line, {:.4} % between up and down\n{}",
-        chain.compliance_m_per_a * 1e6,
+        Decimal(chain.compliance_m_per_a * 1e6),
         2e6 * chain.compliance_sigma_m_per_a,
-        chain.model_m_per_a * 1e6,
+        Decimal(chain.model_m_per_a * 1e6),
         chain.nonlinearity_ratio * 1e2,
         chain.hysteresis_ratio * 1e2,
         delay_text(chain)
@@ -184,7 +185,7 @@ fn delay_text(chain: &ChainCalibration) -> String {
     };
     format!(
         "  delay         {:.3} ± {:.3} ms from command to reading; if it differs from\n                `bench margins`, set amplifier.latency_s\n",
-        delay_s * 1e3,
+        Decimal(delay_s * 1e3),
         2e3 * chain.delay_sigma_s.unwrap_or(0.0)
     )
 }

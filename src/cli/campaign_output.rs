@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::table::{labelled, table, wrap};
 use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use crate::identify::verdict::Cnmp;
+use crate::util::decimal::Decimal;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
@@ -142,7 +143,8 @@ impl<'a> Report<'a> {
             .iter()
             .filter(|point| point.result.cnmp == Cnmp::Undecided);
         let lines = undecided.map(|point| {
-            let (at, asymmetry) = (100.0 * point.operating_point, 100.0 * point.asymmetry);
+            let at = Decimal(100.0 * point.operating_point);
+            let asymmetry = Decimal(100.0 * point.asymmetry);
             let why = &point.result.why;
             wrap(
                 &format!("undecided at {at:.3} % of L, {asymmetry:+.3} %: {why}"),
@@ -172,9 +174,9 @@ impl<'a> Report<'a> {
         };
         format!(
             "{:+.2} % of initial asymmetry fits best, 95 % interval {:+.2} to {:+.2} %{open}; {} verdicts disagree with it",
-            100.0 * offset.best,
-            100.0 * offset.low,
-            100.0 * offset.high,
+            Decimal(100.0 * offset.best),
+            Decimal(100.0 * offset.low),
+            Decimal(100.0 * offset.high),
             self.agreement.contradicted_with_offset.unwrap_or_default()
         )
     }
@@ -183,7 +185,7 @@ impl<'a> Report<'a> {
         let Some(best) = self.recommendation else {
             return NO_RECOMMENDATION.into();
         };
-        let asymmetry = format!("asymmetry {:+.2} %", 100.0 * best.asymmetry);
+        let asymmetry = format!("asymmetry {:+.2} %", Decimal(100.0 * best.asymmetry));
         match (best.distance_tolerances, best.nearest) {
             (Some(distance), Some(nearest)) => {
                 let distance = self.distance_text(distance, nearest, best.at_the_end);
@@ -202,8 +204,8 @@ impl<'a> Report<'a> {
             "{tolerances:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}; \
              tolerances: {:.3} % of asymmetry, {:.3} % of L; for all operating points of the range and the interval of \
              the offset",
-            100.0 * point,
-            100.0 * border,
+            Decimal(100.0 * point),
+            Decimal(100.0 * border),
             100.0 * self.tolerances.asymmetry,
             100.0 * self.tolerances.operating_point
         )
@@ -215,8 +217,8 @@ const NO_RECOMMENDATION: &str = "nothing: with every asymmetry of the range, and
 
 fn row(point: &ComparedPoint<'_>) -> Vec<String> {
     vec![
-        format!("{:.3}", 100.0 * point.operating_point),
-        format!("{:+.3}", 100.0 * point.asymmetry),
+        format!("{:.3}", Decimal(100.0 * point.operating_point)),
+        format!("{:+.3}", Decimal(100.0 * point.asymmetry)),
         point.result.cnmp.name().into(),
         point.model_pairs.to_string(),
         point.model_pairs_damped.to_string(),

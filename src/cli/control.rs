@@ -19,6 +19,7 @@ use crate::excitation::Extremes;
 use crate::experiment::{Plan, Run, RunSummary, TrackingMetrics, tracking_metrics};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
+use crate::util::decimal::Decimal;
 
 /// Largest number of ticks of a predicted step: 200 s at 5 kHz.
 const PREDICTED_TICKS: usize = 1_000_000;
@@ -150,7 +151,7 @@ fn step_text(step: &StepMetrics) -> String {
     let settling = step
         .settling_time_s
         .map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
-    let overshoot = step.overshoot_percent;
+    let overshoot = Decimal(step.overshoot_percent);
     format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
 }
 
@@ -170,7 +171,7 @@ fn measured_text(measured: Option<&TrackingMetrics>) -> String {
     let step = measured.step.as_ref().map(step_text);
     let steady = format!(
         "steady state: mean error {:+.4} um, sigma {:.4} um",
-        measured.steady_state_mean_error_m * 1e6,
+        Decimal(measured.steady_state_mean_error_m * 1e6),
         measured.steady_state_sigma_m * 1e6
     );
     let parts: Vec<String> = step.into_iter().chain([steady]).collect();

@@ -2,6 +2,7 @@
 
 use crate::report::number::angular_frequency;
 use crate::report::run_pages::LoopOutputs;
+use crate::util::decimal::Decimal;
 
 /// The files of the responses, and the measured margins beside those of the model.
 pub(super) fn text(outputs: &LoopOutputs) -> String {
@@ -18,7 +19,9 @@ fn margins_text(outputs: &LoopOutputs) -> String {
     let crossover = outputs.crossover_rad_s.map(angular_frequency);
     let crossover = crossover.unwrap_or("none in the band".into());
     let phase_margin = match (outputs.phase_margin_deg, outputs.phase_margin_sigma_deg) {
-        (Some(deg), Some(sigma_deg)) => format!("{deg:.2} ± {:.2} deg", 2.0 * sigma_deg),
+        (Some(deg), Some(sigma_deg)) => {
+            format!("{:.2} ± {:.2} deg", Decimal(deg), 2.0 * sigma_deg)
+        }
         _ => "none".into(),
     };
     format!(

@@ -17,6 +17,7 @@ use crate::config::{Config, ProbeSettings, Purpose};
 use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::report::number::angular_frequency;
+use crate::util::decimal::Decimal;
 
 /// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -113,11 +114,12 @@ impl Pole {
     }
 
     fn row(&self) -> Vec<String> {
+        let re = Decimal(self.re_rad_s);
         let s = match self.im_rad_s {
-            0.0 => format!("{:+.3}", self.re_rad_s),
-            im => format!("{:+.3} +- {im:.3}j", self.re_rad_s),
+            0.0 => format!("{re:+.3}"),
+            im => format!("{re:+.3} +- {im:.3}j"),
         };
-        let (hz, damping) = (self.frequency_hz, self.damping_ratio);
+        let (hz, damping) = (self.frequency_hz, Decimal(self.damping_ratio));
         vec![s, format!("{hz:.3}"), format!("{damping:+.4}")]
     }
 }
@@ -228,9 +230,9 @@ fn unstable_text(poles: &[Pole]) -> String {
 }
 
 fn margin_lines(margins: &Margins) -> String {
-    let degrees = |deg: f64| format!("{deg:.2} deg");
-    let decibels = |db: f64| format!("{db:.2} dB");
-    let (modulus, peak_db) = (margins.modulus_margin, margins.sensitivity_peak_db);
+    let degrees = |deg| format!("{:.2} deg", Decimal(deg));
+    let decibels = |db| format!("{:.2} dB", Decimal(db));
+    let (modulus, peak_db) = (margins.modulus_margin, Decimal(margins.sensitivity_peak_db));
     let modulus = format!("{modulus:.4} (peak of S {peak_db:.2} dB)");
     let bandwidth = margins.sensitivity_bandwidth_rad_s;
     let lines = [

@@ -4,6 +4,7 @@ use super::table::{table, wrap};
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::UncertainZero;
 use crate::report::run_pages::ModalSummary;
+use crate::util::decimal::Decimal;
 
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary) -> String {
@@ -24,9 +25,9 @@ fn mode_row(mode: &FittedMode) -> Vec<String> {
     vec![
         format!("{:.4}", frequency_hz.value),
         format!("{:.1e}", frequency_hz.half_width_95()),
-        format!("{:.6}", damping_ratio.value),
+        format!("{:.6}", Decimal(damping_ratio.value)),
         format!("{:.1e}", damping_ratio.half_width_95()),
-        format!("{:+.6}", mode.residue_per_kg.value),
+        format!("{:+.6}", Decimal(mode.residue_per_kg.value)),
         format!("{:.1e}", mode.residue_per_kg.half_width_95()),
         mode.sign().to_string(),
     ]
@@ -43,7 +44,7 @@ fn zero_table(zeros: &[UncertainZero]) -> String {
 
 fn zero_row(zero: &UncertainZero) -> Vec<String> {
     vec![
-        format!("{:+.3} ± {:.3}j", zero.s.re, zero.s.im),
+        format!("{:+.3} ± {:.3}j", Decimal(zero.s.re), Decimal(zero.s.im)),
         format!("{:.1e}", zero.real_part().half_width_95()),
         zero.kind.name().into(),
         format!("{:.2} %", 100.0 * zero.rhp_probability),

@@ -9,6 +9,7 @@ use serde::Serialize;
 use super::finding::{Finding, Subject};
 use crate::config::{InterlockSettings, ProbeSettings};
 use crate::rig::devices::first_reading;
+use crate::util::decimal::Decimal;
 
 /// Duration of the observation.
 const OBSERVED: Duration = Duration::from_secs(1);
@@ -257,8 +258,8 @@ fn milliseconds(seconds: f64) -> String {
 fn position(readings: &Readings, soft_limit_m: f64) -> Finding {
     let what = format!(
         "mean position {:+.1} um, farthest {:+.1} um; the soft limit is {:.1} um",
-        readings.position_mean_m * 1e6,
-        readings.position_farthest_m * 1e6,
+        Decimal(readings.position_mean_m * 1e6),
+        Decimal(readings.position_farthest_m * 1e6),
         soft_limit_m * 1e6
     );
     if readings.position_farthest_m.abs() <= soft_limit_m {

@@ -8,6 +8,7 @@ use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use crate::identify::verdict::Cnmp;
 use crate::model::plant::PlantError;
 use crate::model::zeros::cnmp_map;
+use crate::util::decimal::Decimal;
 
 /// Number of cells of the map along the asymmetries.
 const COLUMNS: usize = 161;
@@ -43,7 +44,7 @@ pub fn campaign_picture(title: &str, evaluation: &Evaluation<'_>) -> Result<Stri
     if let Some(offset) = &evaluation.offset {
         let heading = format!(
             "(b) The model with {:+.2} % of initial asymmetry",
-            100.0 * offset.best
+            Decimal(100.0 * offset.best)
         );
         maps.push(map(evaluation, &heading, offset.best)?);
         rows.push(Row::new(150.0, vec![likelihood(offset)]));

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use crate::util::decimal::Decimal;
+
 /// Decimals that show two digits of an error.
 pub fn decimals(error: f64) -> usize {
     if !(error.is_finite() && error > 0.0) {
@@ -12,7 +14,7 @@ pub fn decimals(error: f64) -> usize {
 
 /// A number with a typographic minus sign.
 pub fn plain(value: f64, digits: usize) -> String {
-    format!("{value:.digits$}").replace('-', "\u{2212}")
+    format!("{:.digits$}", Decimal(value)).replace('-', "\u{2212}")
 }
 
 /// A number and half the width of its interval: `29.274373 ± 0.000062`.

@@ -2,6 +2,7 @@
 
 pub mod atomic_file;
 pub mod checkpoint;
+pub mod decimal;
 pub mod finding;
 pub mod nearest;
 pub mod numeric;

@@ -10,6 +10,7 @@ use super::Profiled;
 use crate::config::Purpose;
 use crate::model::plant;
 use crate::model::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
+use crate::util::decimal::Decimal;
 use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
 
 /// The demands on the loop.
@@ -113,8 +114,8 @@ fn bounds_table(bounds: &[Bound]) -> String {
 
 fn row(bound: &Bound) -> Vec<String> {
     vec![
-        format!("{:+.4}", bound.zero.s.re),
-        format!("{:+.4}", bound.zero.s.im),
+        format!("{:+.4}", Decimal(bound.zero.s.re)),
+        format!("{:+.4}", Decimal(bound.zero.s.im)),
         bound.zero.kind.name().into(),
         format!("{:.3}", bound.bandwidth_rad_s),
         format!("{:.3}", bound.opening_angle_deg),

@@ -7,6 +7,7 @@ use crate::model::veering::propositions::Proposition;
 use crate::model::veering::report::{
     Assumptions, ConditionRow, ConditionsReport, Explanation, PredictionTally, SideReport,
 };
+use crate::util::decimal::Decimal;
 
 pub(super) fn text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
     let here = match &conditions.here {
@@ -119,7 +120,8 @@ fn proposition_text(proposition: &Proposition) -> String {
 
 fn premise_text(condition: &Condition) -> String {
     let holds = if condition.holds { "holds" } else { "fails" };
-    format!("{} {holds} ({:+.3})", condition.name, condition.margin)
+    let margin = Decimal(condition.margin);
+    format!("{} {holds} ({margin:+.3})", condition.name)
 }
 
 fn rows_text(rows: &[ConditionRow]) -> String {
@@ -145,25 +147,25 @@ fn rows_text(rows: &[ConditionRow]) -> String {
 
 fn margin_row(row: &ConditionRow) -> Vec<String> {
     vec![
-        format!("{:.6}", row.value),
+        format!("{:.6}", Decimal(row.value)),
         format!("{:.4}", row.u_hz),
         format!("{:.4}", row.v_hz),
-        format!("{:+.3}", row.c4_1.margin),
-        format!("{:+.3}", row.c4_2.margin),
+        format!("{:+.3}", Decimal(row.c4_1.margin)),
+        format!("{:+.3}", Decimal(row.c4_2.margin)),
         row.equation.name().into(),
         row.plant.name().into(),
     ]
 }
 
 fn residue_row(row: &ConditionRow) -> Vec<String> {
-    let [b21, b22] = row.c4_2.limits;
+    let [b21, b22] = row.c4_2.limits.map(Decimal);
     vec![
-        format!("{:.6}", row.value),
-        format!("{:+.3e}", row.residue_r_per_kg),
-        format!("{:+.3e}", row.residue_u_per_kg),
-        format!("{:+.3e}", row.residue_v_per_kg),
+        format!("{:.6}", Decimal(row.value)),
+        format!("{:+.3e}", Decimal(row.residue_r_per_kg)),
+        format!("{:+.3e}", Decimal(row.residue_u_per_kg)),
+        format!("{:+.3e}", Decimal(row.residue_v_per_kg)),
         format!("{b21:.3e}"),
-        format!("{:.3e}", row.c4_2.figure),
+        format!("{:.3e}", Decimal(row.c4_2.figure)),
         format!("{b22:.3e}"),
     ]
 }

@@ -13,6 +13,7 @@ use crate::model::plant::ModalModel;
 use crate::model::zeros::{
     ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
+use crate::util::decimal::Decimal;
 
 /// The setting that varies, and the zeros to follow.
 #[derive(Clone, Debug, clap::Args)]
@@ -160,7 +161,7 @@ fn tracks_table(report: &Report) -> String {
     let places: Vec<usize> = (0..report.values.len()).collect();
     let rows: Vec<Vec<String>> = evenly_spread_rows(&places)
         .map(|&k| {
-            let mut row = vec![format!("{:.6}", report.values[k])];
+            let mut row = vec![format!("{:.6}", Decimal(report.values[k]))];
             row.extend(report.tracks.iter().map(|track| place_text(track, k)));
             row
         })
@@ -171,7 +172,7 @@ fn tracks_table(report: &Report) -> String {
 
 fn place_text(track: &Track, k: usize) -> String {
     match (track.re_rad_s[k], track.im_rad_s[k]) {
-        (Some(re), Some(im)) => format!("{re:.3}{im:+.3}j"),
+        (Some(re), Some(im)) => format!("{:.3}{:+.3}j", Decimal(re), Decimal(im)),
         _ => "infinity".into(),
     }
 }
@@ -185,7 +186,7 @@ fn change_text(change: &Change) -> String {
         after,
     } = &change.change;
     let place = match s.re.is_finite() && s.im.is_finite() {
-        true => format!(" at {:.4}{:+.4}j rad/s", s.re, s.im),
+        true => format!(" at {:.4}{:+.4}j rad/s", Decimal(s.re), Decimal(s.im)),
         false => String::new(),
     };
     let sentence = format!(
@@ -205,6 +206,8 @@ fn closed_form_text(closed_form: &ClosedForm) -> String {
             b2,
             eq_4_6_shifted,
         } => {
+            let [residue_r, eq_4_5, eq_4_5_shifted, b2, eq_4_6_shifted] =
+                [residue_r, eq_4_5, eq_4_5_shifted, b2, eq_4_6_shifted].map(|x| Decimal(*x));
             let residue = format!(
                 "residue of mode R {residue_r:.6} 1/kg; critical by Eq. (4-5) {eq_4_5:.6} (mode R at 0 rad/s), {eq_4_5_shifted:.6} (at its frequency)"
             );
@@ -218,7 +221,7 @@ fn closed_form_text(closed_form: &ClosedForm) -> String {
 
 fn break_points_text(points_rad_s: &[f64; 2]) -> String {
     let [first, second] = points_rad_s.map(|s| match s.is_finite() {
-        true => format!("{s:.4}"),
+        true => format!("{:.4}", Decimal(s)),
         false => "infinity".into(),
     });
     let sentence = format!("break points by Eq. (3-14) {first} and {second} rad/s");

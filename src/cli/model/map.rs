@@ -10,6 +10,7 @@ use super::super::table::wrap;
 use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
+use crate::util::decimal::Decimal;
 use crate::util::quantity::{OperatingPoint, Ratio};
 
 /// The largest picture in lines and characters, which fits 80 columns.
@@ -177,7 +178,11 @@ fn summary(report: &Report) -> String {
 fn range(ratios: impl Iterator<Item = f64> + Clone) -> String {
     let low = ratios.clone().fold(f64::INFINITY, f64::min);
     let high = ratios.fold(f64::NEG_INFINITY, f64::max);
-    format!("{:.3} to {:.3} %", 100.0 * low, 100.0 * high)
+    format!(
+        "{:.3} to {:.3} %",
+        Decimal(100.0 * low),
+        Decimal(100.0 * high)
+    )
 }
 
 /// A line for each operating point, a character for each asymmetry: its CNMP pairs, `.` for none.
@@ -187,12 +192,12 @@ fn picture(report: &Report) -> String {
     let mut picture = format!(
         "{:>11}  asymmetry from {:+.2} to {:+.2} %\n",
         "Y1o/L",
-        100.0 * first,
-        100.0 * last
+        Decimal(100.0 * first),
+        Decimal(100.0 * last)
     );
     for (point, row) in report.operating_points.iter().zip(&report.cnmp_pairs) {
         let symbols: String = row.iter().map(|pairs| symbol(*pairs)).collect();
-        picture += &format!("{:>9.3} %  {symbols}\n", 100.0 * point);
+        picture += &format!("{:>9.3} %  {symbols}\n", Decimal(100.0 * point));
     }
     picture
 }

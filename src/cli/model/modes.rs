@@ -7,6 +7,7 @@ use super::super::table::table;
 use super::Profiled;
 use crate::config::Purpose;
 use crate::model::zeros::{ModeSummary, PlantSummary, Zero};
+use crate::util::decimal::Decimal;
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;
@@ -36,10 +37,10 @@ fn text(profile: &str, plant: &PlantSummary) -> String {
 fn title(profile: &str, plant: &PlantSummary) -> String {
     let point = plant
         .operating_point_m
-        .map(|m| format!("at Y1o = {:.4} mm", m * 1e3));
+        .map(|m| format!("at Y1o = {:.4} mm", Decimal(m * 1e3)));
     let asymmetry = plant
         .mass_asymmetry
-        .map(|ratio| format!("mass asymmetry {:+.2} %", ratio * 100.0));
+        .map(|ratio| format!("mass asymmetry {:+.2} %", Decimal(ratio * 100.0)));
     let details: Vec<String> = point.into_iter().chain(asymmetry).collect();
     format!("{profile} {}", details.join(", "))
         .trim_end()
@@ -58,7 +59,7 @@ fn mode_row((index, mode): (usize, &ModeSummary)) -> Vec<String> {
         format!("{:.3}", mode.omega_rad_s),
         format!("{:.4}", mode.frequency_hz),
         format!("{:.5}", mode.damping_ratio),
-        format!("{:+.6}", mode.residue),
+        format!("{:+.6}", Decimal(mode.residue)),
         mode.sign.symbol().to_string(),
     ]
 }
@@ -73,7 +74,7 @@ fn shapes_table(plant: &PlantSummary) -> String {
         .enumerate()
         .map(|(index, mode)| {
             let mut row = vec![(index + 1).to_string()];
-            row.extend(mode.shape.iter().map(|x| format!("{x:+.4}")));
+            row.extend(mode.shape.iter().map(|x| format!("{:+.4}", Decimal(*x))));
             row
         })
         .collect();
@@ -84,7 +85,7 @@ fn zeros_table(zeros: &[Zero]) -> String {
     let rows: Vec<Vec<String>> = zeros
         .iter()
         .map(|zero| {
-            let (re, im) = (zero.s.re, zero.s.im);
+            let (re, im) = (Decimal(zero.s.re), Decimal(zero.s.im));
             vec![
                 format!("{re:+.4}"),
                 format!("{im:+.4}"),

@@ -3,6 +3,7 @@
 use super::super::table::{table, wrap};
 use crate::model::veering::QuadrantSummary;
 use crate::model::veering::placement::{MIN_REMAINDER_RATIO, Placement, PlacementReport, Trial};
+use crate::util::decimal::Decimal;
 
 /// Placements that are listed; the JSON has all.
 const LISTED: usize = 16;
@@ -80,11 +81,11 @@ fn diagrams_text(diagrams: &[QuadrantSummary]) -> String {
 }
 
 fn diagram_row(when: &str, diagram: &QuadrantSummary) -> Vec<String> {
-    let pair = |[a, b]: [f64; 2]| format!("{a:+.3} {b:+.3}");
-    let turn_deg = (diagram.turn_deg * 100.0).round() / 100.0 + 0.0;
+    let pair = |[a, b]: [f64; 2]| format!("{:+.3} {:+.3}", Decimal(a), Decimal(b));
+    let turn_deg = Decimal(diagram.turn_deg);
     vec![
         when.to_string(),
-        format!("{:.6}", diagram.value),
+        format!("{:.6}", Decimal(diagram.value)),
         format!("{turn_deg:+.2}"),
         pair(diagram.actuator),
         numeral(diagram.actuator_quadrant, "line"),
@@ -126,7 +127,9 @@ fn best_text(which: &str, best: Option<&Placement>) -> String {
     };
     let sentence = format!(
         "{which}: actuator {}, probe {}: {verdict}, C4-1 {:+.3}",
-        best.actuator, best.sensor, best.trial.c4_1_margin
+        best.actuator,
+        best.sensor,
+        Decimal(best.trial.c4_1_margin)
     );
     wrap(&sentence, 2)
 }
@@ -176,9 +179,9 @@ fn trial_row(placement: &Placement) -> Vec<String> {
         placement.sensor.clone(),
         trial.with_any_cnmp.to_string(),
         trial.with_cnmp.to_string(),
-        format!("{:+.3}", trial.c4_1_margin),
+        format!("{:+.3}", Decimal(trial.c4_1_margin)),
         diagram.into(),
         differs.into(),
-        format!("{:.3e}", trial.remainder_per_kg),
+        format!("{:.3e}", Decimal(trial.remainder_per_kg)),
     ]
 }

@@ -12,6 +12,7 @@ use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{
     ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
 };
+use crate::util::decimal::Decimal;
 use crate::util::numeric::linspace;
 use crate::util::quantity::{OfTime, si};
 
@@ -118,9 +119,9 @@ fn report<'a>(
 }
 
 fn text(report: &Report) -> String {
-    let end = report
-        .end_m_per_n
-        .map_or("unlimited".into(), |end| format!("{:.4} um/N", end * 1e6));
+    let end = report.end_m_per_n.map_or("unlimited".into(), |end| {
+        format!("{:.4} um/N", Decimal(end * 1e6))
+    });
     let disagreement = match report.predicted.agrees {
         true => "",
         false => "  the features DISAGREE with the prediction\n",
@@ -141,7 +142,7 @@ fn undershoot_text(report: &Report) -> String {
     format!(
         "  initial undershoot  {}, {:.4} um/N (predicted: {})\n",
         yes(report.initial_undershoot),
-        report.undershoot_m_per_n * 1e6,
+        Decimal(report.undershoot_m_per_n * 1e6),
         yes(report.predicted.initial_undershoot),
     )
 }

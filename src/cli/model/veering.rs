@@ -12,6 +12,7 @@ use super::{evenly_spread_rows, meeting_text};
 use crate::config::Purpose;
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
+use crate::util::decimal::Decimal;
 use crate::util::units::hz;
 
 /// The setting that varies, and the two modes.
@@ -113,7 +114,7 @@ fn loci_table(report: &VeeringReport) -> String {
     let rows: Vec<Vec<String>> = evenly_spread_rows(&places)
         .map(|&k| {
             vec![
-                format!("{:.6}", report.values[k]),
+                format!("{:.6}", Decimal(report.values[k])),
                 frequency(u, k),
                 frequency(v, k),
             ]
@@ -145,7 +146,7 @@ fn shares_table(report: &Report) -> String {
 }
 
 fn shares_row(at: &Shares, which: usize, mode: usize) -> Vec<String> {
-    let mut row = vec![format!("{:.6}", at.value), mode.to_string()];
+    let mut row = vec![format!("{:.6}", Decimal(at.value)), mode.to_string()];
     row.extend(at.shares[which].iter().map(|share| format!("{share:.4}")));
     row
 }

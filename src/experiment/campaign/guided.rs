@@ -17,6 +17,7 @@ use super::load_check::{Finding, LoadCheck};
 use super::point::PointResult;
 use super::rest_position::RestPosition;
 use crate::config::{Config, Sr4dofSettings};
+use crate::util::decimal::Decimal;
 
 /// A question to the operator.
 #[derive(Clone, Debug, PartialEq)]
@@ -248,9 +249,9 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         stage: &Sr4dofSettings,
         instructions: &[String],
     ) -> Question {
-        let operating_point = 100.0 * self.grid.operating_points[point.row];
-        let displacement_mm = 1e3 * stage.operating_point_m;
-        let asymmetry = 100.0 * self.grid.asymmetries[point.column];
+        let operating_point = Decimal(100.0 * self.grid.operating_points[point.row]);
+        let displacement_mm = Decimal(1e3 * stage.operating_point_m);
+        let asymmetry = Decimal(100.0 * self.grid.asymmetries[point.column]);
         let instructions = instructions.join("\n  ");
         Question {
             text: format!(

@@ -11,6 +11,7 @@ use super::load::{Load, StageModel};
 use super::rest_position::RestPosition;
 use crate::config::{PlantSettings, Sr4dofSettings};
 use crate::model::plant::{self, ModalModel, Mode, Sign};
+use crate::util::decimal::Decimal;
 
 /// A difference of more standard deviations is not noise; noise alone exceeds it once in two million cases.
 const SIGMAS: f64 = 5.0;
@@ -109,7 +110,7 @@ impl LengthCheck {
             return None;
         }
         let [seen, expected, tolerance] =
-            [self.seen_m, self.expected_m, self.tolerance_m].map(|m| m * 1e6);
+            [self.seen_m, self.expected_m, self.tolerance_m].map(|m| Decimal(m * 1e6));
         Some(format!(
             "{what} {seen:+.1} um, expected {expected:+.1} ± {tolerance:.1} um: {remedy}"
         ))

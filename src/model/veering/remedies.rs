@@ -3,6 +3,7 @@
 use super::CloseModes;
 use super::conditions::{c4_1, c4_2, deciding_residue, pattern};
 use super::quadrants::residue_signs;
+use crate::util::decimal::Decimal;
 
 /// A sentence on C4-1 and one on C4-2.
 pub(super) fn remedies(modes: &CloseModes) -> Vec<String> {
@@ -15,7 +16,7 @@ fn on_signs(modes: &CloseModes) -> String {
     let residue = format!(
         "a{} = {:+.4e} 1/kg",
         ["R", "u", "v"][which],
-        residues[which]
+        Decimal(residues[which])
     );
     let signs: String = residue_signs(residues).iter().collect();
     let percent = condition.margin.abs() * 100.0;
