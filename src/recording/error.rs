@@ -50,13 +50,20 @@ pub enum RecordingError {
         /// The previous tick.
         after: u64,
     },
-    /// The thread of the recorder could not be started, or panicked.
-    #[error(
-        "the thread of the recorder {what}; the recording is cut off there: `bench recover` completes it"
-    )]
-    Thread {
-        /// What happened to the thread.
-        what: String,
+    /// The thread of the recorder could not be started.
+    #[error("{}: cannot start the thread of the recorder: {source}; raise the limit of processes (ulimit -u)", path.display())]
+    NotStarted {
+        /// The file, which has no ticks.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: io::Error,
+    },
+    /// The thread of the recorder panicked.
+    #[error("{0}: the thread of the recorder panicked, and the recording is cut off there; \
+        complete it with `bench recover {0}`", path.display())]
+    Panicked {
+        /// The file.
+        path: PathBuf,
     },
     /// The file does not exist.
     #[error("{}: no such file; check the name; recordings are in the folder recordings/ unless --out named another", path.display())]
@@ -88,7 +95,7 @@ pub enum RecordingError {
     },
     /// The content of the file was changed, or parts of it are missing.
     #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; \
-        `bench recover` saves the data before the damage", path.display())]
+        save the data before the damage with `bench recover`", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -120,8 +127,8 @@ fn remedy_of_writing(error: &McapError) -> &'static str {
     use io::ErrorKind::{QuotaExceeded, StorageFull};
     match error {
         McapError::Io(e) if matches!(e.kind(), StorageFull | QuotaExceeded) => {
-            "free some space or record to another disk; `bench recover` completes what was written"
+            "free some space or record to another disk, and complete what was written with `bench recover`"
         }
-        _ => "check the disk; `bench recover` completes what was written",
+        _ => "check the disk, and complete what was written with `bench recover`",
     }
 }

@@ -1,5 +1,6 @@
 //! The thread of the recorder, between the ring of the loop and the disk.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
@@ -48,6 +49,7 @@ impl Health {
 pub struct RecorderHandle {
     thread: JoinHandle<Result<Recorder, RecordingError>>,
     health: Arc<Health>,
+    path: PathBuf,
 }
 
 impl RecorderHandle {
@@ -59,11 +61,9 @@ impl RecorderHandle {
     /// Waits until the loop has dropped its end of the ring and everything in it is written. Returns the recorder, to which the
     /// results can be added; fails if writing failed.
     pub fn join(self) -> Result<Recorder, RecordingError> {
-        self.thread.join().unwrap_or_else(|_| {
-            Err(RecordingError::Thread {
-                what: "panicked".into(),
-            })
-        })
+        let path = self.path;
+        let joined = self.thread.join();
+        joined.unwrap_or_else(|_| Err(RecordingError::Panicked { path }))
     }
 }
 
@@ -78,13 +78,19 @@ pub fn spawn(
 ) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
     let shared = Arc::clone(&health);
+    let path = recorder.path().to_path_buf();
     let thread = std::thread::Builder::new()
         .name("bench-recorder".into())
         .spawn(move || run(recorder, ring, &shared))
-        .map_err(|e| RecordingError::Thread {
-            what: format!("could not be started ({e})"),
+        .map_err(|source| RecordingError::NotStarted {
+            path: path.clone(),
+            source,
         })?;
-    Ok(RecorderHandle { thread, health })
+    Ok(RecorderHandle {
+        thread,
+        health,
+        path,
+    })
 }
 
 fn run(
