@@ -105,7 +105,7 @@ pub(super) fn in_folder(folder: Option<&Path>, path: &Path) -> Result<PathBuf, C
     };
     let failed = |e| {
         CliError::Failed(format!(
-            "cannot create the folder {}: {e}",
+            "cannot create the folder {}: {e}; choose another folder with --out",
             folder.display()
         ))
     };

@@ -127,7 +127,7 @@ fn write(args: &Args, calibration: &Calibration, recording: &str) -> Result<Stri
     let path = args.write.as_ref().unwrap_or(&beside).display().to_string();
     calibration.write_new(path.as_ref()).map_err(|e| {
         CliError::Failed(format!(
-            "cannot write {path}: {e}; name another file with --write"
+            "cannot write {path}: {e}; choose another file with --write"
         ))
     })?;
     Ok(path)

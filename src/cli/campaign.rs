@@ -180,7 +180,7 @@ fn draw(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<Pat
     let written = drawn.and_then(|svg| write_atomic(&path, &svg).map_err(|e| e.to_string()));
     written.map_err(|error| {
         let path = path.display();
-        CliError::Failed(format!("cannot draw {path}: {error}; the points are kept"))
+        CliError::Failed(format!("cannot draw {path}: {error}; start the command again to draw it (the points are stored)"))
     })?;
     Ok(path)
 }
@@ -189,7 +189,7 @@ fn draw(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<Pat
 fn config(args: &Args) -> Result<Config, CliError> {
     if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
         return Err(CliError::Usage(
-            "--operating-point and --asymmetry set what a campaign varies: leave them out, or use `bench chirp`".into(),
+            "--operating-point and --asymmetry cannot be fixed here, because a campaign varies both; leave them out, or use `bench chirp`".into(),
         ));
     }
     let bench = at_rate_of_thesis(&args.bench);
@@ -207,7 +207,7 @@ fn refuse_threads(args: &Args) -> Result<(), CliError> {
     match args.threads {
         None => Ok(()),
         Some(_) => Err(CliError::Usage(
-            "--threads is for the simulated stage; on devices one point is measured after the other: leave it out, or add --simulate".into(),
+            "--threads is valid only for the simulated stage, because on devices one point is measured after the other; leave it out, or add --simulate".into(),
         )),
     }
 }
@@ -222,7 +222,7 @@ fn at_rate_of_thesis(bench: &BenchOptions) -> BenchOptions {
     bench
 }
 
-const NO_TERMINAL: &str = "the configuration names devices: an operator must load the stage for each point of a campaign, and \
+const NO_TERMINAL: &str = "the configuration names devices, so an operator must load the stage for each point of a campaign, and \
     standard input is not a terminal; start it in a terminal, or add --simulate, or run `bench chirp \
     --operating-point Y --asymmetry D` at each point";
 const CALIBRATED_SIMULATION: &str = "`calibration.file` is set, but the simulated stage of a campaign needs no correction; leave it out";
@@ -252,13 +252,13 @@ fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, C
         asymmetry: below_one(
             asymmetry,
             &format!(
-                "--asymmetry-tolerance is {asymmetry}; it is a ratio between 0 and 1, for example 0.4% or 0.004"
+                "--asymmetry-tolerance is {asymmetry}; give a ratio between 0 and 1, for example 0.4% or 0.004"
             ),
         )?,
         operating_point: below_one(
             operating_point,
             &format!(
-                "--operating-point-tolerance is {}; it is between 0 and the beam length, for example 0.2% or 0.1mm",
+                "--operating-point-tolerance is {}; give a length between 0 and the beam length, for example 0.2% or 0.1mm",
                 args.operating_point_tolerance
             ),
         )?,

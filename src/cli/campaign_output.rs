@@ -212,7 +212,7 @@ impl<'a> Report<'a> {
     }
 }
 
-const NO_RECOMMENDATION: &str = "nothing: with every asymmetry of the range, and some initial asymmetry of the interval, an operating \
+const NO_RECOMMENDATION: &str = "none: for each asymmetry of the range, and some initial asymmetry of the interval, an operating \
     point has CNMP zeros";
 
 fn row(point: &ComparedPoint<'_>) -> Vec<String> {

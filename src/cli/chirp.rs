@@ -80,11 +80,11 @@ impl Args {
         let unused = match (&self.duration, self.sweep) {
             (Some(duration), _) => {
                 format!(
-                    "--duration {duration} is the length of a chirp; --set {key}=N changes that of `{name}`"
+                    "--duration {duration} is the length of a chirp, not of `{name}`; use --set {key}=N"
                 )
             }
             (None, Some(_)) => format!(
-                "--sweep goes with --excitation chirp only, not with `{name}`: leave it out"
+                "--sweep goes with --excitation chirp only, not with `{name}`; leave it out"
             ),
             (None, None) => return Ok(()),
         };

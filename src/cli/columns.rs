@@ -21,7 +21,7 @@ impl TableOptions {
     pub fn check(&self) -> Result<(), CliError> {
         match self.parquet {
             Some(_) if !cfg!(feature = "parquet") => Err(CliError::Usage(
-                "this `bench` was built without Parquet: build it with `--features parquet`, or take --csv FILE".into(),
+                "--parquet is not available, because this `bench` was built without Parquet; build it with `--features parquet`, or use --csv FILE".into(),
             )),
             _ => Ok(()),
         }
@@ -145,7 +145,7 @@ fn write_csv(path: &Path, columns: &[Column]) -> std::io::Result<()> {
 
 pub(super) fn cannot_write(path: &Path, error: &impl std::fmt::Display) -> CliError {
     CliError::Failed(format!(
-        "cannot write {}: {error}; free some space or choose another file",
+        "cannot write {}: {error}; free some space, or choose another file",
         path.display()
     ))
 }

@@ -73,24 +73,31 @@ pub fn main() -> Outcome {
 }
 
 fn failed(error: &CliError, json: bool) -> Outcome {
-    print_note(&error.to_string());
-    if json {
-        // If standard output is closed, the exit code still reports the failure.
-        let _ = print_json(&ErrorReport::of(error));
+    match json {
+        true => print_report(&ErrorReport::of(error)),
+        false => print_note(&error.to_string()),
     }
     error.outcome()
 }
 
 /// Help and version are requests, everything else is wrong usage.
 fn not_parsed(error: &clap::Error, json: bool) -> Outcome {
-    let _ = error.print();
-    if error.exit_code() == 0 {
-        return Outcome::Done;
+    let is_request = error.exit_code() == 0;
+    match json && !is_request {
+        true => print_report(&ErrorReport::of_usage(error)),
+        false => drop(error.print()),
     }
-    if json {
-        let _ = print_json(&ErrorReport::of_usage(error));
+    match is_request {
+        true => Outcome::Done,
+        false => Outcome::Usage,
     }
-    Outcome::Usage
+}
+
+/// The message on standard error, the object on standard output.
+fn print_report(report: &ErrorReport) {
+    print_note(report.message());
+    // If standard output is closed, the exit code still reports the failure.
+    let _ = print_json(report);
 }
 
 /// Runs a parsed command line.

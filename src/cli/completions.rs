@@ -58,6 +58,10 @@ fn write_pages(command: &Command, folder: &Path) -> Result<(), CliError> {
 fn page(command: Command) -> Result<String, CliError> {
     let mut page = Vec::new();
     let rendered = clap_mangen::Man::new(command).render(&mut page);
-    rendered.map_err(|e| CliError::Failed(format!("cannot write the manual page: {e}")))?;
+    rendered.map_err(|e| {
+        CliError::Failed(format!(
+            "cannot write the manual page: {e}; report this with the command"
+        ))
+    })?;
     Ok(String::from_utf8_lossy(&page).into_owned())
 }

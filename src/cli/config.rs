@@ -165,7 +165,7 @@ fn init(args: &InitArgs) -> Result<(), CliError> {
     let written = created.and_then(|mut file| file.write_all(args.plant.text().as_bytes()));
     written.map_err(|e| {
         CliError::Failed(format!(
-            "cannot write {file}: {e}; name another file with --out"
+            "cannot write {file}: {e}; choose another file with --out"
         ))
     })?;
     let result = serde_json::json!({ "file": file });
@@ -176,6 +176,9 @@ fn init(args: &InitArgs) -> Result<(), CliError> {
 
 /// The whole effective configuration, as in a recording.
 fn to_toml(config: &Config) -> Result<String, CliError> {
-    toml::to_string(config)
-        .map_err(|e| CliError::Failed(format!("cannot write the configuration as TOML: {e}")))
+    toml::to_string(config).map_err(|e| {
+        CliError::Failed(format!(
+            "cannot write the configuration as TOML: {e}; report this with the configuration"
+        ))
+    })
 }

@@ -166,7 +166,10 @@ fn text(report: &Report, config: &Config) -> String {
 
 fn measured_text(measured: Option<&TrackingMetrics>) -> String {
     let Some(measured) = measured else {
-        return labelled("measured", "nothing: the run did not reach a steady state");
+        return labelled(
+            "measured",
+            "no result: the run ended before the steady state",
+        );
     };
     let step = measured.step.as_ref().map(step_text);
     let steady = format!(

@@ -144,7 +144,7 @@ fn reference(text: &str) -> Result<Reference, String> {
     match std::fs::metadata(Path::new(text)) {
         Ok(_) => Ok(Reference::File(text.into())),
         Err(error) => Err(format!(
-            "neither a kind of reference nor a file: {error}; the kinds are step, hold, ramp, sine, chirp"
+            "neither a kind of reference nor a file: {error}; choose step, hold, ramp, sine, chirp, or a file"
         )),
     }
 }
@@ -195,5 +195,7 @@ impl Args {
 }
 
 fn unused(option: &str, kinds: &str) -> CliError {
-    CliError::Usage(format!("{option} goes with --reference {kinds} only"))
+    CliError::Usage(format!(
+        "{option} is valid only with --reference {kinds}; leave it out, or choose such a reference"
+    ))
 }

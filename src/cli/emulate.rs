@@ -102,11 +102,11 @@ impl Args {
         let has_probe_options =
             self.port.is_some() || self.pty.is_some() || self.measuring_rate.is_some();
         if has_probe_options && !self.emulates(EmulatedDevice::Probe) {
-            let what = "--port, --pty and --measuring-rate need the device `probe`";
+            let what = "--port, --pty and --measuring-rate are valid only for the device `probe`; add `probe`, or leave them out";
             return Err(CliError::Usage(what.into()));
         }
         if self.interface.is_some() && !self.emulates(EmulatedDevice::Amplifier) {
-            let what = "--interface needs the device `amplifier`";
+            let what = "--interface is valid only for the device `amplifier`; add `amplifier`, or leave it out";
             return Err(CliError::Usage(what.into()));
         }
         require_positive("--measuring-rate", self.measuring_rate)?;
@@ -125,7 +125,9 @@ impl Args {
 fn require_positive(option: &str, value: Option<f64>) -> Result<(), CliError> {
     match value.is_none_or(|value| value > 0.0) {
         true => Ok(()),
-        false => Err(CliError::Usage(format!("{option} must be above zero"))),
+        false => Err(CliError::Usage(format!(
+            "{option} is not above 0; give a value above 0"
+        ))),
     }
 }
 
@@ -134,8 +136,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.settings())?;
     let log = args.log.as_deref().map(LogFile::create).transpose()?;
     let signals = watch_signals();
-    let (runtime, signals) =
-        signals.map_err(|e| CliError::Failed(format!("cannot watch for signals: {e}")))?;
+    let (runtime, signals) = signals.map_err(|e| {
+        CliError::Failed(format!(
+            "cannot install the handlers of SIGINT and SIGTERM: {e}; start the command again"
+        ))
+    })?;
     let mut server = Server::start(args, &config, log)?;
     runtime.block_on(server.serve(signals))?;
     if args.bench.json {
@@ -218,7 +223,7 @@ impl<'a> Server<'a> {
                 }
             }
             _ => print_note(&format!(
-                "`{line}` is not a command; the commands are fault KIND, quit, help"
+                "`{line}` is not a command; use fault KIND, quit or help"
             )),
         }
     }
@@ -277,7 +282,9 @@ impl LogFile {
     fn create(path: &Path) -> Result<LogFile, CliError> {
         let file = File::create(path).map_err(|e| {
             let path = path.display();
-            CliError::Usage(format!("cannot write {path}: {e}; choose another --log"))
+            CliError::Usage(format!(
+                "cannot write {path}: {e}; choose another file with --log"
+            ))
         })?;
         let path = path.to_owned();
         Ok(LogFile { file, path })
@@ -286,7 +293,9 @@ impl LogFile {
     fn write(&mut self, entry: &LogEntry) -> Result<(), CliError> {
         self.append(entry).map_err(|e| {
             let path = self.path.display();
-            CliError::Failed(format!("cannot write {path}: {e}; free some space"))
+            CliError::Failed(format!(
+                "cannot write {path}: {e}; free some space, or choose another file with --log"
+            ))
         })
     }
 

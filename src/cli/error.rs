@@ -9,6 +9,7 @@ use crate::experiment::{ExperimentError, PlanError};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
 use crate::model::study::StudyError;
+use crate::util::remedy;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
@@ -199,17 +200,18 @@ impl ErrorReport {
 
     /// The report of a command line that cannot be parsed.
     pub(super) fn of_usage(error: &clap::Error) -> ErrorReport {
-        let message = error.to_string();
         let argument = error.get(ContextKind::InvalidArg);
         let place = argument.map(|argument| argument.to_string());
-        ErrorReport::new(message.trim_end().into(), ErrorKind::Usage, place)
+        ErrorReport::new(usage_message(error), ErrorKind::Usage, place)
     }
 
-    /// Takes the text after the first `; ` of the message as the remedy.
+    /// The text of the error.
+    pub(super) fn message(&self) -> &str {
+        &self.error.message
+    }
+
     fn new(message: String, kind: ErrorKind, place: Option<String>) -> ErrorReport {
-        let remedy = message
-            .split_once("; ")
-            .map(|(_, remedy)| remedy.to_string());
+        let remedy = remedy::split(&message).1.map(String::from);
         ErrorReport {
             error: ErrorObject {
                 message,
@@ -218,5 +220,26 @@ impl ErrorReport {
                 remedy,
             },
         }
+    }
+}
+
+/// The first paragraph of the parser's message, on one line and with a remedy: the messages of our own value parsers have
+/// one already.
+fn usage_message(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let paragraph = text.split("\n\n").next().unwrap_or_default();
+    let words: Vec<&str> = paragraph.split_whitespace().collect();
+    let what = words.join(" ");
+    let what = what.strip_prefix("error: ").unwrap_or(&what);
+    let suggestions = [
+        ContextKind::SuggestedArg,
+        ContextKind::SuggestedSubcommand,
+        ContextKind::SuggestedValue,
+    ];
+    let suggested = suggestions.into_iter().find_map(|kind| error.get(kind));
+    match (remedy::split(what).1, suggested) {
+        (Some(_), _) => what.to_string(),
+        (None, Some(suggested)) => remedy::join(what, &format!("use {suggested}, or see --help")),
+        (None, None) => remedy::join(what, "see --help for the arguments"),
     }
 }

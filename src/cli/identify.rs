@@ -74,10 +74,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 fn check_kind(kind: RunKind, path: &Path) -> Result<(), CliError> {
     let what = match kind {
         RunKind::Chirp | RunKind::Control => return Ok(()),
-        RunKind::Calibrate => "is the recording of static steps, which `bench calibrate` analyses",
+        RunKind::Calibrate => {
+            "is the recording of static steps of `bench calibrate`; choose a recording of `bench chirp` or `bench control`"
+        }
         RunKind::Quiet => {
-            "is a quiet run of `bench campaign`, without current: \
-             it only contains the rest position of the stage"
+            "is a run of `bench campaign` without current, which only contains the rest position of the stage; \
+             choose a recording of `bench chirp` or `bench control`"
         }
     };
     Err(CliError::Usage(format!("{} {what}", path.display())))

@@ -104,7 +104,7 @@ impl ExternalOptions {
         let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
             let (file, names) = (path.display(), names(path)?);
             return Err(CliError::Usage(format!(
-                "which columns of {file}? --input COLUMN --output COLUMN of {names}"
+                "{file}: input and output column are not selected; give --input COLUMN and --output COLUMN (columns: {names})"
             )));
         };
         Ok(Columns {
@@ -121,7 +121,7 @@ impl ExternalOptions {
             (None, None) => {
                 let names = names(path)?;
                 Err(CliError::Usage(format!(
-                    "when were the lines sampled? --time COLUMN (of {names}) or --rate HZ"
+                    "the sampling times of the lines are not known; give --time COLUMN (columns: {names}) or --rate HZ"
                 )))
             }
         }
@@ -137,7 +137,7 @@ impl ExternalOptions {
         });
         limits.ok_or_else(|| {
             CliError::Usage(format!(
-                "--band {text}: it must be two frequencies, as in 11Hz:250Hz"
+                "--band {text} is not a band; give two frequencies, as in 11Hz:250Hz"
             ))
         })
     }
@@ -148,7 +148,7 @@ impl ExternalOptions {
         };
         let period = period_samples(text, rate_hz).ok_or_else(|| {
             CliError::Usage(format!(
-                "--period {text}: it must be a whole number of samples, or seconds that make one at {rate_hz} Hz, as in 2500 or 1s"
+                "--period {text} is not a whole number of samples at {rate_hz} Hz; give a number of samples (2500) or a time that is a multiple of the sampling period (1s)"
             ))
         })?;
         let skip = self.skip_periods.unwrap_or(0);
@@ -238,7 +238,7 @@ impl Report {
         let coherence = self.coherence_median.unwrap_or(0.0);
         let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "{}{}\n{}  residues   in `{output}` per `{input}` and s^2, in place of 1/kg below\n  fit        reduced chi-square {chi2:.3}\n{}",
+            "{}{}\n{}  residues   in `{output}`/(`{input}` s^2) instead of the 1/kg in the table\n  fit        reduced chi-square {chi2:.3}\n{}",
             self.record_text(),
             response_text(&self.frf_csv, self.frequencies, coherence),
             pages_text(&self.pages),

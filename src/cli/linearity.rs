@@ -64,7 +64,7 @@ impl Args {
             return Ok(scales);
         }
         Err(CliError::Usage(format!(
-            "--scales {scales:?}: two to {MAX_AMPLITUDES} different ratios above 0 are needed, for example 0.5,1,2"
+            "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios above 0, for example 0.5,1,2"
         )))
     }
 

@@ -82,7 +82,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The margins with their names; `null` where the loop is unstable.
 fn margins_json(margins: &Margins) -> Result<Value, CliError> {
-    let failed = |e| CliError::Failed(format!("cannot write JSON: {e}"));
+    let failed = |e| {
+        CliError::Failed(format!(
+            "cannot write JSON: {e}; report this with the command"
+        ))
+    };
     let mut json = serde_json::to_value(margins).map_err(failed)?;
     if let (false, Some(object)) = (margins.stable, json.as_object_mut()) {
         let figures = object.iter_mut().filter(|(_, value)| value.is_number());
@@ -142,19 +146,24 @@ pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
 /// Refuses a loop with less than the configured modulus margin.
 pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Result<(), CliError> {
     let least = config.control.min_modulus_margin;
-    let found = match margins.stable {
+    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
+    let why = match margins.stable {
         true if margins.modulus_margin < least => {
-            format!("the modulus margin is {:.3}", margins.modulus_margin)
+            let margin = margins.modulus_margin;
+            format!(
+                "the modulus margin of the {name} controller at {rate_hz} Hz is {margin:.3}, below"
+            )
         }
-        false if least > 0.0 => "the closed loop is unstable and has no modulus margin".into(),
+        false if least > 0.0 => {
+            format!(
+                "the loop with the {name} controller at {rate_hz} Hz is unstable, so its modulus margin is below"
+            )
+        }
         _ => return Ok(()),
     };
-    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
     Err(CliError::Margin {
-        why: format!(
-            "with the {name} controller at {rate_hz} Hz {found}, at least {least} is required (control.min_modulus_margin)"
-        ),
-        alternative: "lower control.min_modulus_margin if you know better",
+        why: format!("{why} the limit of {least} (control.min_modulus_margin)"),
+        alternative: "lower control.min_modulus_margin if a smaller margin is acceptable",
     })
 }
 
@@ -166,7 +175,7 @@ pub(super) fn require_stability(config: &Config, margins: &Margins) -> Result<()
     let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
     Err(CliError::Margin {
         why: format!(
-            "with the {name} controller at {rate_hz} Hz the closed loop is unstable by the model, and such a loop is \
+            "the loop with the {name} controller at {rate_hz} Hz is unstable by the model, and such a loop is \
              never run on devices"
         ),
         alternative: "add --simulate to run it on the simulated stage",
@@ -181,7 +190,7 @@ fn chain_text(config: &Config) -> String {
         false => String::new(),
     };
     format!(
-        "{} Hz, hold, {} of computing delay, amplifier of {} Hz{latency}{}",
+        "sampling at {} Hz, zero-order hold, {} of computing delay, amplifier bandwidth {} Hz{latency}{}",
         servo.rate_hz,
         periods_text(servo.computing_delay_periods),
         amplifier.bandwidth_hz,

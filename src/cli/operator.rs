@@ -128,9 +128,12 @@ fn reply(line: &str, question: &Question, beam_length_m: Option<f64>) -> Result<
 fn refusal(line: &str, question: &Question) -> String {
     let is_number = line.parse::<f64>().is_ok_and(f64::is_finite);
     if question.may_read && is_number {
-        return format!("`{line}` has no unit: type {line}mm or {line}um");
+        return format!("`{line}` has no unit; type {line}mm or {line}um");
     }
-    format!("`{line}` is not accepted here: {}", choices(question))
+    format!(
+        "`{line}` is not an answer to this question; give {}",
+        choices(question)
+    )
 }
 
 /// A displacement with its unit. A bare number is refused: it may be in millimetres or in metres.
@@ -201,12 +204,12 @@ mod tests {
             [done(0.0035), done(-0.002), done(0.004)]
         );
         let error = open("3.8").unwrap_err();
-        assert_eq!(error, "`3.8` has no unit: type 3.8mm or 3.8um");
+        assert_eq!(error, "`3.8` has no unit; type 3.8mm or 3.8um");
         for line in ["yes", "nan", "infmm", "skip it"] {
             assert!(
                 open(line)
                     .unwrap_err()
-                    .contains("is not accepted here: Enter when done"),
+                    .contains("is not an answer to this question; give Enter when done"),
                 "{line}"
             );
         }

@@ -49,7 +49,7 @@ impl SeedOption {
         match self.seed {
             None => Ok(()),
             Some(seed) => Err(CliError::Usage(format!(
-                "--seed {seed} is for the simulated stage and has no effect on devices: leave it out, or add --simulate"
+                "--seed {seed} is for the simulated stage and has no effect on devices; leave it out, or add --simulate"
             ))),
         }
     }
@@ -120,10 +120,10 @@ pub(super) fn given<D>(
 /// Refuses an option for a setting that the model does not have.
 fn require(plant: &PlantSettings, value: Option<f64>, option: &str) -> Result<(), CliError> {
     let model = plant.model();
-    let settings = "`bench config show` lists its settings, --set KEY=VALUE changes one";
+    let settings = "see its settings with `bench config show`, and set one with --set KEY=VALUE";
     value.map(drop).ok_or_else(|| {
         CliError::Usage(format!(
-            "{option} has no meaning for the model `{model}`; {settings}"
+            "{option} is not a setting of the model `{model}`; {settings}"
         ))
     })
 }

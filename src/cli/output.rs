@@ -8,8 +8,11 @@ use super::error::CliError;
 
 /// Prints the one JSON object of a command.
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| CliError::Failed(format!("cannot write JSON: {e}")))?;
+    let text = serde_json::to_string_pretty(value).map_err(|e| {
+        CliError::Failed(format!(
+            "cannot write JSON: {e}; report this with the command"
+        ))
+    })?;
     print_text(&format!("{text}\n"))
 }
 
@@ -33,7 +36,7 @@ pub(super) fn print_text(text: &str) -> Result<(), CliError> {
         .and_then(|()| output.flush());
     match written {
         Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => Err(CliError::Failed(format!(
-            "cannot write to standard output: {e}"
+            "cannot write to standard output: {e}; check where the output is redirected to"
         ))),
         _ => Ok(()),
     }

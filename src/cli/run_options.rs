@@ -45,7 +45,7 @@ impl RunOptions {
     fn pace(&self, config: &Config) -> Result<Pace, CliError> {
         match (self.pace, self.is_simulated(config)) {
             (Some(Pace::Virtual), false) => Err(CliError::Usage(
-                "--pace virtual is for the simulated stage, and devices run in real time: leave it out, or add --simulate".into(),
+                "--pace virtual is valid only for the simulated stage, because devices run in real time; leave it out, or add --simulate".into(),
             )),
             (Some(pace), _) => Ok(pace),
             (None, true) => Ok(Pace::Virtual),

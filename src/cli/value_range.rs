@@ -33,7 +33,7 @@ impl<T> ValueRange<T> {
         value: impl Fn(&str) -> Result<T, QuantityError>,
     ) -> Result<ValueRange<T>, String> {
         let [from, to, count] = text.split(':').collect::<Vec<_>>()[..] else {
-            return Err(format!("write FROM:TO:COUNT, as in {example}"));
+            return Err(format!("not a range; write FROM:TO:COUNT, as in {example}"));
         };
         let value = |text| value(text).map_err(|error| error.to_string());
         Ok(ValueRange {
@@ -66,7 +66,7 @@ impl<T: Display> ValueRange<T> {
     fn spaced(&self, option: &str, from: f64, to: f64) -> Result<Vec<f64>, CliError> {
         if from == to {
             return Err(CliError::Usage(format!(
-                "{option}: an empty sweep, FROM ({}) and TO ({}) are equal; give two values",
+                "{option}: FROM ({}) and TO ({}) are equal; give two different values",
                 self.from, self.to
             )));
         }
@@ -79,5 +79,5 @@ impl<T: Display> ValueRange<T> {
 fn count_of(text: &str) -> Result<usize, String> {
     let count = text.trim().parse().ok();
     let count = count.filter(|count| (2..=MOST).contains(count));
-    count.ok_or_else(|| format!("COUNT is a whole number from 2 to {MOST}"))
+    count.ok_or_else(|| format!("COUNT `{text}` is invalid; give a whole number from 2 to {MOST}"))
 }

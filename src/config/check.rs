@@ -180,23 +180,19 @@ impl Checker<'_> {
         }
         let required = keywords.words("required").into_iter();
         for key in required.filter(|key| !entries.contains_key(*key)) {
-            let what = "is missing; this kind of table needs it".into();
+            let what = "is missing; add it (this kind of table requires it)".into();
             self.add_missing(&join(path, key), what);
         }
     }
 
     fn array(&mut self, keywords: &Keywords, items: &[Value], path: &str) {
         let limit = |key| keywords.0.get(key).and_then(Json::as_u64);
-        let (min, max) = (
-            limit("minItems").unwrap_or(0),
-            limit("maxItems").unwrap_or(u64::MAX),
-        );
+        let min = limit("minItems").unwrap_or(0);
+        let max = limit("maxItems");
         let count = items.len() as u64;
-        if !(min..=max).contains(&count) {
-            self.add(
-                path,
-                format!("has {count} entries; {min} to {max} are allowed"),
-            );
+        if !(min..=max.unwrap_or(u64::MAX)).contains(&count) {
+            let allowed = max.map_or(format!("at least {min}"), |max| format!("{min} to {max}"));
+            self.add(path, format!("has {count} entries; give {allowed}"));
         }
         let Some(schema) = keywords.0.get("items") else {
             return;
@@ -212,11 +208,10 @@ impl Checker<'_> {
         if x.is_finite() && is_inside {
             return;
         }
-        let bound = |b: Option<f64>| b.map_or("any".to_string(), |b| format!("{b}"));
         let dimension = Dimension::of_key(path);
         let (is, unit) = (dimension.display(x), dimension.si_unit());
-        let allowed = format!("{} to {} {unit}", bound(min), bound(max));
-        self.add(path, format!("is {is}; allowed is {}", allowed.trim_end()));
+        let allowed = format!("{} {unit}", range_text(min, max));
+        self.add(path, format!("is {is}; give {}", allowed.trim_end()));
     }
 
     fn text(&mut self, keywords: &Keywords, word: &str, path: &str) {
@@ -224,6 +219,16 @@ impl Checker<'_> {
         if !words.is_empty() && !words.contains(&word) {
             self.add(path, not_one_of(&format!("{word:?}"), &words));
         }
+    }
+}
+
+/// A range in words.
+fn range_text(min: Option<f64>, max: Option<f64>) -> String {
+    match (min, max) {
+        (Some(min), Some(max)) => format!("a value from {min} to {max}"),
+        (Some(min), None) => format!("at least {min}"),
+        (None, Some(max)) => format!("at most {max}"),
+        (None, None) => "a finite value".into(),
     }
 }
 
@@ -254,11 +259,13 @@ fn tag_of(variant: &Json) -> Option<String> {
 
 fn unknown_key(table: &str, key: &str, properties: &Map<String, Json>) -> String {
     if let Some(new) = new_name(&join(table, key)) {
-        return format!("is an earlier name; it is called `{new}` now");
+        return format!("was renamed; use `{new}`");
     }
     match nearest(key, properties.keys().map(String::as_str)) {
-        Some(nearest) => format!("is not a setting; the nearest is `{nearest}`"),
-        None => "is not a setting; this table has none".into(),
+        Some(nearest) => {
+            format!("is not a setting; check the spelling (the nearest is `{nearest}`)")
+        }
+        None => "is not a setting; leave it out (this table has no settings)".into(),
     }
 }
 
@@ -283,14 +290,19 @@ fn wrong_type(keywords: &Keywords, given: &Value, path: &str) -> String {
     match quantity.filter(|_| kind == "number") {
         Some(quantity) => text_for_number(given, &quantity, path),
         None => format!(
-            "is {given}, of the type {}; {wanted} is expected",
+            "is {given}, of the type {}; give {wanted}",
             given.type_str()
         ),
     }
 }
 
 fn text_for_number(given: &Value, quantity: &Quantity, path: &str) -> String {
-    let si = quantity.si(Dimension::of_key(path));
-    let remedy = si.map_or_else(|error| error.to_string(), |x| format!("write {x}"));
-    format!("is the text {given}, not a number; settings are in SI units: {remedy}")
+    let dimension = Dimension::of_key(path);
+    match quantity.si(dimension) {
+        Ok(x) => format!("is the text {given}, not a number; write {x} (settings are in SI units)"),
+        Err(_) => {
+            let needed = dimension.description();
+            format!("is the text {given}, not a number; write {needed} as a number in SI units")
+        }
+    }
 }

@@ -50,17 +50,17 @@ fn travel(config: &Config, errors: &mut Errors) {
     let range_m = config.probe.range_m / 2.0;
     let path = "interlock.soft_limit_m";
     errors.require(soft_m < stop_m, path, || {
-        format!("is {soft_m} m; it must lie inside the stop at {stop_m} m")
+        format!("is {soft_m} m, not inside the stop at {stop_m} m; lower it")
     });
     errors.require(soft_m <= range_m, path, || {
-        format!("is {soft_m} m, beyond the range of the probe, {range_m} m (half of probe.range_m)")
+        format!("is {soft_m} m, above half the range of the probe, {range_m} m; lower it (probe.range_m is the full range)")
     });
 }
 
 fn force(motor: &MotorSettings, errors: &mut Errors) {
     let (continuous_n, peak_n) = (motor.continuous_force_n, motor.peak_force_n);
     errors.require(continuous_n <= peak_n, "motor.continuous_force_n", || {
-        format!("is {continuous_n} N, above the peak force of {peak_n} N")
+        format!("is {continuous_n} N, above the peak force of {peak_n} N; lower it, or correct motor.peak_force_n")
     });
 }
 
@@ -70,11 +70,11 @@ fn staleness(config: &Config, errors: &mut Errors) {
     let oldest_s = probe.age_at_arrival_s() + probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
     let path = "interlock.probe_stale_s";
     errors.require(stale_s >= period_s, path, || {
-        format!("is {stale_s} s, shorter than a tick of {period_s} s")
+        format!("is {stale_s} s, shorter than a tick of {period_s} s; raise it")
     });
     errors.require(stale_s > oldest_s, path, || {
         format!(
-            "is {stale_s} s, but a reading may be {oldest_s} s old before the next one (probe.latency_s, transport_s, rate_hz)"
+            "is {stale_s} s, but in normal operation a reading is up to {oldest_s} s old (probe.latency_s + transport_s + 1/rate_hz); set a larger value"
         )
     });
 }
@@ -82,18 +82,16 @@ fn staleness(config: &Config, errors: &mut Errors) {
 fn band(config: &Config, errors: &mut Errors) {
     let (start_hz, stop_hz) = (config.chirp.start_hz, config.chirp.stop_hz);
     errors.require(start_hz != stop_hz, "chirp.stop_hz", || {
-        format!(
-            "is {stop_hz} Hz, but the sweep starts at {start_hz} Hz; a sweep needs two frequencies"
-        )
+        format!("is {stop_hz} Hz, and the sweep starts at {start_hz} Hz too; give two frequencies")
     });
     let nyquist_hz = config.servo.rate_hz / 2.0;
     let probe_hz = config.probe.rate_hz.unwrap_or(f64::INFINITY) / 2.0;
     for (path, hz) in [("chirp.start_hz", start_hz), ("chirp.stop_hz", stop_hz)] {
         errors.require(hz < nyquist_hz, path, || {
-            format!("is {hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz")
+            format!("is {hz} Hz, not below half the servo rate of {nyquist_hz} Hz; lower it, or raise loop.rate_hz")
         });
         errors.require(hz < probe_hz, path, || {
-            format!("is {hz} Hz; the probe measures frequencies below half its rate, {probe_hz} Hz")
+            format!("is {hz} Hz, not below half the rate of the probe, {probe_hz} Hz; lower it")
         });
     }
 }
@@ -106,7 +104,7 @@ fn excitation(config: &Config, errors: &mut Errors) {
     errors.require(ticks <= MAX_TICKS, length.key, || {
         let unit = if length.key.ends_with("_s") { " s" } else { "" };
         format!(
-            "is {value}{unit}, with the quiet before and after {ticks} ticks; {MAX_TICKS} can be analysed as one record: shorten it or lower loop.rate_hz"
+            "is {value}{unit}: including the rest before and after, the run has {ticks} ticks, above the limit of {MAX_TICKS} for one record; shorten it, or lower loop.rate_hz"
         )
     });
     errors.0.extend(chosen.design.check(&chosen.shared));
@@ -115,14 +113,15 @@ fn excitation(config: &Config, errors: &mut Errors) {
 fn fades_and_amplitude(chirp: &ChirpSettings, errors: &mut Errors) {
     let (fades_s, duration_s) = (chirp.fade_in_s + chirp.fade_out_s, chirp.duration_s);
     errors.require(fades_s <= duration_s, "chirp.duration_s", || {
-        format!("is {duration_s} s, shorter than both fades, {fades_s} s")
+        format!("is {duration_s} s, shorter than the two fades of {fades_s} s together; raise it, or shorten the fades")
     });
     let frequencies = chirp.amplitude.iter().map(|point| point.frequency_hz);
     let is_rising = frequencies.is_sorted_by(|a, b| a < b);
     errors.require(is_rising, "chirp.amplitude", || NOT_RISING.into());
 }
 
-const NOT_RISING: &str = "has frequencies that do not rise from point to point";
+const NOT_RISING: &str =
+    "has frequencies that do not rise from point to point; sort the points by frequency";
 
 fn resolution(settings: &IdentifySettings, errors: &mut Errors) {
     let IdentifySettings::Local(local) = settings else {

@@ -25,19 +25,35 @@ pub enum ConfigError {
         why: String,
     },
     /// The text is not TOML.
-    #[error("{place} is not TOML: {why}")]
+    #[error("{place} is not TOML; correct the line shown: {why}")]
     Syntax {
         /// File or flag.
         place: String,
         /// The parser's error message, with line and column.
         why: String,
     },
+    /// A text that is not `KEY=VALUE`.
+    #[error("--set {text}: {why}; write KEY=VALUE, as in plant.mass_asymmetry=0.05")]
+    Assignment {
+        /// The text.
+        text: String,
+        /// What is wrong.
+        why: &'static str,
+    },
     /// Keys, types, ranges or their combination are wrong.
-    #[error("refused:\n{}", .0.join("\n"))]
+    #[error("{}", refused(.0))]
     Refused(
         /// One line for each error, with its location in the configuration.
         Vec<String>,
     ),
+}
+
+fn refused(lines: &[String]) -> String {
+    let text = lines.join("\n");
+    match lines.len() {
+        1 => format!("the configuration is refused:\n{text}"),
+        errors => format!("the configuration has {errors} errors; correct each of them:\n{text}"),
+    }
 }
 
 impl ConfigError {
@@ -47,6 +63,7 @@ impl ConfigError {
             ConfigError::NotFound { name, .. } => Some(name.clone()),
             ConfigError::Unreadable { path, .. } => Some(path.display().to_string()),
             ConfigError::Syntax { place, .. } => Some(place.clone()),
+            ConfigError::Assignment { text, .. } => Some(format!("--set {text}")),
             ConfigError::Refused(findings) => {
                 let (place, _) = findings.first()?.split_once(": `")?;
                 Some(place.trim().to_string())

@@ -39,7 +39,7 @@ impl OptionSetting {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
-    /// `; did you mean 8mm?` for a number without a unit that would be allowed with one.
+    /// ` (did you mean 8mm?)` for a number without a unit that would be allowed with one.
     fn hint(&self, path: &str, schema: &Json, merged: &Value) -> String {
         let number = self.option.rsplit(' ').next();
         let number = number.and_then(|text| text.parse::<f64>().ok());
@@ -51,7 +51,7 @@ impl OptionSetting {
         }
         match readings(number, path, &allowed).as_slice() {
             [] => String::new(),
-            readings => format!("; did you mean {}?", readings.join(" or ")),
+            readings => format!(" (did you mean {}?)", readings.join(" or ")),
         }
     }
 }
@@ -94,9 +94,9 @@ pub(super) fn in_terms_of_option(
 pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
     let mut table = Table::new();
     for set in sets {
-        let (key, value) = key_and_value(set).map_err(|why| ConfigError::Syntax {
-            place: format!("--set {set}"),
-            why: why.into(),
+        let (key, value) = key_and_value(set).map_err(|why| ConfigError::Assignment {
+            text: set.clone(),
+            why,
         })?;
         overlay_at(&mut table, key, value);
     }
@@ -110,7 +110,7 @@ pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
 
 fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
     let split = set.split_once('=');
-    let (key, text) = split.ok_or("write KEY=VALUE, as in plant.mass_asymmetry=0.05")?;
+    let (key, text) = split.ok_or("there is no `=`")?;
     let (key, text) = (key.trim(), text.trim());
     if key.split('.').any(str::is_empty) {
         return Err("the key has an empty part");

@@ -30,7 +30,7 @@ fn asymmetry_offset(config: &Config) -> Option<Finding> {
         return (offset != 0.0).then(|| Finding::new("sim.asymmetry_offset", what));
     };
     let what = format!(
-        "is {offset}, which together with plant.mass_asymmetry = {asymmetry} is below {MIN_ASYMMETRY}: m2 would be too small"
+        "is {offset}, which together with plant.mass_asymmetry = {asymmetry} is below {MIN_ASYMMETRY}, where m2 is too small; raise one of the two"
     );
     (asymmetry + offset < MIN_ASYMMETRY).then(|| Finding::new("sim.asymmetry_offset", what))
 }

@@ -124,7 +124,7 @@ pub enum ControllerError {
     },
     /// A prewarping frequency above half the servo rate.
     #[error(
-        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s; at this servo rate it must lie below {limit_rad_s:.1} rad/s"
+        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s, but the limit at this servo rate is {limit_rad_s:.1} rad/s; lower the frequency, or raise loop.rate_hz"
     )]
     Prewarp {
         /// The controller.
@@ -146,12 +146,12 @@ pub enum ControllerError {
     },
     /// A law of another kind where sections are needed.
     #[error(
-        "the controller is not a cascade of continuous sections, which this needs; choose one with `[[section]]`"
+        "the controller is not a cascade of continuous sections; choose one with `[[section]]` tables, which this command needs"
     )]
     NotSections,
     /// A law without a linear description.
     #[error(
-        "the control law offers no linear description, so its stability and margins cannot be computed"
+        "the control law offers no linear description, so its stability and margins cannot be computed; choose another controller"
     )]
     NotLinear,
 }

@@ -30,7 +30,7 @@ pub enum SectionError {
     },
     /// A pole in the right half plane, or more than one at the origin.
     #[error(
-        "is unstable: it has a pole at {re_rad_s:.4} {im_rad_s:+.4}j rad/s; poles must lie left of the imaginary axis, one at the origin excepted"
+        "is unstable: it has a pole at {re_rad_s:.4} {im_rad_s:+.4}j rad/s; move the pole to the left of the imaginary axis (only a single pole at the origin is allowed)"
     )]
     Unstable {
         /// Real part.
@@ -39,7 +39,9 @@ pub enum SectionError {
         im_rad_s: f64,
     },
     /// A coefficient that is not finite, or a denominator whose coefficients are all 0.
-    #[error("has a denominator of zeros or a coefficient that is not finite")]
+    #[error(
+        "has a denominator whose coefficients are all 0, or a coefficient that is not finite; correct its coefficients"
+    )]
     Degenerate,
 }
 

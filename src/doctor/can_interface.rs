@@ -201,7 +201,7 @@ fn queue(name: &str, length: u32) -> Finding {
         }
         4..=100 => Subject::CanQueue.ok(what),
         _ => {
-            let what = format!("{what}: outdated set-points may wait there");
+            let what = format!("{what}: set-points may be queued and arrive late");
             Subject::CanQueue.note(what, remedy)
         }
     }

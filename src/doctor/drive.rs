@@ -124,7 +124,8 @@ fn rated_current(actual_a: Option<f64>, settings: &DriveSettings) -> Finding {
     }
     DRIVE.failure(
         format!(
-            "the rated current (0x6075) is {actual_a} A, the configuration states {configured_a} A: every current would be wrong"
+            "the rated current (0x6075) is {actual_a} A, but {configured_a} A is configured: every current would be wrong by the factor {:.3}",
+            actual_a / configured_a
         ),
         "correct amplifier.device.rated_current_a, or the drive with its commissioning program",
     )
@@ -154,7 +155,7 @@ fn count(reference_a: f64, limit_a: f64) -> Finding {
     };
     let count_ma = scale.step_a() * 1e3;
     DRIVE.ok(format!(
-        "a count is {count_ma:.3} mA, the limit is {limit_a} A"
+        "resolution of the current {count_ma:.3} mA per count, current limit {limit_a} A"
     ))
 }
 
@@ -163,7 +164,7 @@ fn maximum(actual: Option<f64>, configured: f64) -> Result<f64, Finding> {
     match actual {
         Some(ratio) if (ratio - configured).abs() < TOLERANCE => Ok(ratio),
         Some(ratio) => Err(DRIVE.warning(
-            format!("the maximum (0x6072) is {ratio} of the rated current, the configuration states {configured}"),
+            format!("the maximum (0x6072) is {ratio} of the rated current, but {configured} is configured"),
             "correct amplifier.device.maximum_current_ratio: the resolution of the current depends on it",
         )),
         None => Err(DRIVE.failure(
@@ -183,7 +184,7 @@ fn mode(supported: Option<u32>, settings: &DriveSettings) -> Finding {
     match settings.mode.choose(supported) {
         Some(CYCLIC_TORQUE) => DRIVE.ok("mode of a run: cyclic synchronous torque (10)"),
         Some(mode) => DRIVE.ok(format!(
-            "mode of a run: profile torque ({mode}), with its slope"
+            "mode of a run: profile torque ({mode}), whose torque slope (0x6087) limits the rate of the current"
         )),
         None => DRIVE.failure(
             format!("the drive has none of the configured modes (0x6502 is 0x{supported:08X})"),
@@ -338,7 +339,7 @@ mod tests {
     fn a_healthy_drive_is_ok() {
         assert_eq!(not_ok(&healthy(), &DriveSettings::default()), []);
         let found = findings(&healthy(), &maximum_reference(), 1.5);
-        let expected = "a count is 6.000 mA, the limit is 4 A";
+        let expected = "resolution of the current 6.000 mA per count, current limit 4 A";
         assert!(found.iter().any(|f| f.what == expected), "{found:?}");
     }
 
@@ -349,7 +350,7 @@ mod tests {
             (
                 |i| i.rated_current_a = Some(2.0),
                 Failure,
-                "is 2 A, the configuration states 4 A",
+                "is 2 A, but 4 A is configured: every current would be wrong by the factor 0.500",
             ),
             (|i| i.rated_current_a = None, Failure, "0x6075"),
             (|i| i.modes = Some(1), Failure, "0x6502 is 0x00000001"),

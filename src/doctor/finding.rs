@@ -4,6 +4,8 @@ use std::fmt::Display;
 
 use serde::Serialize;
 
+use crate::util::remedy;
+
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -111,8 +113,9 @@ impl Subject {
 
     /// The run does not start because of an error, whose text is `what; remedy`.
     pub fn refused(self, error: &impl Display) -> Finding {
-        let (what, remedy) = split_remedy(&error.to_string());
-        Finding::new(self, Severity::Failure, what, remedy)
+        let text = error.to_string();
+        let (what, remedy) = remedy::split(&text);
+        Finding::new(self, Severity::Failure, what, remedy.map(String::from))
     }
 }
 
@@ -151,14 +154,6 @@ impl Finding {
             severity: self.severity.min(limit),
             ..self
         }
-    }
-}
-
-/// The two parts of a text `what; remedy`.
-pub(super) fn split_remedy(text: &str) -> (String, Option<String>) {
-    match text.split_once("; ") {
-        Some((what, remedy)) => (what.to_string(), Some(remedy.to_string())),
-        None => (text.to_string(), None),
     }
 }
 

@@ -218,7 +218,7 @@ fn validity(readings: &Readings) -> Option<Finding> {
 
 fn rate(actual_hz: f64, configured_hz: Option<f64>) -> Option<Finding> {
     let configured_hz = configured_hz?;
-    let what = format!("{actual_hz:.0} readings per second; probe.rate_hz is {configured_hz}");
+    let what = format!("{actual_hz:.0} readings per second, but probe.rate_hz is {configured_hz}");
     let remedy = "set probe.rate_hz to the actual rate: margins and simulation depend on it";
     Some(match actual_hz / configured_hz {
         ..0.9 => Subject::Readings.warning(what, remedy),
@@ -232,15 +232,16 @@ fn age(readings: &Readings, probe: &ProbeSettings, stale_s: f64) -> Finding {
     let half_period_s = probe.rate_hz.map_or(0.0, |rate_hz| 0.5 / rate_hz);
     let expected_s = probe.age_at_arrival_s() + half_period_s;
     let what = format!(
-        "mean age {}, largest age {}; by the configuration the mean is {} and the limit {}",
+        "mean age {}, largest age {}; configured: mean {}, limit {}",
         milliseconds(readings.age_mean_s),
         milliseconds(readings.age_max_s),
         milliseconds(expected_s),
         milliseconds(stale_s)
     );
     if readings.age_max_s > stale_s {
-        let remedy =
-            format!("{AGE_REMEDY}; or raise interlock.probe_stale_s if the loop allows it");
+        let remedy = format!(
+            "{AGE_REMEDY}; or raise interlock.probe_stale_s after checking the loop with `bench margins`"
+        );
         Subject::Readings.failure(what, remedy)
     } else if readings.age_mean_s > 1.2 * expected_s {
         Subject::Readings.warning(what, AGE_REMEDY)
@@ -385,7 +386,7 @@ mod tests {
             (
                 |r| r.rate_hz = 500.0,
                 Warning,
-                "500 readings per second; probe.rate_hz is 650",
+                "500 readings per second, but probe.rate_hz is 650",
             ),
             (|r| r.rate_hz = 900.0, Note, "900 readings per second"),
             (|r| r.age_mean_s = 0.0031, Warning, "mean age 3.10 ms"),

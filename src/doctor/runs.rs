@@ -61,7 +61,7 @@ pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
 fn judge_margins(margins: &Margins, min_modulus_margin: f64) -> Finding {
     if !margins.stable {
         return Subject::Control.warning(
-            "the closed loop is unstable by the model and no modulus margin is required: the run would trip",
+            "the closed loop is unstable in the model, and no modulus margin is required: the run would trip",
             "choose another controller (--controller FILE), or set control.min_modulus_margin to refuse such loops",
         );
     }

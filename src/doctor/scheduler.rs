@@ -5,10 +5,11 @@ use nix::sched::{CpuSet, sched_getaffinity};
 use nix::sys::resource::{Resource, getrlimit};
 use nix::unistd::Pid;
 
-use super::finding::{Finding, Severity, Subject, split_remedy};
+use super::finding::{Finding, Severity, Subject};
 use super::trial::Trial;
 use crate::config::LoopSettings;
 use crate::rt::thread::{Pace, Scheduling};
+use crate::util::remedy;
 
 /// The requested and the granted scheduling, and the limits that apply.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -120,11 +121,9 @@ fn yes_or_no(value: bool) -> &'static str {
 fn refusal(scheduling: &Scheduling, request: &str) -> (String, String) {
     let refused = scheduling.refused.iter();
     let text = refused.into_iter().find(|text| text.starts_with(request));
-    let (what, remedy) = split_remedy(text.map_or(request, String::as_str));
-    (
-        what,
-        remedy.unwrap_or_else(|| "see docs/real-time.md".into()),
-    )
+    let (what, remedy) = remedy::split(text.map_or(request, String::as_str));
+    let remedy = remedy.unwrap_or("see docs/real-time.md");
+    (what.into(), remedy.into())
 }
 
 #[cfg(test)]

@@ -183,7 +183,7 @@ fn permission_remedy(facts: &PortFacts, device: &Path) -> String {
     let by_group = match group_may_open && !facts.groups.contains(group) {
         true => format!("`sudo usermod -aG {group} {user}` and log in again"),
         false => format!(
-            "`sudo chgrp {new_group} {0} && sudo chmod g+rw {0}`, with {user} in {new_group}",
+            "`sudo chgrp {new_group} {0} && sudo chmod g+rw {0}`, and add {user} to the group {new_group} (`sudo usermod -aG {new_group} {user}`)",
             device.display()
         ),
     };
@@ -208,17 +208,17 @@ pub fn refusal(error: &ProbeError, facts: &PortFacts) -> Finding {
     };
     if pids.is_empty() {
         let what = format!("{path} is used by another process");
-        let remedy = format!("`sudo fuser {path}` shows it; end it first: {TWO_READERS}");
+        let remedy = format!("find it with `sudo fuser {path}` and end it: {TWO_READERS}");
         return PORT.failure(what, remedy);
     }
     let names: Vec<String> = pids.iter().map(process_name).collect();
     PORT.failure(
         format!("{path} is used by {}", names.join(", ")),
-        format!("wait for its end, or end it: {TWO_READERS}"),
+        format!("wait until it ends, or end it: {TWO_READERS}"),
     )
 }
 
-const TWO_READERS: &str = "with two readers each of them would lose bytes";
+const TWO_READERS: &str = "each of two readers loses bytes";
 
 fn process_name(pid: &u32) -> String {
     match read_line(format!("/proc/{pid}/comm")) {
@@ -244,7 +244,9 @@ pub fn opened(facts: &PortFacts, line: &PortSettings, notes: &[Note]) -> Vec<Fin
 }
 
 fn latency(latency_ms: u32) -> Finding {
-    let what = format!("the adapter collects bytes for up to {latency_ms} ms");
+    let what = format!(
+        "the latency timer of the USB adapter delays received bytes by up to {latency_ms} ms"
+    );
     if latency_ms <= MAX_LATENCY_MS {
         return PORT.ok(what);
     }
@@ -323,7 +325,7 @@ mod tests {
             };
             only(&facts).remedy.unwrap()
         };
-        let changed = "`sudo chgrp dialout /dev/ttyUSB0 && sudo chmod g+rw /dev/ttyUSB0`, with ada in dialout";
+        let changed = "`sudo chgrp dialout /dev/ttyUSB0 && sudo chmod g+rw /dev/ttyUSB0`, and add ada to the group dialout (`sudo usermod -aG dialout ada`)";
         assert_eq!(remedy("dialout", &["dialout"], 0o600), changed);
         assert_eq!(
             remedy("root", &["users"], 0o660),

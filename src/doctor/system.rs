@@ -111,7 +111,7 @@ fn governor(facts: &SystemFacts) -> Finding {
         governors => {
             let names = governors.join(", ");
             Subject::Processors.warning(
-                format!("frequency governor {names}: a slow processor wakes the loop late"),
+                format!("frequency governor {names}: a low processor frequency delays the wake-up of the loop"),
                 "`cpupower frequency-set -g performance`",
             )
         }

@@ -39,7 +39,10 @@ fn current(node: u8, tenths: i16) -> Finding {
         return Subject::Vesc.ok(what);
     }
     let what = format!("{what}, without a command of this program");
-    Subject::Vesc.warning(what, "find out what drives it before the run")
+    Subject::Vesc.warning(
+        what,
+        "disconnect the other source of commands before the run",
+    )
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use super::waveform::Excitation;
 pub enum ExcitationError {
     /// Beyond the motor or the amplifier.
     #[error(
-        "the excitation's largest current of {current_a:.3} A is beyond {limit_a:.3} A, {what}; lower {setting}"
+        "the largest current of the excitation is {current_a:.3} A, above {what} of {limit_a:.3} A; lower {setting}"
     )]
     Current {
         /// The largest current.
@@ -25,7 +25,7 @@ pub enum ExcitationError {
     },
     /// Faster than the amplifier can follow.
     #[error(
-        "the excitation changes by up to {slew_a_per_s:.0} A/s, the amplifier follows {limit_a_per_s:.0} A/s; lower {setting} or the highest frequency"
+        "the slew rate of the excitation is {slew_a_per_s:.0} A/s, above the limit of the amplifier of {limit_a_per_s:.0} A/s; lower {setting} or the highest frequency"
     )]
     Slew {
         /// Its largest change.
@@ -37,7 +37,7 @@ pub enum ExcitationError {
     },
     /// Beyond the thermal rating of the motor.
     #[error(
-        "the excitation would heat the motor to a thermal current of {thermal_a:.3} A, {limit_a:.3} A are allowed; lower {setting} or shorten it"
+        "the thermal current of the motor would be {thermal_a:.3} A, above the limit of {limit_a:.3} A; lower {setting}, or shorten the excitation"
     )]
     Heat {
         /// Largest thermal current.
@@ -49,9 +49,9 @@ pub enum ExcitationError {
     },
     /// Beyond the soft limit.
     #[error(
-        "by the model the stage would travel {travel_um:.0} um{}, the soft limit is {limit_um:.0} um; lower {setting}{}",
+        "in the model the stage travels {travel_um:.0} um{}, above the soft limit of {limit_um:.0} um; lower {setting}{}",
         .frequency_hz.map_or(String::new(), |f| format!(" at {f:.1} Hz")),
-        .frequency_hz.map_or("", |_| " there, or take --shape model")
+        .frequency_hz.map_or("", |_| " there, or use --shape model")
     )]
     Travel {
         /// Largest travel by the model.
@@ -65,7 +65,7 @@ pub enum ExcitationError {
     },
     /// Some lines are too small compared with others.
     #[error(
-        "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited: raise the smallest or lower the largest"
+        "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited; raise the smallest amplitude, or lower the largest"
     )]
     Span {
         /// The smallest amplitude within the band.

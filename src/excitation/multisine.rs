@@ -87,7 +87,7 @@ impl ExcitationDesign for MultisineSettings {
             return Vec::new();
         }
         let what = format!(
-            "is {period_s} s: lines are {line_hz} Hz apart, and the band from {low_hz} to {high_hz} Hz holds too few; it needs ten of them"
+            "is {period_s} s: the band from {low_hz} to {high_hz} Hz contains fewer than ten lines ({line_hz} Hz apart); raise it, or widen the band"
         );
         vec![Finding::new("multisine.period_s", what)]
     }

@@ -75,7 +75,7 @@ impl ExcitationDesign for PrbsSettings {
             return Vec::new();
         }
         let what = format!(
-            "is {}: the sequence excites up to {limit_hz} Hz, the band goes to {highest_hz} Hz; lower it, or chirp.stop_hz",
+            "is {}: the sequence excites up to {limit_hz} Hz, but the band extends to {highest_hz} Hz; lower it, or chirp.stop_hz",
             self.clock_divider
         );
         vec![Finding::new("prbs.clock_divider", what)]

@@ -59,11 +59,11 @@ pub enum AmplitudePlanError {
     )]
     OneAmplitude(&'static str),
     /// The FRF cannot be read.
-    #[error("{0}; or take `model`")]
+    #[error("{0}, or use --shape model")]
     Frf(String),
     /// The FRF is measured over a part of the band only.
     #[error(
-        "it does not cover the band from {low_hz} to {high_hz} Hz; narrow the band with --start and --stop, or take `model`"
+        "it does not cover the band from {low_hz} to {high_hz} Hz; narrow the band with --start and --stop, or use --shape model"
     )]
     Band {
         /// Lowest frequency of the excitation.

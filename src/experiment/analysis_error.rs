@@ -22,14 +22,16 @@ pub enum AnalysisError {
     #[error(transparent)]
     Loop(#[from] ClosedLoopError),
     /// No program ran.
-    #[error("no program ran in this recording: it contains no excitation to analyse")]
+    #[error(
+        "no program ran in this recording, so it contains no excitation to analyse; choose another recording"
+    )]
     NothingRan,
     /// The receiver of the progress cancelled the analysis.
-    #[error("the analysis was cancelled")]
+    #[error("the analysis was cancelled; repeat it with `bench identify`")]
     Cancelled,
     /// Too many ticks are missing.
     #[error(
-        "at least {missing} ticks are missing between the {ticks} recorded ones, at most {allowed} can be interpolated; repeat the run with a lower loop.rate_hz or with real-time scheduling"
+        "at least {missing} ticks are missing between the {ticks} recorded ones, but at most {allowed} can be interpolated; repeat the run with a lower loop.rate_hz or with real-time scheduling"
     )]
     Gaps {
         /// Missing ticks, counted until there were too many.

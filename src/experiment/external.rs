@@ -136,7 +136,7 @@ fn inverse_fits(data: &[FrfDatum], fit: &Result<ModalFit, FitError>) -> Option<S
     describes(&inverse_fit).then(|| SWAPPED.into())
 }
 
-const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output: input and output are swapped (--input, --output)";
+const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output; exchange --input and --output, which are swapped";
 
 fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
     FrfDatum {
@@ -167,7 +167,7 @@ fn growing(frf: &Frf) -> Option<String> {
     let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
     (slope > MAX_SLOPE).then(|| {
         format!(
-            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}: input and output are swapped (--input, --output), or a mode lies right above the band (--band)"
+            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
         )
     })
 }
@@ -187,7 +187,7 @@ fn early(rate_hz: f64, fit: &ModalFit) -> Option<String> {
     let limit_s = (EARLY_SAMPLES / rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
         format!(
-            "the output precedes the input by {:.3} ms: input and output are swapped (--input, --output), or they were not sampled at the same times",
+            "the output precedes the input by {:.3} ms; exchange --input and --output if they are swapped, or check that they were sampled at the same times",
             -delay.value * 1e3
         )
     })

@@ -25,13 +25,15 @@ pub enum PlanError {
     Excitation(#[from] ExcitationError),
     /// A swept reference for a loop that is unstable by the model.
     #[error(
-        "by the model this loop is unstable: with a swept reference the stage would run away until an interlock trips; `bench margins` shows the loop; choose a controller, an operating point or an asymmetry with which it is stable"
+        "the closed loop is unstable in the model, so a swept reference would trip an interlock; choose another controller, operating point or asymmetry (check it with `bench margins`)"
     )]
     Unstable,
     /// The recording lacks a part of the plan.
-    #[error("the recording has no {0}: it was not made by `bench chirp` or `bench control`")]
+    #[error(
+        "the recording has no {0}, so it was not made by `bench chirp` or `bench control`; choose another recording"
+    )]
     Missing(&'static str),
     /// The configuration cannot be written as TOML.
-    #[error("the configuration cannot be written as TOML: {0}")]
+    #[error("the configuration cannot be written as TOML: {0}; report this with the configuration")]
     Text(String),
 }

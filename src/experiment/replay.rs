@@ -34,7 +34,7 @@ pub enum ReplayError {
     Recording(#[from] RecordingError),
     /// The recording has gaps.
     #[error(
-        "{lost} records are missing from the recording, the first after tick {after}: the input of the loop is not known there, so nothing after it can be replayed"
+        "{lost} records are missing from the recording, the first after tick {after}: the input of the loop is not known there, so nothing after it can be replayed; choose a recording without lost records"
     )]
     Gap {
         /// Number of missing records.

@@ -16,7 +16,7 @@ pub enum RunError {
     Create(RecordingError),
     /// The folder could not be created.
     #[error(
-        "cannot create the folder {folder} for recordings: {why}; choose another with --out; nothing was moved"
+        "cannot create the folder {folder} for recordings: {why}; choose another folder with --out; nothing was moved"
     )]
     Folder {
         /// The folder.
@@ -27,17 +27,20 @@ pub enum RunError {
     /// The recording failed.
     #[error("{0}; the run was stopped with zero current")]
     Recording(#[from] RecordingError),
-    /// The operating system refused a thread or the supervisor, or a thread panicked.
-    #[error("cannot {what}: {why}")]
+    /// The operating system refused a thread or the supervisor.
+    #[error("cannot {what}: {why}; raise the limit of processes (ulimit -u)")]
     System {
         /// The action that failed.
         what: &'static str,
-        /// The error of the operating system, or the cause.
+        /// The error of the operating system.
         why: String,
     },
+    /// The thread of an analysis or of a computation panicked.
+    #[error("the thread of the analysis panicked; report this with the command and its input")]
+    AnalysisDied,
     /// The thread of the loop panicked.
     #[error(
-        "the thread of the loop panicked; the amplifier was disabled; the recording up to then is {0}"
+        "the thread of the loop panicked, and the amplifier was disabled; report this with the recording up to then, {0}"
     )]
     LoopDied(PathBuf),
 }

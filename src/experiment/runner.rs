@@ -142,8 +142,11 @@ fn configured_calibration(
 
 /// Adds the result of a run to its recording as JSON and closes the file; returns the JSON.
 pub fn close(run: Run, result: &impl Serialize) -> Result<String, ExperimentError> {
-    let json = serde_json::to_string_pretty(result)
-        .map_err(|e| ExperimentError::Failed(format!("cannot write the result as JSON: {e}")))?;
+    let json = serde_json::to_string_pretty(result).map_err(|e| {
+        ExperimentError::Failed(format!(
+            "cannot write the result as JSON: {e}; report this with the command"
+        ))
+    })?;
     run.finish(&json)?;
     Ok(json + "\n")
 }

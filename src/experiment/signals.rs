@@ -104,10 +104,7 @@ pub(super) fn runtime() -> std::io::Result<Runtime> {
 }
 
 fn thread_panicked(_: RecvError) -> RunError {
-    RunError::System {
-        what: "finish the analysis",
-        why: "its thread panicked; please report this with the command and its input".into(),
-    }
+    RunError::AnalysisDied
 }
 
 #[cfg(test)]

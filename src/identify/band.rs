@@ -28,7 +28,7 @@ pub(super) fn bins(
 
 fn no_bin((low_hz, high_hz): (f64, f64), bin_hz: f64) -> IdentifyError {
     IdentifyError::Band(format!(
-        "no frequency of this record lies between {low_hz} and {high_hz} Hz, its bins are {bin_hz} Hz apart and begin at {bin_hz} Hz: widen the band or use a longer record or segment"
+        "no frequency bin lies between {low_hz} and {high_hz} Hz (first bin at {bin_hz} Hz, spacing {bin_hz} Hz); widen the band, or use a longer record or segment"
     ))
 }
 
@@ -40,13 +40,13 @@ pub(super) fn last_bin(samples: usize) -> usize {
 fn check((low_hz, high_hz): (f64, f64), rate_hz: f64) -> Result<(), IdentifyError> {
     if !(low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite()) {
         return Err(IdentifyError::Band(format!(
-            "a band from {low_hz} to {high_hz} Hz: both limits must be finite with 0 <= lower < upper"
+            "the band from {low_hz} to {high_hz} Hz is invalid; give finite limits with 0 <= lower < upper"
         )));
     }
     let limit_hz = rate_hz / 2.0;
     if high_hz > limit_hz {
         return Err(IdentifyError::Band(format!(
-            "the band reaches {high_hz} Hz, beyond the Nyquist frequency of {limit_hz} Hz: lower its upper limit or record at a higher rate"
+            "the band reaches {high_hz} Hz, beyond the Nyquist frequency of {limit_hz} Hz; lower its upper limit, or record at a higher rate"
         )));
     }
     Ok(())

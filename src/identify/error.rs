@@ -26,7 +26,7 @@ pub enum IdentifyError {
         high_hz: f64,
     },
     /// A setting of an estimator is out of bounds.
-    #[error("{name} is {value}, it must be from {min} to {max}")]
+    #[error("{name} is {value}; give a value from {min} to {max}")]
     Setting {
         /// Name of the setting.
         name: &'static str,

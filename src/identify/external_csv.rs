@@ -36,7 +36,7 @@ pub enum Sampling {
 #[derive(Debug, Error)]
 pub enum ExternalCsvError {
     /// The file cannot be read.
-    #[error("{0}: {1}")]
+    #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
     File(PathBuf, std::io::Error),
     /// The selected columns are missing, ambiguous or identical.
     #[error("{0}")]
@@ -135,7 +135,7 @@ impl Table<'_> {
     fn not_a_table(&self, error: &csv::Error) -> ExternalCsvError {
         let path = self.path.display();
         ExternalCsvError::Data(format!(
-            "{path} is not a table with one sample a line: {error}"
+            "{path} is not a table with one sample per line: {error}; repair the file"
         ))
     }
 
@@ -185,7 +185,7 @@ impl Table<'_> {
         let duplicate = (1..names.len()).find(|k| names[..*k].contains(&names[*k]));
         if let Some(name) = duplicate.map(|k| names[k]) {
             return Err(ExternalCsvError::Columns(format!(
-                "`{name}` is selected twice; input, output and time must be different columns"
+                "`{name}` is selected twice; give different columns for input, output and time"
             )));
         }
         names
@@ -208,7 +208,7 @@ impl Table<'_> {
             }
             (None, _) => {
                 let available = header.iter().collect::<Vec<_>>().join(", ");
-                format!("{path} has no column `{name}`; its columns are {available}")
+                format!("{path} has no column `{name}`; choose one of {available}")
             }
         };
         Err(ExternalCsvError::Columns(why))
@@ -233,7 +233,7 @@ impl Table<'_> {
     ) -> Result<f64, ExternalCsvError> {
         let [first_s, .., last_s] = time_s else {
             return Err(ExternalCsvError::Data(format!(
-                "{} has {} lines of samples; a rate needs at least 2, and an estimate 64",
+                "{} has {} lines of samples, a rate needs at least 2 and an estimate 64; record for longer",
                 self.path.display(),
                 time_s.len()
             )));

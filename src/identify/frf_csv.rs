@@ -21,11 +21,13 @@ pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,mag
 
 const COLUMNS: usize = 7;
 
+const REPAIR: &str = "repair the line, or write the file again with `bench identify`";
+
 /// Why an FRF cannot be read.
 #[derive(Debug, Error)]
 pub enum FrfCsvError {
     /// The file cannot be read.
-    #[error("{0}: {1}")]
+    #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
     File(PathBuf, io::Error),
     /// The text is not an FRF.
     #[error("{0}")]
@@ -85,7 +87,7 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let found = text.lines().next().unwrap_or_default().trim();
     if found != HEADER {
         return Err(FrfCsvError::Format(format!(
-            "the first line is {found:?}, that of an FRF is {HEADER:?}"
+            "the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`"
         )));
     }
     let mut reader = csv::ReaderBuilder::new()
@@ -94,7 +96,7 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
         .from_reader(text.as_bytes());
     let mut frf = Frf::default();
     for record in reader.records() {
-        let record = record.map_err(|error| FrfCsvError::Format(error.to_string()))?;
+        let record = record.map_err(|error| FrfCsvError::Format(format!("{error}; {REPAIR}")))?;
         finite_numbers(&record)
             .and_then(|numbers| push_row(numbers, &mut frf))
             .ok_or_else(|| invalid_row(&record))?;
@@ -106,7 +108,7 @@ fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {
     let line = record.position().map_or(0, csv::Position::line);
     let text = record.iter().collect::<Vec<_>>().join(",");
     FrfCsvError::Format(format!(
-        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before"
+        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before; {REPAIR}"
     ))
 }
 

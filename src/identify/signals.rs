@@ -57,7 +57,7 @@ impl Signals {
         check_min_samples(self.len(), MIN_SAMPLES)?;
         if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
             return Err(IdentifyError::Signals(format!(
-                "a sampling rate of {} Hz: it must be finite and greater than 0 Hz",
+                "the sampling rate is {} Hz; give a finite rate above 0 Hz",
                 self.rate_hz
             )));
         }
@@ -74,7 +74,7 @@ impl Signals {
             )
         } else if let Some(value) = constant_value(&self.output_m) {
             format!(
-                "the output is {value} m at every one of {samples} samples: the probe did not see the stage; check its range, its cable and its validity flag"
+                "the output is {value} m at every one of {samples} samples: the probe does not measure the stage; check its range, its cable and its validity flag"
             )
         } else {
             return Ok(());
@@ -131,7 +131,7 @@ pub(super) fn check_lengths(input: usize, output: usize) -> Result<(), IdentifyE
         return Ok(());
     }
     Err(IdentifyError::Signals(format!(
-        "{input} samples of the input but {output} of the output: both need one sample a tick, with the same tick at the same index"
+        "the input has {input} samples, the output {output}; give both one sample for each tick, with the same tick at the same index"
     )))
 }
 
@@ -141,7 +141,7 @@ pub(super) fn check_min_samples(samples: usize, min: usize) -> Result<(), Identi
         return Ok(());
     }
     Err(IdentifyError::Signals(format!(
-        "{samples} samples are too few: at least {min} are needed, so record for longer"
+        "{samples} samples are too few, at least {min} are needed; record for longer"
     )))
 }
 
@@ -150,7 +150,7 @@ fn check_samples(column: &str, samples: &[f64]) -> Result<(), IdentifyError> {
         return Ok(());
     };
     Err(IdentifyError::Signals(format!(
-        "{column} is {} at sample {index}: every sample must be finite and below {MAX_SAMPLE:e} in magnitude; cut the record before it or repair the sample",
+        "{column} is {} at sample {index}: every sample must be finite and below {MAX_SAMPLE:e} in magnitude; cut the record before it, or repair the sample",
         samples[index]
     )))
 }

@@ -66,7 +66,7 @@ pub enum RecordingError {
         path: PathBuf,
     },
     /// The file does not exist.
-    #[error("{}: no such file; check the name; recordings are in the folder recordings/ unless --out named another", path.display())]
+    #[error("{}: no such file; check the name (recordings are in the folder recordings/ unless --out named another)", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
@@ -86,7 +86,7 @@ pub enum RecordingError {
         channels: String,
     },
     /// A recording without ticks.
-    #[error("{}: the recording holds no ticks ({}): the loop did not run; record again", path.display(), state(*is_cut))]
+    #[error("{}: the recording has no ticks ({}), because the loop did not run; record again", path.display(), state(*is_cut))]
     Empty {
         /// The file.
         path: PathBuf,

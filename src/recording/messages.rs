@@ -187,7 +187,9 @@ pub(super) const STATES: [State; 4] = [
 
 /// A name or number in a message that this version of the program does not know.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{field} {found:?} is unknown to this version of bench")]
+#[error(
+    "{field} {found:?} is unknown to this version of bench; use the version that made the recording"
+)]
 pub struct UnknownValue {
     field: &'static str,
     found: String,

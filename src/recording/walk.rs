@@ -134,9 +134,9 @@ impl Walk {
             McapError::UnexpectedEof if self.bytes_read < mcap::MAGIC.len() as u64 => Stop::NotMcap,
             McapError::UnexpectedEof => Stop::Cut,
             McapError::BadMagic if self.offset == 0 => Stop::NotMcap,
-            McapError::BadMagic => {
-                Stop::Damaged("the file does not end as an MCAP file does".into())
-            }
+            McapError::BadMagic => Stop::Damaged(
+                "the footer or the magic at the end of the MCAP file is missing".into(),
+            ),
             other => Stop::Damaged(error::why(&other)),
         }
     }

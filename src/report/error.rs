@@ -6,16 +6,18 @@ use thiserror::Error;
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum ReportError {
     /// No trace or chart was given.
-    #[error("there is nothing to plot: give at least one trace")]
+    #[error("there is nothing to plot; give at least one trace")]
     NoTrace,
     /// A trace without points.
-    #[error("trace {name:?} has no points: leave it out")]
+    #[error("trace {name:?} has no points; leave it out")]
     Empty {
         /// Name of the trace.
         name: String,
     },
     /// Columns of different lengths.
-    #[error("trace {name:?} has {frequencies} frequencies, but a column of {values} values")]
+    #[error(
+        "trace {name:?} has {frequencies} frequencies, but a column of {values} values; give each column one value per frequency"
+    )]
     Lengths {
         /// Name of the trace.
         name: String,
@@ -26,7 +28,7 @@ pub enum ReportError {
     },
     /// A frequency that is not positive or not rising.
     #[error(
-        "trace {name:?} has the frequency {value} Hz at index {index}: frequencies must be finite, above 0 Hz and rising"
+        "trace {name:?} has the frequency {value} Hz at index {index}; give finite frequencies above 0 Hz in rising order"
     )]
     Frequency {
         /// Name of the trace.
@@ -38,7 +40,7 @@ pub enum ReportError {
     },
     /// A value that is not finite.
     #[error(
-        "trace {name:?} has a value that is not finite at {frequency_hz} Hz: leave that frequency out"
+        "trace {name:?} has a value that is not finite at {frequency_hz} Hz; leave that frequency out"
     )]
     NotFinite {
         /// Name of the trace.
@@ -47,9 +49,11 @@ pub enum ReportError {
         frequency_hz: f64,
     },
     /// No magnitude is above 0.
-    #[error("no trace has a magnitude above 0, which a logarithmic axis needs")]
+    #[error(
+        "no trace has a magnitude above 0, which a logarithmic axis needs; check the data of the traces"
+    )]
     NoMagnitude,
     /// The drawing library failed.
-    #[error("drawing failed: {0}")]
+    #[error("drawing failed: {0}; report this with the data")]
     Drawing(String),
 }

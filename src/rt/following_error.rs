@@ -160,7 +160,7 @@ mod tests {
         let stuck = |hz: f64| move |tick: u64| sine(hz, tick.min(1000) as f64);
         for hz in [3.0, 30.0, 150.0] {
             let found = first_trip(5_000, |tick| sine(hz, tick as f64), stuck(hz))
-                .expect("it stands still");
+                .expect("a stuck current trips");
             assert!((1000..=1150).contains(&found), "{hz} Hz: {found}");
         }
         // The commands go to zero and stay there: the measured current is outside the commands of the last two

@@ -8,6 +8,7 @@ pub mod nearest;
 pub mod numeric;
 pub mod progress;
 pub mod quantity;
+pub mod remedy;
 pub mod running_stats;
 pub(crate) mod thread_priority;
 pub mod units;

@@ -10,7 +10,7 @@
 //! let amplitude: Current = "100mA".parse()?;
 //! assert_eq!(amplitude.si(), 0.1);
 //! let error = "5s".parse::<Length>().unwrap_err().to_string();
-//! assert_eq!(error, "`5s` is a time in s; a length in m is needed, such as 50um or 3.8mm");
+//! assert_eq!(error, "`5s` is a time in s; give a length in m, such as 50um or 3.8mm");
 //! # Ok::<(), bench::util::quantity::QuantityError>(())
 //! ```
 
@@ -147,7 +147,7 @@ impl Dimension {
         own.map(|(unit, _, scale)| (*unit, *scale))
     }
 
-    fn description(self) -> String {
+    pub(crate) fn description(self) -> String {
         let name = match self {
             Dimension::Length => "a length",
             Dimension::Time => "a time",
@@ -210,14 +210,8 @@ impl FromStr for Quantity {
     type Err = QuantityError;
 
     fn from_str(text: &str) -> Result<Quantity, QuantityError> {
-        let text = text.trim();
-        let not_a_quantity = || QuantityError(format!("`{text}` is not a number with a unit"));
-        let (number, unit) = split(text).ok_or_else(not_a_quantity)?;
-        Ok(Quantity {
-            text: text.into(),
-            number,
-            unit: unit_of(text, unit)?,
-        })
+        let parsed = Quantity::parse(text);
+        parsed.map_err(|what| QuantityError(format!("{what}; write for example 0.5, 5Hz or 3.8mm")))
     }
 }
 
@@ -234,7 +228,7 @@ fn split(text: &str) -> Option<(f64, &str)> {
         .filter(|(number, _)| number.is_finite())
 }
 
-fn unit_of(text: &str, unit: &str) -> Result<Unit, QuantityError> {
+fn unit_of(text: &str, unit: &str) -> Result<Unit, String> {
     match unit {
         "" => return Ok(Unit::Bare),
         "%" => return Ok(Unit::Percent),
@@ -243,13 +237,25 @@ fn unit_of(text: &str, unit: &str) -> Result<Unit, QuantityError> {
     // The micro sign and the Greek letter.
     let plain = unit.replace(['\u{b5}', '\u{3bc}'], "u");
     let known = UNITS.iter().find(|(symbol, ..)| *symbol == plain);
-    let unknown = || QuantityError(format!("`{text}` has the unknown unit `{unit}`"));
+    let unknown = || format!("`{text}` has the unknown unit `{unit}`");
     known
         .map(|(_, dimension, scale)| Unit::Of(*dimension, *scale))
         .ok_or_else(unknown)
 }
 
 impl Quantity {
+    /// Parses a text; the error is without a remedy.
+    fn parse(text: &str) -> Result<Quantity, String> {
+        let text = text.trim();
+        let not_a_quantity = || format!("`{text}` is not a number with a unit");
+        let (number, unit) = split(text).ok_or_else(not_a_quantity)?;
+        Ok(Quantity {
+            text: text.into(),
+            number,
+            unit: unit_of(text, unit)?,
+        })
+    }
+
     /// As it was typed.
     pub fn text(&self) -> &str {
         &self.text
@@ -290,7 +296,7 @@ impl Quantity {
     fn refused(&self, is: &str, needed: Dimension) -> QuantityError {
         let (text, needed, example) = (&self.text, needed.description(), needed.example());
         QuantityError(format!(
-            "`{text}` is {is}; {needed} is needed, such as {example}"
+            "`{text}` is {is}; give {needed}, such as {example}"
         ))
     }
 }
@@ -331,11 +337,11 @@ impl<D: OfDimension> FromStr for Measure<D> {
     type Err = QuantityError;
 
     fn from_str(text: &str) -> Result<Self, QuantityError> {
-        let with_example = |error: QuantityError| {
+        let with_example = |what: String| {
             let (needed, example) = (D::DIMENSION.description(), D::DIMENSION.example());
-            QuantityError(format!("{error}; {needed} is needed, such as {example}"))
+            QuantityError(format!("{what}; give {needed}, such as {example}"))
         };
-        let quantity: Quantity = text.parse().map_err(with_example)?;
+        let quantity = Quantity::parse(text).map_err(with_example)?;
         Ok(Measure {
             si: quantity.si(D::DIMENSION)?,
             quantity,
@@ -397,7 +403,7 @@ impl Quantity {
         if key == Quantity::OPERATING_POINT {
             return self.operating_point_m(beam_length_m);
         }
-        let needed = |error: QuantityError| QuantityError(format!("{error} for `{key}`"));
+        let needed = |error: QuantityError| QuantityError(format!("{error}, for `{key}`"));
         self.si(Dimension::of_key(key)).map_err(needed)
     }
 
@@ -412,7 +418,7 @@ impl Quantity {
         let text = &self.text;
         let no_beams = || {
             QuantityError(format!(
-                "`{text}` is a percentage of the beam length, and this plant has no beams; give metres"
+                "`{text}` is a percentage of the beam length, and this plant has no beams; give a length, such as 3.8mm"
             ))
         };
         beam_length_m
@@ -440,7 +446,7 @@ impl OperatingPoint {
         // Without the rounding error of the multiplication.
         let percent = (number * 1e12).round() / 1e10;
         Err(QuantityError(format!(
-            "`{text}` has no unit: write {percent}% for a ratio of {text} of the beam length, or {text}m for metres"
+            "`{text}` has no unit; write {percent}% for a ratio of {text} of the beam length, or {text}m for metres"
         )))
     }
 
@@ -468,12 +474,12 @@ impl FromStr for OperatingPoint {
     type Err = QuantityError;
 
     fn from_str(text: &str) -> Result<Self, QuantityError> {
-        let needed = |error: QuantityError| {
+        let needed = |what: String| {
             QuantityError(format!(
-                "{error}; write 8% of the beam length, 3.8mm, or metres"
+                "{what}; write 8% of the beam length, 3.8mm, or metres"
             ))
         };
-        let point = OperatingPoint(text.parse().map_err(needed)?);
+        let point = OperatingPoint(Quantity::parse(text).map_err(needed)?);
         // Any beam length shows whether the unit is one of a length.
         point.metres(Some(1.0)).map(|_| point)
     }
@@ -525,12 +531,18 @@ mod tests {
     #[test]
     fn rejects_unknown_units_and_units_of_another_dimension() {
         let error = si("8 apples", Dimension::Length).unwrap_err();
-        assert_eq!(error, "`8 apples` has the unknown unit `apples`");
+        assert_eq!(
+            error,
+            "`8 apples` has the unknown unit `apples`; write for example 0.5, 5Hz or 3.8mm"
+        );
         let error = "8%".parse::<Length>().unwrap_err().to_string();
-        assert!(error.contains("a percentage; a length in m"), "{error}");
+        assert!(
+            error.contains("a percentage; give a length in m"),
+            "{error}"
+        );
         let error = "8mm".parse::<Ratio>().unwrap_err().to_string();
         assert!(
-            error.contains("a length in m; a number without unit"),
+            error.contains("a length in m; give a number without unit"),
             "{error}"
         );
     }
@@ -582,12 +594,12 @@ mod tests {
         for (text, percent, metres) in [("0.07", "7%", "0.07m"), ("-0.15", "-15%", "-0.15m")] {
             let error = ratio(text).unwrap_err().to_string();
             let words = format!(
-                "`{text}` has no unit: write {percent} for a ratio of {text} of the beam length, or {metres} for metres"
+                "`{text}` has no unit; write {percent} for a ratio of {text} of the beam length, or {metres} for metres"
             );
             assert_eq!(error, words);
         }
         let error = ratio("5s").unwrap_err().to_string();
-        assert!(error.contains("a time in s; a length in m"), "{error}");
+        assert!(error.contains("a time in s; give a length in m"), "{error}");
     }
 
     #[test]

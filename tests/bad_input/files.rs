@@ -22,7 +22,10 @@ fn rejects_a_sweep_of_an_unstable_loop() {
     // `bench margins --fast --asymmetry -10%`: the loop is unstable.
     let bench = Bench::new();
     let refused = bench.run("control --fast --reference chirp --asymmetry -10%");
-    refused.is_refused(&["by the model this loop is unstable", "`bench margins`"]);
+    refused.is_refused(&[
+        "the closed loop is unstable in the model",
+        "`bench margins`",
+    ]);
     assert_eq!(bench.files(), [""; 0]);
 }
 
@@ -56,7 +59,7 @@ fn rejects_invalid_reference_file_with_its_line() {
         (b"time_s,reference_m\n", &["no point"]),
         (
             b"time_s,reference_m\n0,0\n0,1e-6\n",
-            &["line 3", "does not rise"],
+            &["line 3", "not after the one before"],
         ),
         (b"0,0\n1,NaN\n", &["line 2", "not two finite numbers"]),
         (b"0;0\n", &["line 1", "time_s,reference_m"]),

@@ -161,7 +161,10 @@ fn interrupted_campaign_continues_to_the_same_result() {
     ] {
         let other = whole.run(&arguments);
         assert!(
-            other.code == 2 && other.err.contains("holds a campaign with other settings"),
+            other.code == 2
+                && other
+                    .err
+                    .contains("contains a campaign with other settings"),
             "{other:?}"
         );
         assert!(other.err.contains(difference), "{other:?}");
@@ -194,7 +197,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
             "standard input is not a terminal; start it in a terminal, or add --simulate",
         ),
         ("campaign --config xy", "the model `xy` does not have both"),
-        ("campaign --asymmetry 2%", "set what a campaign varies"),
+        ("campaign --asymmetry 2%", "because a campaign varies both"),
         (
             "campaign --operating-points 0%:200%:3",
             "beyond the length of the beams",
@@ -205,7 +208,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
         ),
         (
             "campaign --operating-points 0:0.08:3",
-            "`0.08` has no unit: write 8% for a ratio of 0.08 of the beam length, or 0.08m for metres",
+            "`0.08` has no unit; write 8% for a ratio of 0.08 of the beam length, or 0.08m for metres",
         ),
         (
             "campaign --asymmetry-tolerance 0",
@@ -213,7 +216,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
         ),
         (
             "campaign --operating-point-tolerance 0.002",
-            "`0.002` has no unit: write 0.2%",
+            "`0.002` has no unit; write 0.2%",
         ),
         (
             "campaign --operating-point-tolerance 5cm",
@@ -221,7 +224,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
         ),
         (
             "campaign --operating-point-tolerance 100%",
-            "--operating-point-tolerance is 100%; it is between 0 and the beam length",
+            "--operating-point-tolerance is 100%; give a length between 0 and the beam length",
         ),
         (
             "chirp --config xy --set sim.asymmetry_offset=0.01",
@@ -229,7 +232,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
         ),
         (
             "chirp --asymmetry -0.8 --set sim.asymmetry_offset=-0.2",
-            "m2 would be too small",
+            "m2 is too small",
         ),
     ] {
         let answer = bench.run(arguments);

@@ -19,7 +19,7 @@ fn controller_files_are_checked_like_configurations() {
         ),
         (
             section("kind = \"gain\"\ngain_a_per_um = true"),
-            &["line 4", "true", "a number is expected"],
+            &["line 4", "true", "give a number"],
         ),
         (
             section("kind = \"gain\"\ngain_a_per_um = nan"),
@@ -39,7 +39,7 @@ fn controller_files_are_checked_like_configurations() {
         ),
         (
             section("kind = \"coefficients\"\nnumerator = [1]\ndenominator = [0]"),
-            &["section 1", "denominator of zeros"],
+            &["section 1", "coefficients are all 0"],
         ),
         (
             section("kind = \"coefficients\"\nnumerator = [1,2,3,4]\ndenominator = [1]"),

@@ -82,30 +82,22 @@ fn rejects_wrong_type_with_value_and_expected_type() {
             "mine.toml line 2",
             "`loop.rate_hz`",
             "true",
-            "a number is expected",
+            "give a number",
         ],
     );
     assert_file_rejected(
         "title = 3\n",
-        &[
-            "mine.toml line 1",
-            "`title`",
-            "is 3",
-            "a string is expected",
-        ],
+        &["mine.toml line 1", "`title`", "is 3", "give a string"],
     );
     assert_set_rejected(
         "loop.computing_delay_periods=1.5",
-        &["is 1.5", "an integer is expected"],
+        &["is 1.5", "give an integer"],
     );
     assert_set_rejected(
         "chirp.amplitude=3",
-        &["`chirp.amplitude`", "is 3", "an array is expected"],
+        &["`chirp.amplitude`", "is 3", "give an array"],
     );
-    assert_set_rejected(
-        "plant.mass_asymmetry=yes",
-        &["\"yes\"", "a number is expected"],
-    );
+    assert_set_rejected("plant.mass_asymmetry=yes", &["\"yes\"", "give a number"]);
 }
 
 #[test]

@@ -132,7 +132,7 @@ fn rejects_drive_with_unexpected_rated_current() {
     assert!(
         problems(&report)[0]
             .what
-            .contains("is 2 A, the configuration states 4 A"),
+            .contains("is 2 A, but 4 A is configured"),
         "{report:?}"
     );
 }

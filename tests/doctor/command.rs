@@ -153,7 +153,7 @@ fn rejects_invalid_configuration_like_other_commands() {
         "doctor --config lab --set loop.rate_hz=5000 --set amplifier.device.bit_rate=125000";
     Bench::new()
         .run(overload)
-        .is_refused(&["125000 bit/s", "80 % is the limit"]);
+        .is_refused(&["125000 bit/s", "the limit of 80 %"]);
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn too_small_margin_excludes_control_but_not_chirp() {
     );
     let found = findings_on(&report, "control");
     assert!(
-        found[0].starts_with("failure: refused:") && found[0].contains("at least 0.9"),
+        found[0].starts_with("failure: refused:") && found[0].contains("the limit of 0.9"),
         "{found:?}"
     );
 }
@@ -211,7 +211,7 @@ fn mixing_a_real_and_a_simulated_device_is_a_failure() {
     let found = findings_on(&checked_report(&answer), "configuration");
     assert!(
         answer.code == 1
-            && found[0].contains("amplifier.device is vesc, probe.device is simulated"),
+            && found[0].contains("amplifier.device is vesc and probe.device is simulated"),
         "{found:?}"
     );
 }

@@ -274,7 +274,7 @@ fn rejects_invalid_scales_and_amplitudes_beyond_an_interlock_before_any_motion()
     for (options, words) in [
         (
             "--amplitude 0.5 --scales 0.5,1,4",
-            ["at 4 of the planned amplitude", "soft limit is 900 um"].as_slice(),
+            ["at 4 of the planned amplitude", "soft limit of 900 um"].as_slice(),
         ),
         (
             "--amplitude 12 --scales 1,2",

@@ -122,11 +122,11 @@ fn rejects_plan_beyond_interlock_with_value_limit_and_remedy() {
         ),
         (
             "--excitation prbs --amplitude 2 --set prbs.clock_divider=1",
-            &["soft limit is 900 um", "prbs.amplitude_a"],
+            &["soft limit of 900 um", "prbs.amplitude_a"],
         ),
         (
             "--excitation stepped_sine --amplitude 1 --set stepped_sine.count=40",
-            &["Hz", "the soft limit is 900 um"],
+            &["Hz", "the soft limit of 900 um"],
         ),
         (
             "--excitation multisine --set multisine.period_s=0.02 --start 100 --stop 150",

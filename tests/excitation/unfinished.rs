@@ -107,7 +107,7 @@ fn error_without_response_names_the_recording() {
         .into_owned();
     assert_eq!(answer.code, 1, "{}", answer.err);
     assert!(
-        answer.err.contains("did not see the stage") && answer.err.contains(&name),
+        answer.err.contains("does not measure the stage") && answer.err.contains(&name),
         "{name}: {}",
         answer.err
     );

@@ -70,7 +70,7 @@ fn rejects_options_that_do_not_match_the_file() {
     bench.write("data.csv", valid());
     bench
         .run("identify data.csv")
-        .is_refused(&["which columns", "time_s, force_n, position_m"]);
+        .is_refused(&["give --input COLUMN", "time_s, force_n, position_m"]);
     bench
         .run("identify data.csv --input force_n")
         .is_refused(&["--output"]);
@@ -127,7 +127,7 @@ fn rejects_invalid_data_with_line_and_column() {
             &["19 samples are too few", "at least 64"],
         ),
         (constant("1", "n"), &["input is 1", "nothing was excited"]),
-        (constant("n", "1"), &["output is 1", "did not see"]),
+        (constant("n", "1"), &["output is 1", "does not measure"]),
     ] {
         let answer = identify(text, "--time time_s");
         assert_eq!(answer.code, 1, "{answer:?}");

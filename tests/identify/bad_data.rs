@@ -85,7 +85,7 @@ fn rejects_columns_of_different_lengths() {
     };
     assert_contains(
         &rejection(&signals, (10.0, 400.0)),
-        &["200 samples of the input", "199 of the output"],
+        &["the input has 200 samples", "the output 199"],
     );
 }
 
@@ -141,10 +141,10 @@ fn rejects_band_between_two_bins_with_their_distance() {
     let error = local::estimate(&valid(), (11.0, 14.0), &EstimatorSettings::default()).unwrap_err();
     assert_contains(
         &error,
-        &["between 11 and 14 Hz", "5 Hz apart", "longer record"],
+        &["between 11 and 14 Hz", "spacing 5 Hz", "longer record"],
     );
     let error = welch::estimate(&valid(), (70.0, 100.0), 16, Estimator::H1).unwrap_err();
-    assert_contains(&error, &["between 70 and 100 Hz", "62.5 Hz apart"]);
+    assert_contains(&error, &["between 70 and 100 Hz", "spacing 62.5 Hz"]);
 }
 
 #[test]
@@ -152,7 +152,7 @@ fn rejects_invalid_sampling_rate() {
     for rate_hz in [0.0, -5000.0, f64::NAN, f64::INFINITY] {
         assert_contains(
             &rejection(&Signals { rate_hz, ..valid() }, (10.0, 400.0)),
-            &["sampling rate", "greater than 0"],
+            &["sampling rate", "above 0 Hz"],
         );
     }
 }

@@ -207,7 +207,7 @@ fn rejects_rates_beyond_bus_and_line_capacity() {
         &["chirp", "--config", "lab", "--simulate", "--stop", "400"],
     );
     assert!(
-        code == 2 && errors.contains("half its rate, 325 Hz"),
+        code == 2 && errors.contains("half the rate of the probe, 325 Hz"),
         "{errors}"
     );
 }

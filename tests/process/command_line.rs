@@ -49,7 +49,7 @@ fn errors_name_option_and_unit_as_typed_and_suggest_a_correction() {
         &[
             "--amplitude",
             "`5s` is a time in s",
-            "a current in A is needed",
+            "give a current in A",
             "100mA",
         ],
     );

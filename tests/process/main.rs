@@ -3,5 +3,6 @@ mod command_line;
 mod common;
 mod disk;
 mod kill;
+mod remedies;
 mod replay;
 mod stop;

@@ -174,7 +174,7 @@ fn rejects_invalid_recordings_with_reason_and_without_panic() {
         ("empty", b"", ""),
         ("text", b"time_s,reference_m\n0,0\n", "not an MCAP file"),
         ("external", &external, "without bench's channel /loop"),
-        ("head", &whole[..200], "holds no ticks"),
+        ("head", &whole[..200], "has no ticks"),
         ("altered", &altered, "damaged"),
         ("directory", b"", ""),
     ];

@@ -259,15 +259,15 @@ fn unusable_files_are_reported_by_kind_with_a_remedy() {
         "without bench's channel /loop (it has /imu of none)",
     );
     write_file("head.mcap", &ORIGINAL.bytes[..chunks(&ORIGINAL.bytes)[1].0]);
-    assert_error("head.mcap", "holds no ticks (it was cut off");
+    assert_error("head.mcap", "has no ticks (it was cut off");
     write_file("barely.mcap", mcap::MAGIC);
-    assert_error("barely.mcap", "holds no ticks (it was cut off");
+    assert_error("barely.mcap", "has no ticks (it was cut off");
     let path = dir.path().join("idle.mcap");
     Recorder::create(&path, &Header::default())
         .expect("fresh")
         .finish(&[])
         .expect("good disk");
-    assert_error("idle.mcap", "holds no ticks (it is complete)");
+    assert_error("idle.mcap", "has no ticks (it is complete)");
     std::fs::create_dir(dir.path().join("folder")).expect("temporary");
     assert_error("folder", "cannot read the recording");
     assert!(Recorder::create(&dir.path().join("no/such/place.mcap"), &header()).is_err());

@@ -313,7 +313,7 @@ fn text_reports_tolerances_probabilities_and_shares() {
         "95 % by Wilson",
         "share %",
         "with damping",
-        "interactions of two",
+        "second-order interactions",
     ] {
         assert!(
             answer.out.contains(words),

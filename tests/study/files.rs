@@ -73,8 +73,8 @@ fn rejects_incomplete_sets_of_shards() {
     let cut = std::fs::read(bench.path("2.study")).expect("a file");
     bench.write("cut.study", &cut[..cut.len() - 10]);
     for (files, code, words) in [
-        ("1.study 3.study", 1, &["of 3 shards", "no file of 2"][..]),
-        ("3.study", 1, &["no file of 1, 2"]),
+        ("1.study 3.study", 1, &["missing shards: 2 of 3"][..]),
+        ("3.study", 1, &["missing shards: 1, 2 of 3"]),
         (
             "1.study 2.study again.study 3.study",
             1,
@@ -83,7 +83,10 @@ fn rejects_incomplete_sets_of_shards() {
         (
             "1.study cut.study 3.study",
             1,
-            &["cut.study (shard 2/3) lacks", "start it again"],
+            &[
+                "cut.study (shard 2/3) lacks",
+                "continue it with its own arguments",
+            ],
         ),
         (
             "1.study of_four.study 3.study",

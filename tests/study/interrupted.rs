@@ -201,7 +201,7 @@ fn reports_a_full_disk_and_keeps_completed_draws() {
     for words in [
         "cannot write a.study",
         "File too large",
-        "free some space and start it again with the same arguments",
+        "free some space and start the study again with the same arguments",
     ] {
         assert!(message.contains(words), "`{words}` is not in {message}");
     }

@@ -41,17 +41,20 @@ fn rejects_invalid_tolerances() {
         // A percentage of a ratio refers to 1.
         (
             "plant.secondary_mass_deviation.sL=+-100%",
-            &["reaches -1", "allowed is -0.9 to 9"],
+            &["reaches -1", "give a value from -0.9 to 9"],
         ),
         // Uniform tolerance out of range at one end; normal tolerance out of range at 6 sigma; violated relation between two
         // settings.
         (
             "plant.secondary_mass_deviation.sL=uniform:-1:0",
-            &["reaches -1", "allowed is -0.9 to 9", "narrow it"],
+            &["reaches -1", "give a value from -0.9 to 9", "narrow it"],
         ),
         (
             "plant.motion_stage_mass_kg=normal:20%",
-            &["`plant.motion_stage_mass_kg` reaches -0.05", "allowed is"],
+            &[
+                "`plant.motion_stage_mass_kg` reaches -0.05",
+                "give a value from",
+            ],
         ),
         (
             "plant.operating_point_m=+-50mm",
@@ -121,7 +124,7 @@ fn rejects_a_plant_without_response() {
     );
     bench
         .run("model study --config silent.toml --vary plant.modes.u.omega_rad_s=+-10%")
-        .is_refused(&["`plant.modes`", "no force would reach the probe"]);
+        .is_refused(&["`plant.modes`", "no force reaches the probe"]);
 }
 
 #[test]

@@ -80,10 +80,10 @@ fn rejects_plants_and_options_without_a_map() {
         ("--operating-points 1s:2s:5", "a length in m"),
         (
             "--operating-points 0:0.07:5",
-            "`0.07` has no unit: write 7% for a ratio of 0.07 of the beam length, or 0.07m for metres",
+            "`0.07` has no unit; write 7% for a ratio of 0.07 of the beam length, or 0.07m for metres",
         ),
         ("--asymmetries 0:0.1:1", "from 2 to"),
-        ("--asymmetries 0.1:10%:5", "empty sweep"),
+        ("--asymmetries 0.1:10%:5", "two different values"),
         (
             "--operating-points 0%:200%:5",
             "--operating-points is 0.095 m",

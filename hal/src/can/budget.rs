@@ -65,7 +65,7 @@ pub struct Traffic {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[error(
     "{what} at {rate_hz:.0} Hz needs {frames_us:.0} us of the {period_us:.0} us of a tick and loads the bus of {bit_rate} bit/s to \
-     {load_percent:.1} %; {limit_percent:.0} % is the limit, which allows {highest_hz:.0} Hz: {remedy}"
+     {load_percent:.1} %, above the limit of {limit_percent:.0} %, which allows {highest_hz:.0} Hz; {remedy}"
 )]
 pub struct BudgetError {
     /// Description of the exchange.
@@ -215,7 +215,7 @@ mod tests {
         assert_eq!(
             refused.to_string(),
             "an exchange with SYNC at 5000 Hz needs 245 us of the 200 us of a tick and loads the bus of 1000000 bit/s to \
-             122.5 %; 100 % is the limit, which allows 4082 Hz: use asynchronous set-points, request the status less often, or \
+             122.5 %, above the limit of 100 %, which allows 4082 Hz; use asynchronous set-points, request the status less often, or \
              lower the rate"
         );
         assert!(

@@ -52,7 +52,7 @@ impl VescSettings {
         match limit_a > 0.0 && limit_a <= 1000.0 {
             true => Ok(()),
             false => Err(format!(
-                "current_limit_a = {limit_a} is invalid: expected above 0, at most 1000"
+                "current_limit_a = {limit_a} is invalid; set it to a value above 0 and at most 1000"
             )),
         }
     }
@@ -79,19 +79,19 @@ const FAULTS: [(u32, &str, &str); 5] = [
     (
         BUS_FAILED,
         "the CAN interface failed",
-        "`ip link set IFACE up`, then clear the fault",
+        "bring the interface up with `ip link set IFACE up`, then clear the fault",
     ),
     (NOT_ARMED, "the VESC is not enabled", "arm first"),
     (
         NOT_SENT,
         "a command could not be sent",
-        "check that the VESC is on the bus; lower the rate",
+        "check that the VESC is on the bus, or lower the rate",
     ),
 ];
 
 fn text(code: u32) -> FaultText {
     let fault = FAULTS.iter().find(|(known, ..)| *known == code);
-    let &(_, what, remedy) = fault.unwrap_or(&(0, "unknown fault", "please report the code"));
+    let &(_, what, remedy) = fault.unwrap_or(&(0, "unknown fault", "report the code"));
     FaultText { what, remedy }
 }
 

@@ -8,7 +8,7 @@ use crate::DeviceError;
 #[derive(Debug, thiserror::Error)]
 pub enum SerialError {
     /// A setting is invalid.
-    #[error("setting {name} = {value} is invalid: expected {expected}")]
+    #[error("setting {name} = {value} is invalid; give {expected}")]
     Setting {
         /// The setting.
         name: &'static str,
@@ -35,7 +35,7 @@ pub enum SerialError {
     },
     /// Another process uses the port.
     #[error(
-        "{}: held by {}; stop that first: two readers would take each other's bytes",
+        "{}: in use by {}; end that process first, because each of two readers loses bytes",
         path.display(),
         pid.map_or("another process".to_string(), |pid| format!("process {pid}"))
     )]
@@ -54,7 +54,7 @@ pub enum SerialError {
         source: std::io::Error,
     },
     /// The port did not accept a line setting.
-    #[error("{}: {what} {asked} was requested, the port has {got}; {remedy}", path.display())]
+    #[error("{}: {what} {asked} was requested, but the port has {got}; {remedy}", path.display())]
     NotTaken {
         /// The port as configured.
         path: PathBuf,
@@ -68,7 +68,7 @@ pub enum SerialError {
         remedy: &'static str,
     },
     /// The device is not a serial port.
-    #[error("{}: cannot be opened as a serial port ({source}); is it a terminal device?", path.display())]
+    #[error("{}: cannot be opened as a serial port ({source}); check that it is a terminal device", path.display())]
     Open {
         /// The port as configured.
         path: PathBuf,
@@ -93,7 +93,7 @@ pub enum SerialError {
     },
     /// The protocol has no emulated probe.
     #[error(
-        "this protocol has no emulated probe; implement Protocol::responder, or use one that has"
+        "this protocol has no emulated probe; implement Protocol::responder, or use a protocol that has one"
     )]
     NoEmulator,
 }

@@ -255,7 +255,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            error.contains("parity Even was requested, the port has None"),
+            error.contains("parity Even was requested, but the port has None"),
             "{error}"
         );
         assert_eq!(

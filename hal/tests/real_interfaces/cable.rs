@@ -17,7 +17,7 @@ fn interface_down_stops_the_drive_and_can_be_cleared() {
         (text.what, text.remedy),
         (
             "the CAN interface is down",
-            "`ip link set IFACE up`, then clear the fault"
+            "bring the interface up with `ip link set IFACE up`, then clear the fault"
         )
     );
     assert!(

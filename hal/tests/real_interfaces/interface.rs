@@ -14,7 +14,7 @@ fn rejects_unknown_interface_with_command_to_list_them() {
     let refused = refusal("can77");
     assert!(refused.starts_with("CAN interface can77: "), "{refused}");
     assert!(
-        refused.ends_with("`ip link show type can` lists the interfaces"),
+        refused.ends_with("choose an interface from the list of `ip link show type can`"),
         "{refused}"
     );
 }

@@ -29,7 +29,7 @@ fn drive_stops_and_node_is_released_after_the_process_is_killed() {
 
     let refused = refusal(&vcan.name, settings());
     let holder = format!(
-        "node 5 is already in use by process {}; end that first",
+        "node 5 is already in use by process {}; end that process",
         child.id()
     );
     assert!(refused.starts_with(&holder), "{refused}");

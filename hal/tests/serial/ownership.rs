@@ -33,7 +33,7 @@ fn rejects_second_opening_with_process_id_until_the_first_is_dropped() {
     let first = rehearsal.open();
     let error = refusal(rehearsal.settings()).to_string();
     assert!(
-        error.contains(&format!("held by process {}", std::process::id())),
+        error.contains(&format!("in use by process {}", std::process::id())),
         "{error}"
     );
     drop(first);
@@ -116,7 +116,7 @@ fn rejects_terminal_locked_by_another_program() {
     let _locked = Flock::lock(terminal, FlockArg::LockExclusiveNonblock).unwrap();
     let error = refusal(rehearsal.settings()).to_string();
     assert!(
-        error.contains("held by another process; stop that first"),
+        error.contains("in use by another process; end that process first"),
         "{error}"
     );
 }
@@ -140,7 +140,10 @@ fn rejects_file_that_is_not_a_terminal() {
     settings.port.path = rehearsal.locks.path().join("file");
     std::fs::write(&settings.port.path, "").unwrap();
     let error = refusal(settings).to_string();
-    assert!(error.contains("is it a terminal device?"), "{error}");
+    assert!(
+        error.contains("check that it is a terminal device"),
+        "{error}"
+    );
 }
 
 #[test]

@@ -72,7 +72,7 @@ fn check(args: &Args) -> Result<(), CliError> {
     }
     match args.bandwidth {
         Some(omega) if !is_above(omega, 0.0) => {
-            Err(refused("--bandwidth", omega, "in rad/s and above 0"))
+            Err(refused("--bandwidth", omega, "a value in rad/s above 0"))
         }
         _ => Ok(()),
     }
@@ -80,7 +80,7 @@ fn check(args: &Args) -> Result<(), CliError> {
 
 fn refused(option: &str, value: f64, limits: &str) -> CliError {
     CliError::Usage(format!(
-        "{option} is {value}; it must be {limits} (Eqs. 1-1 and 1-3)"
+        "{option} is {value}; give {limits} (Eqs. 1-1 and 1-3)"
     ))
 }
 

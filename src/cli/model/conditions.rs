@@ -89,6 +89,6 @@ fn explained(args: &Args, trajectory: &Trajectory) -> Result<f64, CliError> {
 fn outside(value: f64, range: &RangeInclusive<f64>) -> CliError {
     let (low, high) = (range.start(), range.end());
     CliError::Usage(format!(
-        "--at {value} is outside of the range {low} to {high}"
+        "--at {value} is outside of the range {low} to {high}; give a value inside, or change --from and --to"
     ))
 }

@@ -26,7 +26,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let (u, v, ratio) = (args.omega_u, args.omega_v, args.ratio);
     let damping = CriticalDamping::new(u, v, ratio).ok_or_else(|| {
         CliError::Usage(format!(
-            "omega_u = {u} rad/s, omega_v = {v} rad/s, ratio = {ratio}: Eq. (3-16) requires 0 < omega_u < omega_v and a ratio above (omega_v/omega_u)^2"
+            "--omega-u {u} rad/s, --omega-v {v} rad/s and --ratio {ratio} do not satisfy Eq. (3-16); give 0 < omega_u < omega_v and a ratio above (omega_v/omega_u)^2"
         ))
     })?;
     print_result(args.json, &damping, text)

@@ -71,7 +71,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     print_result(args.bench.json, &report, |report| text(report, profile))
 }
 
-const FIXED: &str = "--operating-point and --asymmetry fix what a map varies: leave them out, or take `bench model modes`";
+const FIXED: &str = "--operating-point and --asymmetry cannot be fixed here, because a map varies both; leave them out, or use `bench model modes`";
 
 /// The settings of the plant, without what the grid varies.
 fn settings(args: &Args) -> Result<Sr4dofSettings, CliError> {
@@ -104,7 +104,7 @@ fn sr4dof(args: &Args, settings: &[OptionSetting]) -> Result<Sr4dofSettings, Cli
     match args.bench.load(Purpose::Model, settings)?.plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CliError::Usage(format!(
-            "a map is over operating point and mass asymmetry, which the model `{}` does not have both; take one of `sr4dof` (--config stage, --config chapter2), or `bench model locus --vary KEY`",
+            "a map varies operating point and mass asymmetry, but the model `{}` does not have both; use a profile with the model `sr4dof` (--config stage, --config chapter2), or `bench model locus --vary KEY`",
             other.model()
         ))),
     }

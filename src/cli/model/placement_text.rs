@@ -123,7 +123,7 @@ fn best_text(which: &str, best: Option<&Placement>) -> String {
     let values = best.trial.values;
     let verdict = match best.trial.with_any_cnmp {
         0 => format!("no CNMP zeros at {values} values"),
-        some => format!("CNMP zeros at {some} of {values} values nevertheless"),
+        some => format!("CNMP zeros remain at {some} of {values} values"),
     };
     let sentence = format!(
         "{which}: actuator {}, probe {}: {verdict}, C4-1 {:+.3}",

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 fn check_duration(duration_s: Option<f64>) -> Result<(), CliError> {
     match duration_s {
         Some(seconds) if !(seconds > 0.0 && seconds.is_finite()) => Err(CliError::Usage(format!(
-            "--duration is {seconds}; it is in seconds and above 0"
+            "--duration is {seconds} s; give a time above 0 s"
         ))),
         _ => Ok(()),
     }

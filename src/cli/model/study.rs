@@ -132,7 +132,7 @@ fn report_progress(opened: &Opened) {
 
 fn stopped(args: &Args, results: &Results) -> String {
     let remedy = match &args.file {
-        None => "nothing was stored: with --file FILE a study can be continued".into(),
+        None => "nothing was stored; use --file FILE for a study that can be continued".into(),
         Some(path) => format!(
             "started again with the same arguments it continues from {}",
             path.display()

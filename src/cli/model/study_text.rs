@@ -76,7 +76,7 @@ const SIDES_LEGEND: &str = "probability of pairs with both settings on the same 
 
 fn interactions(counted: &Counted) -> String {
     let sums = format!(
-        "single settings explain {} % of the variance, interactions of two {} % more; the rest are interactions of three or more",
+        "first-order effects explain {} % of the variance, second-order interactions {} %; the rest is of higher order",
         maybe_percent(counted.share_alone),
         maybe_percent(counted.share_of_interactions)
     );

@@ -37,7 +37,7 @@ impl SweepArgs {
         let to = self.number(&config, "--to", &self.to)?;
         if from == to {
             return Err(CliError::Usage(format!(
-                "an empty sweep: --from and --to are both {from}; give two values"
+                "--from and --to are both {from}; give two different values"
             )));
         }
         Ok(linspace(from, to, self.count as usize).collect())
@@ -78,7 +78,7 @@ impl SweepArgs {
         };
         let vary = &self.vary;
         Err(CliError::Usage(format!(
-            "--vary {vary} and {option}, an option that fixes it: leave out the option"
+            "{option} fixes `{vary}`, which --vary is to change; leave out {option}"
         )))
     }
 

@@ -96,7 +96,7 @@ pub(super) fn check_amplitude(amplitude_m: f64, soft_limit_m: f64) -> Vec<Findin
         return Vec::new();
     }
     let what = format!(
-        "is {amplitude_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m)"
+        "is {amplitude_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m); lower it"
     );
     vec![Finding::new("control.reference.amplitude_m", what)]
 }
@@ -105,7 +105,9 @@ pub(super) fn check_amplitude(amplitude_m: f64, soft_limit_m: f64) -> Vec<Findin
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ReferenceError {
     /// The file cannot be read.
-    #[error("cannot read the reference {path}: {why}")]
+    #[error(
+        "cannot read the reference {path}: {why}; check that it is a file and that you may read it"
+    )]
     Unreadable {
         /// The file.
         path: String,
@@ -114,7 +116,7 @@ pub enum ReferenceError {
     },
     /// A line is not two numbers, or time does not rise.
     #[error(
-        "{path} line {line}: {why}; a reference has the header `time_s,reference_m` and rising times"
+        "{path} line {line}: {why}; write the header `time_s,reference_m` and rows of two numbers with rising times"
     )]
     Line {
         /// The file.

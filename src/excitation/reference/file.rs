@@ -66,7 +66,7 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>, (usize, String)> {
         }
     }
     if points.is_empty() {
-        Err((1, "there is no point".into()))
+        Err((1, "the file has no point".into()))
     } else {
         Ok(points)
     }
@@ -75,7 +75,10 @@ fn points(text: &str) -> Result<Vec<(f64, f64)>, (usize, String)> {
 fn push_point(line: &str, points: &mut Vec<(f64, f64)>) -> Result<(), String> {
     let point = point(line).ok_or_else(|| format!("`{line}` is not two finite numbers"))?;
     if points.last().is_some_and(|before| before.0 >= point.0) {
-        return Err(format!("the time {} s does not rise", point.0));
+        return Err(format!(
+            "the time {} s is not after the one before",
+            point.0
+        ));
     }
     points.push(point);
     Ok(())

@@ -46,7 +46,7 @@ impl ReferenceDesign for SineReference {
         let mut findings = check_amplitude(self.amplitude_m, soft_limit_m);
         if frequency_hz >= nyquist_hz {
             let what = format!(
-                "is {frequency_hz} Hz; it must stay below half the servo rate, {nyquist_hz} Hz"
+                "is {frequency_hz} Hz, not below half the servo rate of {nyquist_hz} Hz; lower it, or raise loop.rate_hz"
             );
             findings.push(Finding::new("control.reference.frequency_hz", what));
         }

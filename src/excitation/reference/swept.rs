@@ -28,7 +28,7 @@ impl SweptReference {
         let amplitudes_m = self.amplitude.iter().map(|point| point.amplitude_m);
         let largest_m = amplitudes_m.fold(self.travel_m, f64::max);
         let what = format!(
-            "reaches {largest_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m)"
+            "reaches {largest_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m); lower it"
         );
         (largest_m > soft_limit_m).then(|| Finding::new("control.reference", what))
     }
@@ -36,7 +36,8 @@ impl SweptReference {
     fn check_rising(&self) -> Option<Finding> {
         let mut pairs = self.amplitude.windows(2);
         let rising = pairs.all(|pair| pair[0].frequency_hz < pair[1].frequency_hz);
-        let what = "has frequencies that do not rise from point to point";
+        let what =
+            "has frequencies that do not rise from point to point; sort the points by frequency";
         (!rising).then(|| Finding::new("control.reference.amplitude", what))
     }
 

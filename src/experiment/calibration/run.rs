@@ -77,7 +77,7 @@ fn check_steps(config: &Config) -> Result<Extremes, ExperimentError> {
 fn require(value: f64, limit: f64, unit: &str, what: &str) -> Result<(), ExperimentError> {
     if value > limit {
         return Err(ExperimentError::Refused(format!(
-            "the steps would reach {value:.3e} {unit}, {what} is {limit:.3e} {unit}; lower calibrate.amplitude_a"
+            "the steps would reach {value:.3e} {unit}, above {what} of {limit:.3e} {unit}; lower calibrate.amplitude_a"
         )));
     }
     Ok(())

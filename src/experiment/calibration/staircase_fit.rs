@@ -18,7 +18,7 @@ pub enum StaircaseError {
     Recording(#[from] RecordingError),
     /// A level has no ticks.
     #[error(
-        "level {0} of the staircase has no ticks in the recording: the run was not completed; repeat it"
+        "level {0} of the staircase has no ticks in the recording, because the run was not completed; repeat the run"
     )]
     Short(usize),
     /// The stage did not move.
@@ -33,7 +33,7 @@ pub enum StaircaseError {
     },
     /// The readings are not on a straight line.
     #[error(
-        "{what} is {found:.4} of the travel, {limit} is allowed ({setting}): friction, a stop, or a probe near the end of its range is likely; examine the recording"
+        "{what} is {found:.4} of the travel, above the limit of {limit} ({setting}): friction, a stop, or a probe near the end of its range is likely; examine the recording"
     )]
     NotStraight {
         /// The quantity that is too large.

@@ -19,7 +19,7 @@ pub enum CampaignError {
     #[error(transparent)]
     Plant(#[from] PlantError),
     /// The folder holds a campaign with other settings.
-    #[error("{folder} holds a campaign with other settings; name another folder with --out, or use the same settings:\n{}", differences.join("\n"))]
+    #[error("{folder} contains a campaign with other settings; choose another folder with --out, or use the same settings:\n{}", differences.join("\n"))]
     OtherSettings {
         /// The folder.
         folder: String,
@@ -28,7 +28,7 @@ pub enum CampaignError {
     },
     /// The settings file of the folder does not belong to a campaign.
     #[error(
-        "{path} does not belong to a campaign ({why}); it was not changed; name another folder with --out"
+        "{path} does not belong to a campaign ({why}) and was left unchanged; choose another folder with --out"
     )]
     NotACampaign {
         /// The file.
@@ -63,10 +63,10 @@ impl From<FileError> for CampaignError {
     fn from(error: FileError) -> Self {
         let remedy = match error.action {
             FileAction::Write => {
-                "the finished points are stored: free some space and start the campaign again with the same arguments"
+                "free some space and start the campaign again with the same arguments (the finished points are stored)"
             }
-            FileAction::Use => "wait until that process ends, or name another folder with --out",
-            _ => "check that the folder can be read and written, or name another with --out",
+            FileAction::Use => "wait until that process ends, or choose another folder with --out",
+            _ => "check that you may read and write the folder, or choose another with --out",
         };
         CampaignError::File { error, remedy }
     }

@@ -55,7 +55,7 @@ impl Grid {
         let count = grid.operating_points.len() * grid.asymmetries.len();
         if !(1..=MAX_POINTS).contains(&count) {
             return Err(CampaignError::Grid(format!(
-                "{count} points; a campaign has from 1 to {MAX_POINTS}: use fewer values"
+                "the grid has {count} points, a campaign has from 1 to {MAX_POINTS}; use fewer values"
             )));
         }
         stage_settings(config)?;
@@ -96,7 +96,9 @@ impl Grid {
         let index = point.row * self.asymmetries.len() + point.column;
         there.sim.seed = config.sim.seed.wrapping_add(index as u64) % SEEDS;
         validate(&there).map_err(|error| {
-            CampaignError::Grid(format!("the grid exceeds an allowed range: {error}"))
+            CampaignError::Grid(format!(
+                "the grid exceeds an allowed range; narrow it: {error}"
+            ))
         })?;
         Ok(there)
     }
@@ -107,7 +109,7 @@ pub fn stage_settings(config: &Config) -> Result<&Sr4dofSettings, CampaignError>
     match &config.plant {
         PlantSettings::Sr4dof(settings) => Ok(settings),
         other => Err(CampaignError::Grid(format!(
-            "a campaign varies operating point and mass asymmetry; the model `{}` does not have both: use a profile with \
+            "a campaign varies operating point and mass asymmetry, but the model `{}` does not have both; use a profile with \
              the model `sr4dof` (--config stage, --config chapter2)",
             other.model()
         ))),

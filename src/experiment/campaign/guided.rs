@@ -287,11 +287,11 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         let load = match check.map(|check| (check.finding(), check.confirmed_by_hand)) {
             Some((_, true)) => "load confirmed by hand",
             Some((Finding::Holds, _)) => "load verified",
-            _ => "no check contradicts the load, but none can distinguish it from no load",
+            _ => "all checks agree with the load, but none of them can distinguish it from no load",
         };
         let cnmp = result.cnmp.name();
         self.operator
-            .tell(&format!("kept: CNMP zeros {cnmp}; {load}"));
+            .tell(&format!("stored: CNMP zeros {cnmp}; {load}"));
         Ok(PointEnd::Kept)
     }
 }

@@ -199,7 +199,10 @@ fn check_format(stored: &str) -> Result<(), String> {
 }
 
 fn json(value: &impl Serialize) -> Result<String, CampaignError> {
-    let text = serde_json::to_string_pretty(value)
-        .map_err(|e| CampaignError::Grid(format!("the settings cannot be written as JSON: {e}")))?;
+    let text = serde_json::to_string_pretty(value).map_err(|e| {
+        CampaignError::Grid(format!(
+            "the settings cannot be written as JSON: {e}; report this with the configuration"
+        ))
+    })?;
     Ok(text + "\n")
 }

@@ -36,7 +36,7 @@ pub enum FitError {
         modes: usize,
     },
     /// The progress callback cancelled the fit.
-    #[error("the fit was cancelled")]
+    #[error("the fit was cancelled; start it again to complete it")]
     Cancelled,
 }
 

@@ -131,7 +131,7 @@ fn averaged_periods(
         return Ok(count);
     }
     Err(IdentifyError::Periods(format!(
-        "{periods} whole periods, of which {skip} are omitted: {} must remain, the last of which only shows the drift; record more periods, omit fewer, or check the length of the period",
+        "too few periods remain after omitting {skip} of {periods} whole ones, at least {} are needed (the last is used for the drift only); record more periods, omit fewer, or check the length of the period",
         MIN_PERIODS + 1
     )))
 }

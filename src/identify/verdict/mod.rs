@@ -38,9 +38,9 @@ const SIGNIFICANT_POWER: f64 = 20.0;
 /// A residue with a larger probability of the opposite sign has no certain sign.
 const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
 
-const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; excite more, or for longer";
+const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
-const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and excite more";
+const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and increase the amplitude or the duration of the excitation";
 
 /// Whether there are CNMP zeros.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -163,7 +163,7 @@ fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
     let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
     (!good).then(|| {
         format!(
-            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes; excite less, so that the stage stays linear, or find in the Bode plot where response and fit differ"
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes; lower the amplitude, so that the stage stays linear, or find in the Bode plot where response and fit differ"
         )
     })
 }
@@ -172,7 +172,7 @@ fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
     let expected = input.expected_modes.unwrap_or(0);
     (found < expected).then(|| {
         format!(
-            "only {found} of the {expected} modes that the model has up to {:.0} Hz are found; excite more there, or for longer",
+            "only {found} of the {expected} modes that the model has up to {:.0} Hz are found; increase the amplitude there, or the duration",
             hertz(input.up_to_rad_s)
         )
     })
@@ -181,7 +181,7 @@ fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
 fn uncertain_sign(modes: &[FittedMode]) -> Option<String> {
     let uncertain = modes.iter().find(|mode| !has_certain_sign(mode))?;
     Some(format!(
-        "the sign of the residue at {:.2} Hz is uncertain; excite more there, or for longer",
+        "the sign of the residue at {:.2} Hz is uncertain; increase the amplitude there, or the duration",
         uncertain.frequency_hz().value
     ))
 }
@@ -195,7 +195,7 @@ fn uncertain_side(zeros: &[UncertainZero]) -> Option<String> {
     let zero = zeros.iter().find(|zero| !has_certain_side(zero))?;
     let real_part = zero.real_part();
     Some(format!(
-        "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); excite more there, or for longer",
+        "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
         real_part.value,
         real_part.half_width_95(),
         hertz(zero.s.norm()),
@@ -259,7 +259,7 @@ impl RightHalfPlane {
 
     fn disagreement(&self, phase_drop: PhaseDrop) -> String {
         format!(
-            "the zeros of the fit give {} degrees more phase lag than a minimum-phase system, the measured response {:.0}; excite more between the modes, or for longer",
+            "the zeros of the fit give {} degrees more phase lag than a minimum-phase system, the measured response {:.0}; increase the amplitude between the modes, or the duration",
             180 * self.half_turns(),
             phase_drop.drop_deg
         )

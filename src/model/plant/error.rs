@@ -18,7 +18,8 @@ pub enum PlantError {
     #[error(
         "the eigenvalue of mode {number}, {eigenvalue_rad2_s2:.3e} rad^2/s^2, is negative or, compared with that of \
          the fastest mode, zero within rounding errors: no spring supports the stage in that direction, \
-         or a mass is too small or a spring too stiff for double precision"
+         or a mass is too small or a spring too stiff for double precision; \
+         add a spring, raise the mass, or lower the stiffness"
     )]
     Unsupported {
         /// Number of the mode, from 1.
@@ -48,7 +49,9 @@ pub enum PlantError {
         model: &'static str,
     },
     /// A free body has no static compliance.
-    #[error("{0} is not defined for a free body (a body without a spring to ground)")]
+    #[error(
+        "{0} is not defined for a free body (a body without a spring to ground); connect each body to ground by a spring"
+    )]
     FreeBody(
         /// The quantity.
         &'static str,

@@ -139,9 +139,7 @@ impl LumpedSettings {
             if weights.iter().all(|weight| *weight == 0.0) {
                 findings.push(Finding::new(
                     "plant.nodes",
-                    format!(
-                        "give no node a part in the {quantity}; set `{key}` of at least one node"
-                    ),
+                    format!("assign the {quantity} to no node; set `{key}` of at least one node"),
                 ));
             }
         }
@@ -162,7 +160,7 @@ impl LumpedSettings {
         let mut known = self.nodes.keys().map(String::as_str).chain([GROUND]);
         let hint = nearest(end, known.clone()).unwrap_or(GROUND);
         (!known.any(|node| node == end)).then(|| {
-            format!("names the node `{end}`, which does not exist; the nearest is `{hint}`")
+            format!("names the node `{end}`, which does not exist; check the spelling (the nearest is `{hint}`)")
         })
     }
 

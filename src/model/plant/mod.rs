@@ -193,7 +193,8 @@ impl PlantSettings {
 
     fn check_operating_point(&self) -> Option<Finding> {
         let (point_m, length_m) = (self.operating_point_m()?, self.beam_length_m()?);
-        let what = format!("is {point_m} m, beyond the length of the beams, {length_m} m");
+        let what =
+            format!("is {point_m} m, beyond the length of the beams of {length_m} m; lower it");
         (point_m.abs() > length_m).then(|| Finding::new("plant.operating_point_m", what))
     }
 }

@@ -60,7 +60,7 @@ impl PlantModel for ModalSettings {
     fn check(&self) -> Vec<Finding> {
         let is_silent = self.modes.values().all(|mode| mode.residue_per_kg == 0.0);
         let silent = is_silent.then(|| {
-            let what = "have residues of zero only: no force would reach the probe; give at least one `residue_per_kg`";
+            let what = "have residues of zero only, so no force reaches the probe; give at least one `residue_per_kg`";
             Finding::new("plant.modes", what)
         });
         let modes = self.modes.iter();

@@ -57,7 +57,9 @@ fn parse_weight(part: &str, ports: &[Port]) -> Result<(usize, f64), String> {
         .parse()
         .ok()
         .filter(|weight: &f64| weight.is_finite());
-    let weight = weight.ok_or_else(|| format!("{part}: a weight is a number, as in {name}=0.5"))?;
+    let weight = weight.ok_or_else(|| {
+        format!("{part}: the weight is not a number; write for example {name}=0.5")
+    })?;
     Ok((place, weight))
 }
 
@@ -65,10 +67,10 @@ fn unknown_port(name: &str, ports: &[Port]) -> String {
     let names: Vec<&str> = ports.iter().map(|port| port.name.as_str()).collect();
     let nearest = nearest(name, names.iter().copied());
     let hint = nearest.map_or(String::new(), |nearest| {
-        format!("; did you mean {nearest}?")
+        format!(" (did you mean {nearest}?)")
     });
     format!(
-        "{name}: no such place; this plant has {}{hint}",
+        "{name}: no such place; choose one of {}{hint}",
         names.join(" ")
     )
 }

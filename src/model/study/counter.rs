@@ -86,7 +86,10 @@ fn check_relations(plant: &PlantSettings) -> Result<(), String> {
     let lines = findings
         .iter()
         .map(|finding| format!("\n  `{}` {}", finding.path, finding.what));
-    Err(format!("refused:{}", lines.collect::<String>()))
+    Err(format!(
+        "the plant is refused:{}",
+        lines.collect::<String>()
+    ))
 }
 
 /// The modes are computed first: a plant that cannot move, is not held or does not respond has no zeros to count.

@@ -89,10 +89,10 @@ impl From<FileError> for StudyError {
     fn from(error: FileError) -> StudyError {
         let remedy = match error.action {
             FileAction::Write => {
-                "the draws done so far are kept: free some space and start it again with the same arguments"
+                "free some space and start the study again with the same arguments (the draws done so far are stored)"
             }
-            FileAction::Use => "wait for it, or name another file",
-            _ => "check that the file can be read and written",
+            FileAction::Use => "wait until that process ends, or choose another file",
+            _ => "check that you may read and write the file",
         };
         StudyError::File { error, remedy }
     }
@@ -223,7 +223,7 @@ fn missing_shards(parts: &[Content], given: &BTreeSet<u64>) -> Option<String> {
         .map(|index| index.to_string())
         .collect();
     let names = missing.join(", ");
-    (!missing.is_empty()).then(|| format!("  of {count} shards there is no file of {names}"))
+    (!missing.is_empty()).then(|| format!("  missing shards: {names} of {count}"))
 }
 
 fn given_twice(parts: &[Content], index: u64) -> Option<String> {
@@ -234,7 +234,7 @@ fn given_twice(parts: &[Content], index: u64) -> Option<String> {
     let shard = files.map(|part| part.results.shard).next()?;
     (names.len() > 1).then(|| {
         let names = names.join(", ");
-        format!("  shard {shard} is there more than once: {names}")
+        format!("  shard {shard} is given more than once: {names}")
     })
 }
 
@@ -243,7 +243,7 @@ fn incomplete(part: &Content) -> Option<String> {
     let draws: u64 = missing.iter().map(|range| range.end - range.start).sum();
     let (first, path, shard) = (missing.first()?.start, &part.path, part.results.shard);
     Some(format!(
-        "  {path} (shard {shard}) lacks {draws} draws, from {first} on: start it again with its own arguments"
+        "  {path} (shard {shard}) lacks {draws} draws, from {first} on: continue it with its own arguments"
     ))
 }
 

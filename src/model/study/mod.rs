@@ -49,7 +49,7 @@ pub enum StudyError {
         String,
     ),
     /// An invalid shard.
-    #[error("invalid shard `{0}`: expected I/N with 1 <= I <= N, as in 3/8 for the third of eight")]
+    #[error("invalid shard `{0}`; give I/N with 1 <= I <= N, as in 3/8 for the third of eight")]
     Shard(
         /// As typed.
         String,
@@ -63,7 +63,7 @@ pub enum StudyError {
         remedy: &'static str,
     },
     /// A file of another kind.
-    #[error("{path} is not a study ({why}); it was left unchanged: name another file")]
+    #[error("{path} is not a study ({why}) and was left unchanged; choose another file")]
     NotAStudy {
         /// The file.
         path: String,
@@ -80,7 +80,7 @@ pub enum StudyError {
         differences: Vec<String>,
     },
     /// Files that are not a complete study together.
-    #[error("the shards are not a complete study:\n{}", .0.join("\n"))]
+    #[error("the shards are not a complete study; correct the list of files, or complete the shards:\n{}", .0.join("\n"))]
     Shards(
         /// A line for each finding.
         Vec<String>,

@@ -113,7 +113,7 @@ impl Plan {
     ) -> Result<Plan, StudyError> {
         if !(1..=MOST_DRAWS).contains(&draws) {
             return Err(StudyError::Plan(format!(
-                "{draws} draws; give --draws from 1 to {MOST_DRAWS}"
+                "{draws} draws are not possible; give --draws from 1 to {MOST_DRAWS}"
             )));
         }
         let varied = varied(&config.plant, tolerances)?;
@@ -184,7 +184,7 @@ fn check_plant(config: &Config, plant: PlantSettings) -> Result<(), String> {
 
 fn out_of_range(key: &str, value: f64, why: &str) -> StudyError {
     StudyError::Plan(format!(
-        "the tolerance of `{key}` reaches {value}: narrow it, or move the nominal value; {why}"
+        "the tolerance of `{key}` reaches {value}, which is refused; narrow it, or move the nominal value: {why}"
     ))
 }
 
@@ -199,7 +199,7 @@ fn varied(plant: &PlantSettings, tolerances: &[Tolerance]) -> Result<Vec<Varied>
     for tolerance in tolerances {
         for (key, nominal) in matching_settings(tolerance, &settings)? {
             if varied.iter().any(|one| one.key == *key) {
-                let why = format!("`{key}` varies already; name each setting once");
+                let why = format!("`{key}` varies already; give each setting once");
                 return Err(tolerance.wrong(why));
             }
             varied.push(Varied {
@@ -220,7 +220,7 @@ fn check_count(varied: usize) -> Result<(), StudyError> {
         )),
         1..=MOST_VARIED => Ok(()),
         _ => Err(StudyError::Plan(format!(
-            "{varied} settings would vary; the limit is {MOST_VARIED}: name fewer"
+            "{varied} settings would vary, the limit is {MOST_VARIED}; choose fewer"
         ))),
     }
 }
@@ -246,15 +246,17 @@ fn no_matching_setting(tolerance: &Tolerance, settings: &[(String, Value)]) -> S
     let mut keys = settings.iter().map(|(key, _)| key.as_str());
     let pattern = tolerance.pattern();
     if let Some(key) = keys.clone().find(|key| tolerance.matches(key)) {
-        return format!("`{key}` is not a quantity; only quantities can vary");
+        return format!("`{key}` is not a quantity; choose a quantity");
     }
     if !pattern.starts_with("plant.") {
         return format!(
-            "`{pattern}` is not a setting of the plant; a study varies settings that begin with `plant.`"
+            "`{pattern}` is not a setting of the plant; choose a setting that begins with `plant.`"
         );
     }
     let hint = nearest(pattern, &mut keys).unwrap_or("plant");
-    format!("`{pattern}` is not a setting of this plant; the nearest is `{hint}`")
+    format!(
+        "`{pattern}` is not a setting of this plant; check the spelling (the nearest is `{hint}`)"
+    )
 }
 
 /// All settings of a plant, with their dotted paths.

@@ -67,7 +67,7 @@ pub struct Tolerance {
     amounts: Amounts,
 }
 
-const USAGE: &str = "write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
+const USAGE: &str = "not a tolerance; write KEY=uniform:LOW:HIGH, KEY=normal:SIGMA or KEY=+-LIMIT, as in plant.secondary_stage_mass_kg=+-2%";
 
 #[derive(Clone, Debug, PartialEq)]
 enum Amounts {

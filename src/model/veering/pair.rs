@@ -8,8 +8,7 @@ use crate::model::plant::{PlantError, Structure};
 #[error("{0}")]
 pub struct PairError(String);
 
-const TOO_FEW: &str =
-    "fewer than two modes of this plant have a frequency above zero: there is no pair to follow";
+const TOO_FEW: &str = "fewer than two modes of this plant have a frequency above zero, so there is no pair to follow; choose another plant";
 const NO_MEETING: &str =
     "no two modes veer or cross inside the range; move --from or --to, or vary another setting";
 
@@ -26,7 +25,7 @@ where
             Ok([i.min(j) - 1, i.max(j) - 1])
         }
         _ => Err(PairError(format!(
-            "--modes {asked:?}: give two different modes, I,J, of 1 to {}",
+            "--modes {asked:?} is not a pair of modes; give two different modes, I,J, from 1 to {}",
             modes.end()
         ))),
     }

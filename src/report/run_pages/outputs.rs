@@ -25,7 +25,7 @@ pub enum OutputError {
     #[error(transparent)]
     Plot(#[from] ReportError),
     /// A file cannot be written.
-    #[error("cannot write {0}: {1}; free some space or choose another folder")]
+    #[error("cannot write {0}: {1}; free some space, or choose another folder with --out")]
     File(PathBuf, std::io::Error),
 }
 

@@ -97,7 +97,7 @@ pub enum CalibrationError {
         made: String,
     },
     /// The calibration cannot be written.
-    #[error("the calibration cannot be written as TOML: {0}")]
+    #[error("the calibration cannot be written as TOML: {0}; report this with the configuration")]
     Text(String),
     /// A gain so far from 1 that an error is more likely.
     #[error(
@@ -211,7 +211,7 @@ fn expired(
         return Ok(None);
     }
     Ok(Some(format!(
-        "it was made {days:.0} days ago, calibration.valid_days is {valid_days}"
+        "it was made {days:.0} days ago, and calibration.valid_days is {valid_days}"
     )))
 }
 
@@ -223,7 +223,7 @@ fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Opti
     let mut pairs = pairs.into_iter();
     let (kind, calibrated, connected) = pairs.find(|(_, theirs, ours)| theirs != ours)?;
     Some(format!(
-        "it belongs to another {kind}: {calibrated:?}, the connected one is {connected:?}"
+        "it was made for the {kind} {calibrated:?}, but {connected:?} is connected"
     ))
 }
 

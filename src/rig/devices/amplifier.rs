@@ -28,7 +28,7 @@ pub enum AmplifierError {
         why: String,
     },
     /// The simulated amplifier has no interface.
-    #[error("the simulated amplifier has no interface")]
+    #[error("the simulated amplifier has no interface; set amplifier.device")]
     Simulated,
 }
 

@@ -44,7 +44,7 @@ pub enum DevicesError {
     Probe(#[from] ProbeError),
     /// Only one of both is simulated.
     #[error(
-        "amplifier.device is {amplifier}, probe.device is {probe}: a real current and a simulated reading (or the reverse) make no control loop; set both to devices or both to `simulated`"
+        "amplifier.device is {amplifier} and probe.device is {probe}, but a loop needs two real devices or two simulated ones; set both to `simulated`, or neither"
     )]
     Mixed {
         /// Kind of the amplifier.
@@ -54,7 +54,7 @@ pub enum DevicesError {
     },
     /// The probe is open, but gives no valid reading.
     #[error(
-        "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); `bench doctor` examines it; nothing was moved",
+        "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); examine it with `bench doctor`; nothing was moved",
         FIRST_READING.as_secs()
     )]
     NoReading {

@@ -15,7 +15,7 @@ pub enum ProbeError {
     Serial(#[from] SerialError),
     /// The line needs more time than configured.
     #[error(
-        "probe.transport_s is {transport_s} s, but {characters} characters at {baud} baud take {least_s:.6} s: raise it, or the baud rate"
+        "probe.transport_s is {transport_s} s, but {characters} characters at {baud} baud take {least_s:.6} s; raise one of the two"
     )]
     Transport {
         /// As configured.
@@ -28,7 +28,7 @@ pub enum ProbeError {
         baud: u32,
     },
     /// The simulated probe has no interface.
-    #[error("the simulated probe has no interface")]
+    #[error("the simulated probe has no interface; set probe.device")]
     Simulated,
 }
 

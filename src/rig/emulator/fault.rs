@@ -32,13 +32,13 @@ pub enum AmplifierFault {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FaultError {
     /// No such kind.
-    #[error("there is no fault `{kind}`; the faults are {}", names())]
+    #[error("there is no fault `{kind}`; choose one of {}", names())]
     Unknown {
         /// The text before `=`.
         kind: String,
     },
     /// A value that the kind does not accept.
-    #[error("{kind}={value}: it must be {expected}")]
+    #[error("{kind}={value} is invalid; give {expected}")]
     Value {
         /// The kind.
         kind: String,
@@ -349,7 +349,7 @@ mod tests {
             "nonsense=1",
         ] {
             assert!(
-                refusal(text).contains("the faults are none, amplifier.none, amplifier.silence"),
+                refusal(text).contains("choose one of none, amplifier.none, amplifier.silence"),
                 "{}",
                 refusal(text)
             );

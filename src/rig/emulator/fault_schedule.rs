@@ -24,7 +24,7 @@ pub enum PlannedFaultError {
     Fault(#[from] FaultError),
     /// The time.
     #[error(
-        "`{text}`: expected KIND@TIME or KIND@FROM..TO, with times from 0 to {LATEST_S} s (2s, 500ms, or a number of seconds) and the end after the start, as in probe.silence@2s..2.5s"
+        "`{text}` is not a fault with its time; write KIND@TIME or KIND@FROM..TO, with times from 0 to {LATEST_S} s (2s, 500ms, or a number of seconds) and the end after the start, as in probe.silence@2s..2.5s"
     )]
     Time {
         /// The text.

@@ -68,7 +68,7 @@ impl fmt::Display for EmulatedDevice {
 pub enum EmulatorError {
     /// The configuration names no device.
     #[error(
-        "{device}.device is `simulated`: there is no device to emulate; name real devices, as --config lab does"
+        "{device}.device is `simulated`, so there is no device to emulate; choose a configuration with real devices, for example --config lab"
     )]
     Simulated {
         /// The device.
@@ -79,7 +79,7 @@ pub enum EmulatorError {
     Plant(#[from] PlantError),
     /// The CAN interface cannot be used.
     #[error(
-        "{0}; for a test on this computer without hardware: \
+        "{0}; for a test on this computer without hardware use \
          `ip link add vcan0 type vcan`, `ip link set vcan0 up`, and --interface vcan0"
     )]
     Port(#[from] PortError),
@@ -107,7 +107,9 @@ pub enum EmulatorError {
         why: String,
     },
     /// A fault that this device cannot have.
-    #[error("a {kind} cannot have the fault {fault}; `bench emulate --help` lists the faults")]
+    #[error(
+        "a {kind} cannot have the fault {fault}; choose one from the list in `bench emulate --help`"
+    )]
     Fault {
         /// Kind of the device, as in a configuration.
         kind: &'static str,
@@ -115,7 +117,7 @@ pub enum EmulatorError {
         fault: String,
     },
     /// A fault of a device that is not emulated.
-    #[error("{fault}: no {device} is emulated; name it on the command line")]
+    #[error("{fault}: no {device} is emulated; add it on the command line")]
     NotEmulated {
         /// The fault.
         fault: String,

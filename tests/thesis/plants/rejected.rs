@@ -84,7 +84,7 @@ fn rejects_invalid_plants_with_key_and_remedy() {
         ),
         (
             modal("u = { omega_rad_s = 1.0, residue_per_kg = 0.0 }"),
-            &["`plant.modes`", "no force would reach the probe"],
+            &["`plant.modes`", "no force reaches the probe"],
         ),
         (
             modal("u = { omega_rad_s = 0.0, residue_per_kg = 1.0, damping_ratio = 0.1 }"),

@@ -89,7 +89,7 @@ fn each_plant_runs_with_its_controller_and_rejects_those_of_the_stage() {
             "--slow",
             &[
                 "slow controller",
-                "at least 0.3 is required",
+                "below the limit of 0.3",
                 "--controller FILE",
                 "nothing was moved",
             ],

@@ -14,7 +14,7 @@ use thiserror::Error;
 
 /// Another process uses the node.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-#[error("node {node} is already in use by {}; end that first{}, or choose another node", process(*pid), kill(*pid))]
+#[error("node {node} is already in use by {}; end that process{}, or choose another node", process(*pid), kill(*pid))]
 pub struct NodeInUse {
     /// The node.
     pub node: u8,
@@ -81,7 +81,7 @@ mod tests {
         let first = Claim::new(&interface, 5).unwrap();
         let held = Claim::new(&interface, 5).unwrap_err();
         let text = format!(
-            "node 5 is already in use by process {me}; end that first (`kill {me}`), or choose another node"
+            "node 5 is already in use by process {me}; end that process (`kill {me}`), or choose another node"
         );
         assert_eq!((held.node, held.to_string()), (5, text));
         assert!(Claim::new(&interface, 6).is_ok(), "another node is free");
@@ -92,7 +92,7 @@ mod tests {
     #[test]
     fn suggests_no_kill_for_an_unknown_process() {
         let text =
-            "node 5 is already in use by another process; end that first, or choose another node";
+            "node 5 is already in use by another process; end that process, or choose another node";
         assert_eq!(NodeInUse { node: 5, pid: None }.to_string(), text); // `kill 0` would end the caller
     }
 }

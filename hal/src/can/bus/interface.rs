@@ -23,7 +23,9 @@ pub struct Interface {
 
 /// The state of the interface could not be read.
 #[derive(Debug, Error)]
-#[error("CAN interface {name}: {cause}; `ip link show type can` lists the interfaces")]
+#[error(
+    "CAN interface {name}: {cause}; choose an interface from the list of `ip link show type can`"
+)]
 pub struct InterfaceError {
     /// The name of the interface.
     pub name: String,

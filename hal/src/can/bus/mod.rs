@@ -54,7 +54,7 @@ pub enum BusError {
     #[error("the CAN interface is gone; plug the adapter in again")]
     Gone,
     /// Another error, with the number of the system.
-    #[error("the CAN interface failed with errno {0}")]
+    #[error("the CAN interface failed with errno {0}; read the messages of the kernel (dmesg)")]
     Other(i32),
 }
 

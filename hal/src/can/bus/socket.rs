@@ -39,7 +39,7 @@ pub enum PortError {
     },
     /// It runs at another bit rate than configured.
     #[error(
-        "CAN interface {name} runs at {have} bit/s, {want} is configured; `ip link set {name} down` and `ip link set {name} up type can bitrate {want}`, or change the configuration"
+        "CAN interface {name} runs at {have} bit/s, but {want} is configured; set the bit rate with `ip link set {name} down` and `ip link set {name} up type can bitrate {want}`, or change the configuration"
     )]
     BitRate {
         /// Its name.

@@ -10,7 +10,7 @@ use super::super::sdo::{Address, SdoError};
 #[derive(Debug, Error)]
 pub enum OpenError {
     /// An invalid setting.
-    #[error("{name} = {value} is invalid: expected {limit}")]
+    #[error("{name} = {value} is invalid; set it to {limit}")]
     Setting {
         /// The setting.
         name: &'static str,
@@ -34,7 +34,7 @@ pub enum OpenError {
     /// The drive is not the configured one.
     #[error(
         "{field} of node {node} is 0x{have:08X}, \
-         but 0x{want:08X} is configured: connect the configured drive, or correct the configuration"
+         but 0x{want:08X} is configured; connect the configured drive, or correct the configuration"
     )]
     Identity {
         /// The node.
@@ -61,7 +61,7 @@ pub enum OpenError {
     },
     /// The drive has none of the configured modes.
     #[error(
-        "node {node} has none of the configured modes of operation (0x6502 = 0x{supported:08X}; bit 9 is cyclic synchronous torque, bit 3 profile torque)"
+        "node {node} has none of the configured modes of operation (0x6502 = 0x{supported:08X}, where bit 9 is cyclic synchronous torque, bit 3 profile torque); choose another mode in the configuration, or another drive"
     )]
     Modes {
         /// The node.
@@ -83,8 +83,8 @@ pub enum OpenError {
     },
     /// The drive did not accept a value.
     #[error(
-        "node {node} returns 0x{have:X} for {address} after 0x{want:X} was written; \
-         its firmware does not accept this configuration"
+        "node {node}: object {address} reads back 0x{have:X} after 0x{want:X} was written, so the drive rejects the value; \
+         change the setting, or update the firmware of the drive"
     )]
     Verification {
         /// The node.
@@ -98,7 +98,8 @@ pub enum OpenError {
     },
     /// The drive lacks an object without which it would not stop when this program ends.
     #[error(
-        "node {node} cannot be configured to stop when the heartbeat of this program is lost: {cause}; if the drive stops by itself (disconnect the bus to verify it), leave abort_connection unset"
+        "node {node} cannot be configured to stop when the heartbeat of this program is lost: {}; disconnect the bus to check whether the drive stops without this setting, and if it does, set amplifier.device.on_communication_loss = \"own_reaction\"",
+        what(cause)
     )]
     NoStop {
         /// The node.
@@ -118,7 +119,8 @@ pub enum OpenError {
     },
     /// The drive has no timer for its status frames.
     #[error(
-        "node {node} has no inhibit time or event timer for its status frames, which an asynchronous exchange needs: {cause}; choose the synchronous exchange, in which the drive answers SYNC"
+        "node {node} has no inhibit time or event timer for its status frames, which an asynchronous exchange needs: {}; choose the synchronous exchange, in which the drive answers SYNC",
+        what(cause)
     )]
     NoTimer {
         /// The node.
@@ -131,4 +133,10 @@ pub enum OpenError {
         "the thread that monitors the drive could not be started: {0}; raise the limit of processes (ulimit -u)"
     )]
     Thread(std::io::Error),
+}
+
+/// The text of an error without its remedy, for an error with another one.
+fn what(error: &SdoError) -> String {
+    let text = error.to_string();
+    text.split("; ").next().unwrap_or_default().into()
 }

@@ -139,7 +139,7 @@ const FAULTS: [(u32, &str, &str); 23] = [
     (
         BUS_DOWN,
         "the CAN interface is down",
-        "`ip link set IFACE up`, then clear the fault",
+        "bring the interface up with `ip link set IFACE up`, then clear the fault",
     ),
     (
         BUS_GONE,
@@ -154,7 +154,7 @@ const FAULTS: [(u32, &str, &str); 23] = [
     (
         QUEUE_FULL,
         "the transmit queue of the CAN interface is full",
-        "check that the drive is on the bus; lower the rate",
+        "check that the drive is on the bus, or lower the rate",
     ),
     (
         BUS_FAILED,
@@ -165,18 +165,18 @@ const FAULTS: [(u32, &str, &str); 23] = [
     (
         COMMANDS_STOPPED,
         "the loop sent no more commands and the drive was switched off",
-        "look for overruns; the limit is the setting command_timeout",
+        "look for overruns (the limit is the setting command_timeout)",
     ),
     (
         STILL_ENABLED,
-        "the drive did not confirm that it is off; it was stopped by NMT and the heartbeat of this program ended",
+        "the drive did not confirm that it is off, so it was stopped by NMT and the heartbeat of this program ended",
         "disconnect the drive's power, find the cause, then clear the fault",
     ),
     (NOT_ARMED, "the drive is not enabled", "arm first"),
     (
         NOT_FINITE,
         "the commanded current is not a finite number",
-        "this is a fault of the program; please report it",
+        "report this fault of the program",
     ),
 ];
 
@@ -185,7 +185,7 @@ pub fn fault_text(code: u32) -> FaultText {
     if code & 0xFFFF_0000 == EMERGENCY {
         return FaultText {
             what: emcy::text(code as u16),
-            remedy: "the drive reports this in an emergency message; remove the cause, then clear the fault",
+            remedy: "remove the cause, then clear the fault (the drive reports this in an emergency message)",
         };
     }
     let fault = FAULTS.iter().find(|(known, ..)| *known == code);
@@ -193,7 +193,7 @@ pub fn fault_text(code: u32) -> FaultText {
     FaultText { what, remedy }
 }
 
-const UNKNOWN: (&str, &str) = ("unknown fault", "please report the code");
+const UNKNOWN: (&str, &str) = ("unknown fault", "report the code");
 
 /// Whether `code` describes the same fault as `first` more precisely: an emergency message after the state Fault; an interface
 /// that is gone, because it goes down first when the adapter is unplugged.

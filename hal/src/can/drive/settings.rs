@@ -296,7 +296,7 @@ mod tests {
         assert!(DriveSettings::default().check().is_ok());
         assert_eq!(
             refusal(|s| s.node = 0),
-            "node = 0 is invalid: expected 1 to 127"
+            "node = 0 is invalid; set it to 1 to 127"
         );
         assert!(refusal(|s| s.own_node = 5).contains("not that of the drive"));
         assert!(

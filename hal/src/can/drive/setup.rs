@@ -114,7 +114,7 @@ impl Setup<'_> {
         Scale::new(reference_a, limit_a).ok_or_else(|| OpenError::Setting {
             name: "current_limit_a",
             value: format!("{limit_a} A with 1000 counts = {reference_a} A"),
-            limit: "both positive, the limit at least one count",
+            limit: "positive values, with a limit of at least one count",
         })
     }
 

@@ -12,7 +12,9 @@ use super::{AbortCode, Address, Client, Failure, Progress, answer_id, request_id
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum SdoError {
     /// The node aborted the transfer.
-    #[error("node {node} refuses {address}: {code}")]
+    #[error(
+        "node {node} refuses {address}: {code}; check that the drive supports this object and its value"
+    )]
     Aborted {
         /// The node.
         node: u8,

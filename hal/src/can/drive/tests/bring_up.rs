@@ -166,7 +166,7 @@ fn rejects_a_drive_without_a_reaction_to_a_lost_heartbeat_unless_configured() {
     };
     let refused = refusal(DriveSettings::default(), device.clone());
     assert!(
-        refused.contains("disconnect the bus to verify it"),
+        refused.contains("disconnect the bus to check whether the drive stops"),
         "{refused}"
     );
     assert!(
