@@ -174,10 +174,10 @@ impl Servo {
     /// Commands the requested current if the interlocks allow it; otherwise switches everything off.
     fn write(&mut self, requested_a: f64, tick: u64) {
         (self.applied_a, self.raw_command_a) = (0.0, 0.0);
-        if self.is_on() {
-            if let Err(trip) = self.command(requested_a) {
-                self.trip(trip, tick);
-            }
+        if self.is_on()
+            && let Err(trip) = self.command(requested_a)
+        {
+            self.trip(trip, tick);
         }
         self.interlocks
             .record_current(self.applied_a, self.raw_command_a);

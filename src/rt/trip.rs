@@ -233,7 +233,7 @@ impl fmt::Display for Trip {
                 command_a,
             } => write!(
                 f,
-                "the amplifier measures {actual_a:.3} A; the nearest commanded current is {command_a:.3} A"
+                "the amplifier measures {actual_a:.3} A, but the nearest commanded current is {command_a:.3} A"
             ),
             Trip::Overruns { count, limit } => write!(
                 f,
