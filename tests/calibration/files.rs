@@ -112,7 +112,7 @@ fn expired_or_mismatched_calibration_warns_or_fails_as_configured() {
         (
             "mismatched.toml",
             "when_other_devices",
-            "another amplifier",
+            "made for the amplifier",
             "canopen 0x1-0x2",
         ),
     ];

@@ -120,7 +120,7 @@ fn rejects_hysteresis_and_nonlinearity_with_their_figures() {
     .to_string();
     assert!(
         hysteresis.contains("between rising and falling current")
-            && hysteresis.contains("0.01 is allowed"),
+            && hysteresis.contains("above the limit of 0.01 "),
         "{hysteresis}"
     );
     let mut generous = config.clone();

@@ -282,7 +282,7 @@ fn rejects_invalid_options_before_serving() {
         ("stage --config lab", "amplifier"),
         ("probe --config lab --port /dev/ttyNONE9", "no such port"),
         ("probe --config lab --interface vcan0", "amplifier"),
-        ("probe --config lab --measuring-rate 0", "above zero"),
+        ("probe --config lab --measuring-rate 0", "above 0"),
         ("probe --config lab --fault probe.stuck", "KIND@FROM..TO"),
         ("probe --config lab --fault probe.x@1", "there is no fault"),
         (

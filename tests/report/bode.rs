@@ -430,7 +430,7 @@ fn rejects_invalid_traces_by_name() {
     });
     assert_eq!(
         error.to_string(),
-        "trace \"bad\" has 2 frequencies, but a column of 1 values"
+        "trace \"bad\" has 2 frequencies, but a column of 1 values; give each column one value per frequency"
     );
     for frequency_hz in [
         [0.0, 1.0],
