@@ -35,7 +35,7 @@ fn drive_on_another_card_runs_and_cards_report_their_state() {
 
     let refused = SocketPort::open("can0", 500_000).unwrap_err().to_string();
     assert!(
-        refused.contains("can0 runs at 1000000 bit/s, 500000 is configured"),
+        refused.contains("can0 runs at 1000000 bit/s, but 500000 is configured"),
         "{refused}"
     );
 }
