@@ -20,6 +20,11 @@ pub struct LoopSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0, max = 1023))]
     pub cpu: Option<usize>,
+    /// Length of each of the two ramps to zero current at the end of a run, in seconds; 0 switches the current off in one
+    /// step. If absent: three periods of the first mode of the model, at most 2 s.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 60.0))]
+    pub stop_ramp_s: Option<f64>,
 }
 
 impl LoopSettings {

@@ -215,6 +215,7 @@ mod tests {
             computing_delay_periods: 0,
             priority: 80,
             cpu: None,
+            stop_ramp_s: None,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

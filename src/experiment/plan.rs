@@ -1,13 +1,15 @@
 //! The plan of a run: the configuration and the files that it names. The recording contains all of them, so that the same plan
 //! can be made from it again.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::plan_error::PlanError;
 use super::swept_reference;
-use crate::config::{self, Config, whole};
+use crate::config::{self, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
+use crate::model::plant::{self, ModalModel};
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, Correction};
 use crate::rt::program::{Control, Excite, Program};
@@ -20,6 +22,10 @@ const CALIBRATION: &str = "calibration.toml";
 const REFERENCE: &str = "reference.csv";
 /// Metadata key of the kind of run.
 pub(super) const KIND: &str = "run";
+/// Metadata key of [`Plan::ramp_ticks`]. Recordings of older versions do not have it: the current ended in one step.
+pub(super) const RAMP_TICKS: &str = "ramp_ticks";
+/// The longest ramp to zero current that is chosen from the model, in seconds.
+const LONGEST_RAMP_S: f64 = 2.0;
 
 /// The kind of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,6 +191,16 @@ impl Plan {
         Ok(Control::new(law, reference, settle, closed))
     }
 
+    /// Length of each of the two ramps at the end of the run in ticks.
+    pub fn ramp_ticks(&self) -> Result<u64, PlanError> {
+        let servo = &self.config.servo;
+        let ramp_s = match servo.stop_ramp_s {
+            Some(ramp_s) => ramp_s,
+            None => three_periods_s(&self.config.plant)?,
+        };
+        Ok(libm::round(ramp_s * servo.rate_hz) as u64)
+    }
+
     /// The effective configuration as TOML.
     pub fn config_toml(&self) -> Result<String, PlanError> {
         toml::to_string(&self.config).map_err(|e| PlanError::Text(e.to_string()))
@@ -211,6 +227,14 @@ impl Plan {
         let present = present.filter_map(|(name, media, text)| Some((name, media, text?)));
         Ok(present.collect())
     }
+}
+
+/// Three periods of the first mode of the model in seconds, at most [`LONGEST_RAMP_S`]. A free body is not a mode.
+fn three_periods_s(plant: &PlantSettings) -> Result<f64, PlanError> {
+    let model = ModalModel::of(&plant::build(plant)?)?;
+    let frequencies = model.modes.iter().map(|mode| mode.omega_rad_s / TAU);
+    let first_hz = frequencies.filter(|hz| *hz > 0.0).reduce(f64::min);
+    Ok(first_hz.map_or(LONGEST_RAMP_S, |hz| (3.0 / hz).min(LONGEST_RAMP_S)))
 }
 
 fn kind(recording: &Recording) -> Result<RunKind, PlanError> {

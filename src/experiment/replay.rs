@@ -11,7 +11,7 @@ use rtrb::Producer;
 use serde::Serialize;
 
 use super::connections::{OutsideEnds, connect};
-use super::plan::Plan;
+use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 use crate::recording::{Recording, RecordingError};
@@ -72,7 +72,7 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
     let mut events = recording.events().iter().peekable();
     let mut ticks = recording.ticks()?.peekable();
     let has_raw = matches!(ticks.peek(), Some(Ok(record)) if record.raw_position_m.is_some());
-    let mut replay = Replay::new(&Plan::of(recording)?, has_raw)?;
+    let mut replay = Replay::new(&Plan::of(recording)?, has_raw, ramp_ticks(recording)?)?;
     for record in ticks {
         let record = record?;
         let amplifier_tripped = replay.feed_events(&mut events, record.tick);
@@ -82,6 +82,15 @@ pub fn replay(recording: &Recording) -> Result<Replayed, ReplayError> {
         });
     }
     Ok(replay.result)
+}
+
+/// The length of the ramps at the end of the run; 0 in recordings of older versions.
+fn ramp_ticks(recording: &Recording) -> Result<u64, PlanError> {
+    let Some(text) = recording.metadata().get(RAMP_TICKS) else {
+        return Ok(0);
+    };
+    let ticks = text.parse();
+    ticks.map_err(|_| PlanError::Missing("valid number of `ramp_ticks` in its metadata"))
 }
 
 fn require_no_gap(recording: &Recording) -> Result<(), ReplayError> {
@@ -106,7 +115,7 @@ struct Replay {
 impl Replay {
     /// `has_raw`: the recording contains the readings before the correction. Without a calibration, and in recordings of older
     /// versions, the recorded readings are those that the interlocks judged.
-    fn new(plan: &Plan, has_raw: bool) -> Result<Replay, PlanError> {
+    fn new(plan: &Plan, has_raw: bool, ramp_ticks: u64) -> Result<Replay, PlanError> {
         let (connections, outside) = connect(SLOTS_PER_TICK);
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
@@ -118,7 +127,9 @@ impl Replay {
             &config.servo,
         );
         Ok(Replay {
-            servo: Servo::new(Box::new(rig), interlocks, connections).with_correction(correction),
+            servo: Servo::new(Box::new(rig), interlocks, connections)
+                .with_correction(correction)
+                .with_ramps(ramp_ticks),
             outside,
             feed,
             program: Some(plan.program()?),
@@ -152,6 +163,7 @@ impl Replay {
         let request = match kind {
             RequestKind::Arm => Some(Request::Arm),
             RequestKind::Start => self.program.take().map(Request::Start),
+            RequestKind::Finish => Some(Request::Finish),
             RequestKind::Stop => Some(Request::Stop),
             RequestKind::Clear => Some(Request::Clear),
         };

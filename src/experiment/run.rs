@@ -12,7 +12,7 @@ use rtrb::Producer;
 
 use super::connections::{OutsideEnds, connect};
 use super::file_name;
-use super::plan::{KIND, Plan};
+use super::plan::{KIND, Plan, RAMP_TICKS};
 use super::run_error::RunError;
 use super::signals::{StopSignals, runtime};
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
@@ -87,8 +87,11 @@ fn prepare_run(
     let total_ticks = program.ticks();
     let (connections, mut outside) = connect(RING_SLOTS);
     queue_start(&mut outside.requests, program);
-    let servo_loop = prepare_loop(plan, rig, connections, pace)?;
-    let recorder = create_recording(plan, pace, servo_loop.scheduling(), folder)?;
+    let ramp_ticks = plan.ramp_ticks()?;
+    let servo_loop = prepare_loop(plan, rig, connections, pace, ramp_ticks)?;
+    let mut metadata = metadata(plan, pace, servo_loop.scheduling());
+    metadata.insert(RAMP_TICKS.into(), ramp_ticks.to_string());
+    let recorder = create_recording(plan, metadata, folder)?;
     Ok(PreparedRun {
         servo_loop,
         recorder,
@@ -111,6 +114,7 @@ fn prepare_loop(
     rig: Box<dyn Rig>,
     connections: Connections,
     pace: Pace,
+    ramp_ticks: u64,
 ) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
     let interlocks = Interlocks::new(
@@ -119,7 +123,9 @@ fn prepare_loop(
         &config.motor,
         &config.servo,
     );
-    let servo = Servo::new(rig, interlocks, connections).with_correction(plan.correction());
+    let servo = Servo::new(rig, interlocks, connections)
+        .with_correction(plan.correction())
+        .with_ramps(ramp_ticks);
     let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
     prepare(servo, &config.servo, pace, tail_ticks)
         .map_err(RunError::system("start the thread of the loop"))
@@ -128,14 +134,13 @@ fn prepare_loop(
 /// Creates the recording, with everything that is known before the first tick.
 fn create_recording(
     plan: &Plan,
-    pace: Pace,
-    scheduling: &Scheduling,
+    metadata: BTreeMap<String, String>,
     folder: &Path,
 ) -> Result<Recorder, RunError> {
     let header = Header {
         config_toml: plan.config_toml()?,
         period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
-        metadata: metadata(plan, pace, scheduling),
+        metadata,
     };
     create_folder(folder)?;
     let path = file_name::recording(folder, &plan.label(), SystemTime::now());
@@ -193,7 +198,7 @@ impl PreparedRun {
         let mut supervisor = Supervisor {
             requests,
             health: recorder.health(),
-            stopped: false,
+            stopping: Stopping::No,
         };
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
@@ -205,7 +210,7 @@ impl PreparedRun {
             ended,
             pace: self.pace,
             scheduling,
-            stopped: supervisor.stopped,
+            stopped: supervisor.stopping != Stopping::No,
             recorder,
         })
     }
@@ -215,7 +220,18 @@ impl PreparedRun {
 struct Supervisor {
     requests: Producer<Request>,
     health: Arc<Health>,
-    stopped: bool,
+    stopping: Stopping,
+}
+
+/// What the supervisor requested to end the run early.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stopping {
+    /// Nothing.
+    No,
+    /// The current goes to zero along a ramp.
+    Ramp,
+    /// The current was cut.
+    Cut,
 }
 
 impl Supervisor {
@@ -245,18 +261,27 @@ impl Supervisor {
         while !thread.is_finished() {
             tokio::select! {
                 _ = beat.tick() => watch(),
-                () = signals.received() => self.stop(),
+                () = signals.received() => self.signalled(),
             }
-            if self.health.failed() {
-                self.stop();
+            if self.health.failed() && self.stopping == Stopping::No {
+                self.request(Request::Finish, Stopping::Ramp);
             }
         }
     }
 
-    /// Requests zero current at the next tick, once. If the request is not taken, the loop has ended.
-    fn stop(&mut self) {
-        if !self.stopped {
-            self.stopped = self.requests.push(Request::Stop).is_ok();
+    /// The first signal ends the run along a ramp, the second one cuts the current.
+    fn signalled(&mut self) {
+        match self.stopping {
+            Stopping::No => self.request(Request::Finish, Stopping::Ramp),
+            Stopping::Ramp => self.request(Request::Stop, Stopping::Cut),
+            Stopping::Cut => {}
+        }
+    }
+
+    /// Sends a request. If there is no room for it, the next signal sends it again.
+    fn request(&mut self, request: Request, stopping: Stopping) {
+        if self.requests.push(request).is_ok() {
+            self.stopping = stopping;
         }
     }
 }

@@ -71,9 +71,10 @@ fn of_lost(records: u64) -> Message {
     }
 }
 
-const REQUESTS: [(RequestKind, &str); 4] = [
+const REQUESTS: [(RequestKind, &str); 5] = [
     (RequestKind::Arm, "arm"),
     (RequestKind::Start, "start"),
+    (RequestKind::Finish, "finish"),
     (RequestKind::Stop, "stop"),
     (RequestKind::Clear, "clear"),
 ];

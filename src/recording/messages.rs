@@ -178,11 +178,12 @@ pub(super) const VALIDITIES: [(Validity, &str); 4] = [
 ];
 
 /// The states; the index is the number in a message.
-pub(super) const STATES: [State; 4] = [
+pub(super) const STATES: [State; 5] = [
     State::Disarmed,
     State::Armed,
     State::Running,
     State::Tripped,
+    State::Settling,
 ];
 
 /// A name or number in a message that this version of the program does not know.
@@ -290,6 +291,8 @@ mod tests {
                 .expect_err("unknown")
                 .to_string();
             assert!(error.contains("validity") && error.contains(&number.to_string()));
+        }
+        for number in [5, -1, i32::MAX] {
             let later = Loop {
                 state: number,
                 ..good

@@ -1,18 +1,18 @@
 //! The arming machine: the states in which current may flow.
 //!
 //! ```text
-//!              arm                start
-//!  Disarmed ---------->  Armed  ---------->  Running
-//!     ^  ^                 |  |                |  |
-//!     |  |   stop, done    |  |   stop, done   |  |
-//!     |  +-----------------+--|----------------+  |
-//!     |                       |                   |
-//!     |  clear (operator)     v      trip         |
-//!     +-------------------  Tripped  <------------+
+//!              arm                start              finish, done
+//!  Disarmed ---------->  Armed  ---------->  Running ----------> Settling
+//!     ^  ^                 |  |                |  |                |  |
+//!     |  |      stop       |  |      stop      |  |  stop, settled |  |
+//!     |  +-----------------+--|----------------+--|----------------+  |
+//!     |                       |                   |                   |
+//!     |  clear (operator)     v       trip        v       trip        |
+//!     +-------------------  Tripped  <-----------------------------------+
 //! ```
 //!
-//! In `Disarmed` and `Tripped` the amplifier is disabled. In `Armed` it is enabled and commanded zero. Only `clear`
-//! leaves `Tripped`, to `Disarmed`: a new run must be armed again.
+//! In `Disarmed` and `Tripped` the amplifier is disabled. In `Armed` it is enabled and commanded zero. In `Settling` the
+//! current of an ended run goes to zero along a ramp. Only `clear` leaves `Tripped`, to `Disarmed`: a new run must be armed again.
 
 pub use super::trip::Trip;
 
@@ -26,6 +26,8 @@ pub enum State {
     Armed,
     /// A program commands current, below the interlocks.
     Running,
+    /// The run has ended; reference and current go to zero along a ramp, below the interlocks.
+    Settling,
     /// An interlock switched everything off; waits for the operator.
     Tripped,
 }
@@ -37,7 +39,9 @@ pub enum Transition {
     Arm,
     /// A program was passed to the loop.
     Start,
-    /// The program ended, or the operator stopped it.
+    /// The program ended, or the operator ended it: the current goes to zero along a ramp.
+    Finish,
+    /// The ramp ended, or the operator cut the current.
     Stop,
     /// An interlock tripped.
     Trip,
@@ -51,8 +55,13 @@ impl State {
         match (self, transition) {
             (State::Disarmed, Transition::Arm) => Some(State::Armed),
             (State::Armed, Transition::Start) => Some(State::Running),
-            (State::Armed | State::Running, Transition::Stop) => Some(State::Disarmed),
-            (State::Armed | State::Running, Transition::Trip) => Some(State::Tripped),
+            (State::Running, Transition::Finish) => Some(State::Settling),
+            (State::Armed | State::Running | State::Settling, Transition::Stop) => {
+                Some(State::Disarmed)
+            }
+            (State::Armed | State::Running | State::Settling, Transition::Trip) => {
+                Some(State::Tripped)
+            }
             (State::Tripped, Transition::Clear) => Some(State::Disarmed),
             _ => None,
         }
@@ -64,6 +73,7 @@ impl State {
             State::Disarmed => "disarmed",
             State::Armed => "armed",
             State::Running => "running",
+            State::Settling => "settling",
             State::Tripped => "tripped",
         }
     }

@@ -7,7 +7,7 @@
 //!            retired programs (ring)
 //! ```
 //!
-//! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`clock`] its two paces, [`program`] what it
+//! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`settling`] the end of a run, [`clock`] its two paces, [`program`] what it
 //! runs, [`record`] what it publishes.
 
 pub mod arming;
@@ -18,5 +18,6 @@ pub mod program;
 pub mod publisher;
 pub mod record;
 pub mod servo;
+pub mod settling;
 pub mod thread;
 mod trip;

@@ -33,6 +33,17 @@ pub trait Program: Send {
     /// The command of this tick. Called in the tick: must not allocate or block.
     fn decide(&mut self, input: &ProgramInput) -> Decision;
 
+    /// The command of a tick in which the run ends (see [`settling`](super::settling)). `scale` falls from 1 to 0; at 0 the
+    /// program must request what keeps the stage at rest. The tick of `input` stops at the last one of the program. Without
+    /// an implementation of its own, a program's current is scaled. Called in the tick: must not allocate or block.
+    fn settle(&mut self, input: &ProgramInput, scale: f64) -> Decision {
+        let decision = self.decide(input);
+        Decision {
+            requested_a: scale * decision.requested_a,
+            ..decision
+        }
+    }
+
     /// Length of the run in ticks. Called in the tick: must not allocate or block.
     fn ticks(&self) -> u64;
 }
@@ -88,7 +99,7 @@ impl Control {
     }
 
     /// Takes the position into the mean over the rest.
-    fn settle(&mut self, input: &ProgramInput) -> Decision {
+    fn rest(&mut self, input: &ProgramInput) -> Decision {
         self.rest_m += (input.position_m - self.rest_m) / (input.tick + 1) as f64;
         Decision {
             reference_m: self.rest_m,
@@ -96,18 +107,11 @@ impl Control {
             active: false,
         }
     }
-}
 
-impl Program for Control {
-    fn decide(&mut self, input: &ProgramInput) -> Decision {
-        let Some(tick) = input.tick.checked_sub(self.settle_ticks) else {
-            return self.settle(input);
-        };
-        if tick == 0 {
-            self.law.reset(self.rest_m);
-        }
+    /// A tick in closed loop. `relative_m`: the reference in metres from the rest position.
+    fn closed(&mut self, input: &ProgramInput, relative_m: f64) -> Decision {
         let law_input = LawInput {
-            reference_m: self.rest_m + self.reference.at_m(tick),
+            reference_m: self.rest_m + relative_m,
             position_m: input.position_m,
             applied_a: input.applied_a,
         };
@@ -115,6 +119,27 @@ impl Program for Control {
             reference_m: law_input.reference_m,
             requested_a: self.law.update(&law_input),
             active: true,
+        }
+    }
+}
+
+impl Program for Control {
+    fn decide(&mut self, input: &ProgramInput) -> Decision {
+        match input.tick.checked_sub(self.settle_ticks) {
+            None => self.rest(input),
+            Some(0) => {
+                self.law.reset(self.rest_m);
+                self.closed(input, self.reference.at_m(0))
+            }
+            Some(tick) => self.closed(input, self.reference.at_m(tick)),
+        }
+    }
+
+    /// The loop stays closed, and its reference goes to the rest position.
+    fn settle(&mut self, input: &ProgramInput, scale: f64) -> Decision {
+        match input.tick.checked_sub(self.settle_ticks) {
+            None => Decision::default(),
+            Some(tick) => self.closed(input, scale * self.reference.at_m(tick)),
         }
     }
 

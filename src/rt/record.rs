@@ -102,7 +102,9 @@ pub enum RequestKind {
     Arm,
     /// Run the program that came with the request.
     Start,
-    /// Zero current, disarm.
+    /// End the run: current to zero along a ramp, disarm.
+    Finish,
+    /// Zero current at once, disarm.
     Stop,
     /// The operator clears a trip.
     Clear,

@@ -12,6 +12,7 @@ use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
 use super::record::{EventKind, REQUESTS_PER_TICK, RequestKind, TickRecord, flag};
+use super::settling::{Settling, SettlingStep};
 use crate::rig::calibration::Correction;
 
 /// The current is unknown if the driver returns a value that is not finite.
@@ -27,7 +28,9 @@ pub enum Request {
     Arm,
     /// Run a program from the next tick on.
     Start(Box<dyn Program>),
-    /// Zero current, disarm.
+    /// End the run: current to zero along a ramp, disarm.
+    Finish,
+    /// Zero current at once, disarm.
     Stop,
     /// The operator clears a trip.
     Clear,
@@ -38,6 +41,7 @@ impl Request {
         match self {
             Request::Arm => RequestKind::Arm,
             Request::Start(_) => RequestKind::Start,
+            Request::Finish => RequestKind::Finish,
             Request::Stop => RequestKind::Stop,
             Request::Clear => RequestKind::Clear,
         }
@@ -59,6 +63,11 @@ pub struct Servo {
     state: State,
     program: Option<Box<dyn Program>>,
     run_tick: u64,
+    /// Length of each of the two ramps to zero current in ticks; without ramps if 0.
+    ramp_ticks: u64,
+    settling: Settling,
+    /// Current in amperes that the program requested in the last tick.
+    requested_a: f64,
     /// Current in amperes that the amplifier gives since the last tick.
     applied_a: f64,
     /// The same current as set-point of the amplifier, before the correction.
@@ -91,6 +100,9 @@ impl Servo {
             state: State::Disarmed,
             program: None,
             run_tick: 0,
+            ramp_ticks: 0,
+            settling: Settling::new(0),
+            requested_a: 0.0,
             applied_a: 0.0,
             raw_command_a: 0.0,
             connections,
@@ -103,6 +115,13 @@ impl Servo {
     /// The loop with the correction of a calibration. The interlocks judge readings and set-points before and after it.
     pub fn with_correction(mut self, correction: Option<Correction>) -> Self {
         self.correction = correction;
+        self
+    }
+
+    /// The loop with ramps of `ramp_ticks` at the end of a run (see [`settling`](super::settling)). Without them the current
+    /// goes to zero in one step.
+    pub fn with_ramps(mut self, ramp_ticks: u64) -> Self {
+        self.ramp_ticks = ramp_ticks;
         self
     }
 
@@ -147,9 +166,7 @@ impl Servo {
                 code: i64::from(code),
                 text: self.rig.explain(code),
             }),
-            AmplifierStatus::Disabled if self.state == State::Running => {
-                Err(Trip::AmplifierDisabled)
-            }
+            AmplifierStatus::Disabled if self.runs() => Err(Trip::AmplifierDisabled),
             AmplifierStatus::Disabled | AmplifierStatus::Enabled => {
                 missed.and(raw).and(corrected).and(current)
             }
@@ -167,12 +184,16 @@ impl Servo {
         };
         match (self.state, &mut self.program) {
             (State::Running, Some(program)) => program.decide(&input),
+            (State::Settling, Some(program)) => {
+                settle(&mut self.settling, program, &input, self.requested_a)
+            }
             _ => Decision::default(),
         }
     }
 
     /// Commands the requested current if the interlocks allow it; otherwise switches everything off.
     fn write(&mut self, requested_a: f64, tick: u64) {
+        self.requested_a = requested_a;
         (self.applied_a, self.raw_command_a) = (0.0, 0.0);
         if self.is_on()
             && let Err(trip) = self.command(requested_a)
@@ -249,17 +270,38 @@ impl Servo {
     }
 
     fn finish_run(&mut self, tick: u64) {
-        if self.state != State::Running {
-            return;
+        let ticks = self.program.as_ref().map_or(0, |program| program.ticks());
+        match self.state {
+            State::Running => self.count_tick(tick, ticks),
+            State::Settling if self.settling.is_done() => self.switch_off(Transition::Stop, tick),
+            State::Settling => self.run_tick = (self.run_tick + 1).min(ticks.saturating_sub(1)),
+            State::Disarmed | State::Armed | State::Tripped => {}
         }
+    }
+
+    /// Counts a tick of the program; after the last one the run ends.
+    fn count_tick(&mut self, tick: u64, ticks: u64) {
         self.run_tick += 1;
         let progress = &self.connections.progress.run_ticks;
         progress.store(self.run_tick, Ordering::Relaxed);
-        let program = self.program.as_ref();
-        if program.is_some_and(|program| self.run_tick >= program.ticks()) {
+        if self.run_tick >= ticks {
             self.completed = true;
             self.event(tick, EventKind::Completed);
-            self.switch_off(Transition::Stop, tick);
+            self.run_tick = ticks.saturating_sub(1);
+            self.finish(tick);
+        }
+    }
+
+    /// Ends the run: the current goes to zero along a ramp. Without a run, or without current, the amplifier is disabled at
+    /// once.
+    fn finish(&mut self, tick: u64) {
+        match self.state {
+            State::Running if self.ramp_ticks > 0 && self.requested_a != 0.0 => {
+                self.settling = Settling::new(self.ramp_ticks);
+                self.change(Transition::Finish, tick);
+            }
+            State::Running | State::Armed => self.switch_off(Transition::Stop, tick),
+            State::Settling | State::Disarmed | State::Tripped => {}
         }
     }
 
@@ -272,6 +314,7 @@ impl Servo {
             match request {
                 Request::Arm => self.arm(tick),
                 Request::Start(program) => self.start(program, tick),
+                Request::Finish => self.finish(tick),
                 Request::Stop => self.switch_off(Transition::Stop, tick),
                 Request::Clear => self.clear(tick),
             }
@@ -353,12 +396,17 @@ impl Servo {
         std::mem::take(&mut self.took_slow_request)
     }
 
-    /// Whether the loop is armed or running, with the amplifier enabled.
+    /// Whether the amplifier is enabled.
     fn is_on(&self) -> bool {
-        matches!(self.state, State::Armed | State::Running)
+        self.state == State::Armed || self.runs()
     }
 
-    /// Whether the loop is neither armed nor running.
+    /// Whether a run goes on or settles: current may flow.
+    fn runs(&self) -> bool {
+        matches!(self.state, State::Running | State::Settling)
+    }
+
+    /// Whether the amplifier is disabled.
     pub fn is_off(&self) -> bool {
         !self.is_on()
     }
@@ -376,6 +424,27 @@ impl Servo {
     /// The connection to the recorder.
     pub fn publisher(&self) -> &Publisher {
         &self.connections.publisher
+    }
+}
+
+/// The decision in a tick of [`State::Settling`], which does not belong to the experiment any more.
+fn settle(
+    settling: &mut Settling,
+    program: &mut Box<dyn Program>,
+    input: &ProgramInput,
+    requested_a: f64,
+) -> Decision {
+    let decision = match settling.next(requested_a) {
+        SettlingStep::Program { scale } => program.settle(input, scale),
+        SettlingStep::Current(requested_a) => Decision {
+            requested_a,
+            ..Decision::default()
+        },
+        SettlingStep::Done => Decision::default(),
+    };
+    Decision {
+        active: false,
+        ..decision
     }
 }
 

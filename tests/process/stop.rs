@@ -22,6 +22,13 @@ fn start_with(run: LongRun, disposition: &str, folder: &Path) -> Running {
     Running::of(&mut command)
 }
 
+/// The tick of an event.
+fn tick_of(recording: &Recording, kind: EventKind) -> u64 {
+    let mut events = recording.events().iter();
+    let event = events.find(|event| event.kind == kind);
+    event.unwrap_or_else(|| panic!("{kind:?} is recorded")).tick
+}
+
 /// A run stopped by a signal ends at zero current, with a complete recording and report.
 fn stopped_by(signal: i32, run: LongRun) {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -52,40 +59,40 @@ fn stopped_by(signal: i32, run: LongRun) {
     );
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
-    let stop = recording
-        .events()
-        .iter()
-        .find(|e| e.kind == EventKind::Request(RequestKind::Stop))
-        .expect("a stop request");
-    let off = EventKind::State {
+    let stop = tick_of(&recording, EventKind::Request(RequestKind::Finish));
+    let settling = EventKind::State {
         from: State::Running,
+        to: State::Settling,
+    };
+    assert_eq!(tick_of(&recording, settling), stop);
+    let off = EventKind::State {
+        from: State::Settling,
         to: State::Disarmed,
     };
+    let off = tick_of(&recording, off);
+    let ramp_ticks: u64 = recording.metadata()["ramp_ticks"]
+        .parse()
+        .expect("a number");
     assert!(
-        recording
-            .events()
-            .iter()
-            .any(|e| e.tick == stop.tick && e.kind == off),
-        "{:?}",
-        recording.events()
+        (stop + ramp_ticks..=stop + 2 * ramp_ticks + recording.overruns()).contains(&off),
+        "{stop} to {off}, ramps of {ramp_ticks}"
     );
     let ticks = ticks(&recording);
     let (before, after): (Vec<TickRecord>, Vec<TickRecord>) =
-        ticks.into_iter().partition(|r| r.tick < stop.tick);
+        ticks.into_iter().partition(|r| r.tick < off);
     assert!(
         before.iter().any(|record| record.command_a != 0.0),
-        "a current flowed before the stop"
+        "a current flowed before the end"
     );
     assert!(
         after.iter().all(|record| record.command_a.to_bits() == 0),
-        "no current from the tick of the request on"
+        "no current after the ramps"
     );
-    // A tenth of a second is recorded after the stop, including late ticks.
-    let after_stop = recording.last_tick() - stop.tick;
+    // A tenth of a second is recorded after the run, including late ticks.
+    let after_end = recording.last_tick() - off;
     assert!(
-        (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&after_stop)
-            && after.len() as u64 >= RATE_HZ / 10,
-        "{after_stop}"
+        (RATE_HZ / 10 - 1..60 * RATE_HZ).contains(&after_end) && after.len() as u64 >= RATE_HZ / 10,
+        "{after_end}"
     );
     assert_eq!(
         recording.tick_count() + recording.overruns(),
@@ -167,4 +174,35 @@ fn second_ctrl_c_has_no_effect() {
         .filter(|e| e.kind == EventKind::Request(RequestKind::Stop))
         .count();
     assert_eq!(stops, 1);
+}
+
+#[test]
+fn second_signal_cuts_the_current() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut running = Running::of(
+        Command::new(env!("CARGO_BIN_EXE_bench"))
+            .args(arguments_of(LongRun::Control))
+            // Ramps of a minute: only the second signal ends this test.
+            .args(["--set", "loop.stop_ramp_s=60"])
+            .arg("--out")
+            .arg(folder.path())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    running.until_slept(RATE_HZ);
+    running.signal(libc::SIGINT);
+    running.until_slept(2 * RATE_HZ);
+    running.signal(libc::SIGINT);
+    let output = running.end();
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    let recording = Recording::open(&recording_in(folder.path())).expect("a recording");
+    assert!(!recording.truncated());
+    let finish = tick_of(&recording, EventKind::Request(RequestKind::Finish));
+    let stop = tick_of(&recording, EventKind::Request(RequestKind::Stop));
+    assert!(stop > finish, "{stop} after {finish}");
+    let ticks = ticks(&recording);
+    let settled = ticks.iter().filter(|r| r.state == State::Settling);
+    assert!(settled.count() > 0);
+    let mut after = ticks.iter().filter(|r| r.tick >= stop);
+    assert!(after.all(|r| r.command_a == 0.0 && r.state == State::Disarmed));
 }

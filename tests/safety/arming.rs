@@ -20,25 +20,44 @@ use crate::rig::{
     AmplifierCall, Bench, CurrentProgram, LoggedRig, StillRig, endless, interlocks, stage,
 };
 
-const STATES: [State; 4] = [
+const STATES: [State; 5] = [
     State::Disarmed,
     State::Armed,
     State::Running,
+    State::Settling,
     State::Tripped,
 ];
 
 /// The state after each transition, by initial state: the diagram in `rt/arming.rs`.
-const TRANSITIONS: [(Transition, [State; 4]); 5] = {
-    use State::{Armed, Disarmed, Running, Tripped};
+const TRANSITIONS: [(Transition, [State; 5]); 6] = {
+    use State::{Armed, Disarmed, Running, Settling, Tripped};
     [
-        // from:          Disarmed  Armed     Running   Tripped
-        (Transition::Arm, [Armed, Armed, Running, Tripped]),
-        (Transition::Start, [Disarmed, Running, Running, Tripped]),
-        (Transition::Stop, [Disarmed, Disarmed, Disarmed, Tripped]),
-        (Transition::Trip, [Disarmed, Tripped, Tripped, Tripped]),
-        (Transition::Clear, [Disarmed, Armed, Running, Disarmed]),
+        // from:            Disarmed  Armed     Running   Settling  Tripped
+        (Transition::Arm, [Armed, Armed, Running, Settling, Tripped]),
+        (
+            Transition::Start,
+            [Disarmed, Running, Running, Settling, Tripped],
+        ),
+        (
+            Transition::Finish,
+            [Disarmed, Disarmed, Settling, Settling, Tripped],
+        ),
+        (
+            Transition::Stop,
+            [Disarmed, Disarmed, Disarmed, Disarmed, Tripped],
+        ),
+        (
+            Transition::Trip,
+            [Disarmed, Tripped, Tripped, Tripped, Tripped],
+        ),
+        (
+            Transition::Clear,
+            [Disarmed, Armed, Running, Settling, Disarmed],
+        ),
     ]
 };
+/// Length of each of the two ramps at the end of a run in ticks.
+const RAMP_TICKS: u64 = 10;
 
 /// Ticks of a probe fault: the trip under test, and the trip that brings the loop into `Tripped` before it.
 const TRIP: u64 = 20;
@@ -55,14 +74,18 @@ fn bench_in(state: State, trip: bool) -> Bench {
             Fault::Validity(Validity::Faulty),
         ));
     }
-    let mut bench = Bench::still(&stage(), &faults);
+    let mut bench = Bench::still(&stage(), &faults).with_ramps(RAMP_TICKS);
     if state != State::Disarmed {
         bench.request(Request::Arm);
     }
-    if state == State::Running {
+    if matches!(state, State::Running | State::Settling) {
         bench.request(Request::Start(endless(|_| 0.1)));
     }
-    bench.run(TRIP);
+    bench.run(TRIP - 2);
+    if state == State::Settling {
+        bench.request(Request::Finish);
+    }
+    bench.run(2);
     assert_eq!(bench.state(), state);
     bench
 }
@@ -77,6 +100,7 @@ fn transitions_match_the_state_diagram() {
             match change {
                 Transition::Arm => bench.request(Request::Arm),
                 Transition::Start => bench.request(Request::Start(endless(|_| 0.2))),
+                Transition::Finish => bench.request(Request::Finish),
                 Transition::Stop => bench.request(Request::Stop),
                 Transition::Clear => bench.request(Request::Clear),
                 Transition::Trip => {}
@@ -100,14 +124,19 @@ fn transitions_match_the_state_diagram() {
             assert_eq!(changes, expected, "{change:?} in {from:?}");
             assert_eq!(
                 bench.amplifier_is_on(),
-                matches!(to, State::Armed | State::Running),
+                matches!(to, State::Armed | State::Running | State::Settling),
                 "{change:?} in {from:?}"
             );
             assert_eq!(
                 record.command_a != 0.0,
-                to == State::Running,
+                matches!(to, State::Running | State::Settling),
                 "{change:?} in {from:?}: {record:?}"
             );
+            // Without a run there is no current to ramp down: the loop disarms at once.
+            let change = match (change, from) {
+                (Transition::Finish, State::Armed) => Transition::Stop,
+                (change, _) => change,
+            };
             assert_eq!(
                 from.after(change),
                 (from != to).then_some(to),

@@ -142,7 +142,7 @@ fn closing_the_loop_with_probe_offset_is_bumpless() {
 }
 
 #[test]
-fn no_current_flows_during_settling() {
+fn no_current_flows_before_the_loop_closes() {
     let config = config("fast", 1);
     let rig = SimulatedRig::new(&config).expect("a rig");
     let mut bench = Bench::around(

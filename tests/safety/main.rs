@@ -8,4 +8,5 @@ mod replay;
 mod reproducible;
 mod requests_and_faults;
 use bench_test_support::loop_rig as rig;
+mod settling;
 mod trips;

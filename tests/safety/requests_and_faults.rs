@@ -19,6 +19,7 @@ enum RandomRequest {
     Arm,
     /// A program with a constant current in amperes and a number of ticks.
     Start(f64, u64),
+    Finish,
     Stop,
     Clear,
 }
@@ -33,6 +34,7 @@ fn requests() -> impl Strategy<Value = Vec<(u64, RandomRequest)>> {
     let request = prop_oneof![
         4 => Just(RandomRequest::Arm),
         4 => (current, 1..40u64).prop_map(|(a, ticks)| RandomRequest::Start(a, ticks)),
+        1 => Just(RandomRequest::Finish),
         1 => Just(RandomRequest::Stop),
         3 => Just(RandomRequest::Clear),
     ];
@@ -66,8 +68,9 @@ fn run(
     requests: &[(u64, RandomRequest)],
     faults: &[(Range<u64>, Fault)],
     late: &[(u64, u32)],
+    ramp_ticks: u64,
 ) -> Bench {
-    let mut bench = Bench::still(&stage(), faults);
+    let mut bench = Bench::still(&stage(), faults).with_ramps(ramp_ticks);
     for step in 0..TICKS {
         // The request ring has 16 slots.
         for (_, request) in requests.iter().filter(|(at, _)| *at == step).take(16) {
@@ -76,6 +79,7 @@ fn run(
                 RandomRequest::Start(current_a, ticks) => {
                     Request::Start(Box::new(CurrentProgram(move |_| current_a, ticks)))
                 }
+                RandomRequest::Finish => Request::Finish,
                 RandomRequest::Stop => Request::Stop,
                 RandomRequest::Clear => Request::Clear,
             });
@@ -136,7 +140,7 @@ fn check_run(bench: &Bench) -> Result<(), TestCaseError> {
         });
         prop_assert!(!beyond_peak, "beyond the motor's peak: {record:?}");
         if has_current {
-            prop_assert_eq!(record.state, State::Running);
+            prop_assert!(matches!(record.state, State::Running | State::Settling));
             prop_assert_eq!(record.flags & flag::TRIPPED, 0);
             prop_assert!(may_flow(known), "{:?} after {:?}", record, known);
         }
@@ -165,9 +169,9 @@ proptest! {
 
     #[test]
     fn current_flows_only_after_arm_and_start_since_the_last_trip(
-        requests in requests(), faults in faults(), late in late(),
+        requests in requests(), faults in faults(), late in late(), ramp_ticks in 0..12u64,
     ) {
-        check_run(&run(&requests, &faults, &late))?;
+        check_run(&run(&requests, &faults, &late, ramp_ticks))?;
     }
 }
 
@@ -180,12 +184,19 @@ fn generators_cover_runs_trips_clears_and_completions() {
         ..ProptestConfig::default()
     });
     let (mut with_current, mut trips, mut second_runs, mut completed) = (0, 0, 0, 0);
+    let mut settling = 0;
     for _ in 0..500 {
         let tree = (requests(), faults(), late())
             .new_tree(&mut runner)
             .expect("generators without filters");
         let (requests, faults, late) = proptest::strategy::ValueTree::current(&tree);
-        let bench = run(&requests, &faults, &late);
+        let bench = run(&requests, &faults, &late, 5);
+        settling += usize::from(
+            bench
+                .ticks()
+                .iter()
+                .any(|r| r.state == State::Settling && r.command_a != 0.0),
+        );
         let events = bench.events();
         let trip = events
             .iter()
@@ -205,10 +216,10 @@ fn generators_cover_runs_trips_clears_and_completions() {
         completed += usize::from(events.iter().any(|e| e.kind == EventKind::Completed));
     }
     assert!(
-        [with_current, trips, second_runs, completed]
+        [with_current, trips, second_runs, completed, settling]
             .iter()
             .all(|n| *n >= 25),
-        "of 500: {with_current} with current, {trips} trips, {second_runs} runs after one, {completed} completed"
+        "of 500: {with_current} with current, {trips} trips, {second_runs} runs after one, {completed} completed, {settling} settling with current"
     );
 }
 

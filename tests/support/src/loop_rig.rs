@@ -230,7 +230,6 @@ impl Bench {
         }
     }
 
-    /// A stage at rest, disarmed.
     /// The same loop with a correction between its program and the rig.
     pub fn with_correction(self, correction: Correction) -> Bench {
         Bench {
@@ -239,6 +238,15 @@ impl Bench {
         }
     }
 
+    /// The same loop with ramps to zero current at the end of a run.
+    pub fn with_ramps(self, ramp_ticks: u64) -> Bench {
+        Bench {
+            servo: self.servo.with_ramps(ramp_ticks),
+            ..self
+        }
+    }
+
+    /// A stage at rest, disarmed.
     pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
         Bench::around(config, FaultyRig::new(StillRig::default(), faults))
     }
