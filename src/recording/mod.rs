@@ -12,7 +12,7 @@
 //! | [`messages`], [`schema`] | the protobuf messages of the channels `/loop`, `/event`, `/timing` and their description |
 //! | `writer` | [`Recorder`]: creates the file, writes ticks and events, summarises each second, adds the results |
 //! | `thread` | [`spawn`]: the recorder on its own thread, which a full disk does not stop |
-//! | `walk` | reads a file record by record and returns only checked data |
+//! | `walk`, `contents` | read a file record by record and return only checked data |
 //! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, counts gaps, streams [`Ticks`] |
 //! | `recover` | [`recover()`]: copies the readable part of a cut-off or damaged file to a complete one |
 //!
@@ -29,6 +29,7 @@
 //! * Times in a recording are scheduled times since the loop began: two runs at virtual pace have the same bytes in all
 //!   three channels.
 
+mod contents;
 mod continuity;
 mod descriptor;
 mod digest;

@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::contents::{Contents, Part};
 use super::continuity::{Continuity, Gap};
 use super::digest::Digest;
 use super::messages::Timing;
 use super::stream::{Stream, Ticks, decode, published};
-use super::walk::{Contents, Part, Stop, Walk};
+use super::walk::{Stop, Walk};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
 use crate::rt::record::{Event, LoopMessage};
 

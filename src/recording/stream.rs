@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use prost::Message;
 
+use super::contents::Part;
 use super::messages;
-use super::walk::{Part, Stop, Walk};
+use super::walk::{Stop, Walk};
 use super::{RecordingError, Topic};
 use crate::rt::record::{Event, LoopMessage, TickRecord};
 

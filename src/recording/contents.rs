@@ -1,0 +1,215 @@
+//! The contents of the records of an MCAP file. Only checked data are returned.
+//!
+//! Checked are the CRC of the uncompressed content of a chunk *before* its first message, and the CRC of an attachment. For
+//! `mcap`, a CRC field of zero means *not checked*; this module refuses it for chunks and attachments. This module also checks
+//! that the messages of a channel are numbered without a gap, and some lengths with which `mcap` would panic.
+
+use std::collections::BTreeMap;
+
+use mcap::parse_record;
+use mcap::records::{Channel, Metadata, Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::{Topic, error};
+
+/// Largest chunk after decompression; its header states how much memory is allocated.
+const CHUNK_BYTES: usize = 64 << 20;
+
+/// A checked part of the file.
+pub(super) enum Part<'a> {
+    Message {
+        topic: Topic,
+        data: &'a [u8],
+    },
+    Attachment {
+        name: String,
+        media_type: String,
+        data: &'a [u8],
+    },
+    Metadata(Metadata),
+}
+
+/// Receives the parts. An error means that the part is damaged.
+pub(super) type Take<'a> = dyn FnMut(Part<'_>) -> Result<(), String> + 'a;
+
+/// The definitions in the records so far.
+#[derive(Default)]
+pub(super) struct Contents {
+    schemas: BTreeMap<u16, String>,
+    /// Topic and schema name of every channel.
+    pub(super) channels: BTreeMap<u16, (String, String)>,
+    topics: BTreeMap<u16, Topic>,
+    messages: [u64; 3],
+    pub(super) data_ended: bool,
+}
+
+impl Contents {
+    /// Takes one record of the file.
+    pub(super) fn record(
+        &mut self,
+        opcode: u8,
+        data: &[u8],
+        take: &mut Take,
+    ) -> Result<(), String> {
+        match opcode {
+            op::DATA_END => self.data_ended = true,
+            _ if self.data_ended => {} // the summary repeats earlier records
+            op::CHUNK => self.chunk(data, take)?,
+            op::ATTACHMENT => attachment(data, take)?,
+            op::METADATA => metadata(data, take)?,
+            op::MESSAGE => {
+                return Err("a message outside of the chunks, without a CRC".into());
+            }
+            op::SCHEMA | op::CHANNEL => self.define(opcode, data)?,
+            _ => {} // indexes, and what a later version of MCAP may add
+        }
+        Ok(())
+    }
+
+    /// Reads a chunk with a separate reader, which checks the CRC before it returns a record.
+    fn chunk(&mut self, chunk: &[u8], take: &mut Take) -> Result<(), String> {
+        check_chunk(chunk)?;
+        let mut reader = chunk_reader(chunk);
+        while let Some(event) = reader.next_event() {
+            match event.map_err(|e| error::why(&e))? {
+                LinearReadEvent::Record {
+                    opcode: op::MESSAGE,
+                    data,
+                } => self.message(data, take)?,
+                LinearReadEvent::Record { opcode, data } => self.define(opcode, data)?,
+                LinearReadEvent::ReadRequest(_) => reader.notify_read(0), // the end of the chunk
+            }
+        }
+        Ok(())
+    }
+
+    fn define(&mut self, opcode: u8, data: &[u8]) -> Result<(), String> {
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
+            return Ok(());
+        }
+        match parse_record(opcode, data).map_err(|e| error::why(&e))? {
+            Record::Schema { header, .. } => drop(self.schemas.insert(header.id, header.name)),
+            Record::Channel(channel) => self.add_channel(channel),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn add_channel(&mut self, channel: Channel) {
+        let schema = self.schemas.get(&channel.schema_id);
+        let schema = schema.cloned().unwrap_or_default();
+        let is_same = |t: &Topic| t.name() == channel.topic && t.schema_name() == schema;
+        let topic = Topic::ALL.into_iter().find(is_same);
+        self.topics.extend(topic.map(|topic| (channel.id, topic)));
+        self.channels.insert(channel.id, (channel.topic, schema));
+    }
+
+    /// A message consists of its channel (u16), its number in the channel (u32), two times (u64) and its data.
+    fn message(&mut self, message: &[u8], take: &mut Take) -> Result<(), String> {
+        let Some((header, data)) = message.split_first_chunk::<22>() else {
+            return Err("a message without a header".into());
+        };
+        let [c0, c1, n0, n1, n2, n3, ..] = *header;
+        let Some(&topic) = self.topics.get(&u16::from_le_bytes([c0, c1])) else {
+            return Ok(()); // a channel of another program
+        };
+        self.count(topic, u32::from_le_bytes([n0, n1, n2, n3]))?;
+        take(Part::Message { topic, data })
+    }
+
+    fn count(&mut self, topic: Topic, number: u32) -> Result<(), String> {
+        let expected = self.messages[topic as usize] as u32;
+        self.messages[topic as usize] += 1;
+        if number == expected {
+            return Ok(());
+        }
+        Err(format!(
+            "message {expected} of {} is missing, {number} follows",
+            topic.name()
+        ))
+    }
+
+    /// Whether the file has the channel with the ticks.
+    pub(super) fn has_loop(&self) -> bool {
+        self.topics.values().any(|t| *t == Topic::Loop)
+    }
+}
+
+fn chunk_reader(chunk: &[u8]) -> LinearReader {
+    let options = LinearReaderOptions::default()
+        .with_skip_start_magic(true)
+        .with_skip_end_magic(true)
+        .with_prevalidate_chunk_crcs(true)
+        .with_record_length_limit(CHUNK_BYTES);
+    let mut reader = LinearReader::new_with_options(options);
+    let room = reader.insert(9 + chunk.len());
+    room[0] = op::CHUNK;
+    room[1..9].copy_from_slice(&(chunk.len() as u64).to_le_bytes());
+    room[9..].copy_from_slice(chunk);
+    reader.notify_read(9 + chunk.len());
+    reader
+}
+
+/// Refuses a chunk that `mcap` would not check (no CRC) or would panic at (a length beyond the end of an uncompressed chunk).
+fn check_chunk(chunk: &[u8]) -> Result<(), String> {
+    let Record::Chunk { header, data } =
+        parse_record(op::CHUNK, chunk).map_err(|e| error::why(&e))?
+    else {
+        return Err("a chunk with the content of another record".into());
+    };
+    match header.compression.as_str() {
+        _ if header.uncompressed_crc == 0 => Err("a chunk without a CRC".into()),
+        "" if !is_framed(&data) => Err("a record that reaches beyond its chunk".into()),
+        _ => Ok(()),
+    }
+}
+
+/// Whether `records` is a sequence of (opcode, length u64, content) without a rest.
+fn is_framed(mut records: &[u8]) -> bool {
+    while let Some((head, rest)) = records.split_first_chunk::<9>() {
+        let [_, length @ ..] = *head;
+        let length = usize::try_from(u64::from_le_bytes(length)).ok();
+        let Some(next) = length.and_then(|length| rest.get(length..)) else {
+            return false;
+        };
+        records = next;
+    }
+    records.is_empty()
+}
+
+fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
+    if !attachment_is_framed(data) {
+        return Err("an attachment shorter than its own header".into());
+    }
+    match parse_record(op::ATTACHMENT, data).map_err(|e| error::why(&e))? {
+        Record::Attachment { crc: 0, .. } => Err("an attachment without a CRC".into()),
+        Record::Attachment { header, data, .. } => take(Part::Attachment {
+            name: header.name,
+            media_type: header.media_type,
+            data: &data,
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// An attachment consists of two times (u64), name and media type (each with its length u32), the length of the content (u64),
+/// the content, and a CRC (u32). `mcap` panics if the record ends between the length and the CRC.
+fn attachment_is_framed(record: &[u8]) -> bool {
+    let after_string = |rest: &[u8]| {
+        let (length, text) = rest.split_first_chunk::<4>()?;
+        text.get(u32::from_le_bytes(*length) as usize..)
+            .map(<[u8]>::len)
+    };
+    let tail = |remaining: usize| &record[record.len() - remaining..];
+    let after_name = record.get(16..).and_then(after_string);
+    after_name
+        .and_then(|n| after_string(tail(n)))
+        .is_some_and(|n| n >= 8 + 4)
+}
+
+fn metadata(data: &[u8], take: &mut Take) -> Result<(), String> {
+    match parse_record(op::METADATA, data).map_err(|e| error::why(&e))? {
+        Record::Metadata(metadata) => take(Part::Metadata(metadata)),
+        _ => Ok(()),
+    }
+}
