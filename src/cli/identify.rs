@@ -59,6 +59,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         );
     }
     let recording = Recording::open(&args.recording)?;
+    warn_of_unchecked(&recording);
     let plan = Plan::of(&recording)?;
     check_kind(plan.kind, &args.recording)?;
     let made = analysed(&recording, &plan.config, args)?;
@@ -68,6 +69,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         true => Outcome::Done,
         false => Outcome::Impaired,
     })
+}
+
+/// Warns of messages that no CRC covers.
+pub(super) fn warn_of_unchecked(recording: &Recording) {
+    let messages = recording.unchecked_messages();
+    if messages > 0 {
+        tracing::warn!(
+            "{}: {messages} messages have no CRC, so that damaged values are not detected; use the recording as bench made it, if there is one",
+            recording.path().display()
+        );
+    }
 }
 
 /// Refuses a recording without an excitation.

@@ -1,4 +1,4 @@
-//! `bench recover`: makes a complete recording from the intact part of a truncated or damaged one.
+//! `bench recover`: makes a complete recording from the intact parts of a truncated or damaged one.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::recording::{Cut, recover};
+use crate::recording::{Cut, DamagedRange, MissingTicks, Recovered, recover};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]
@@ -31,6 +31,10 @@ struct Report {
     overruns: u64,
     lost_records: u64,
     cut: Option<Cut>,
+    damage: Vec<DamagedRange>,
+    missing_ticks: Vec<MissingTicks>,
+    missing_attachments: Vec<String>,
+    unchecked_messages: u64,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -46,12 +50,16 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         last_tick: totals.last_tick,
         overruns: totals.overruns,
         lost_records: totals.lost_records,
-        cut: recovered.cut,
+        cut: recovered.cut.clone(),
+        damage: recovered.damage.clone(),
+        missing_ticks: recovered.missing_ticks.clone(),
+        missing_attachments: recovered.missing_attachments.clone(),
+        unchecked_messages: recovered.unchecked_messages,
     };
-    print_result(args.json, &report, text)?;
-    Ok(match report.lost_records {
-        0 => Outcome::Done,
-        _ => Outcome::Impaired,
+    print_result(args.json, &report, |report| text(report, &recovered))?;
+    Ok(match recovered.is_complete() {
+        true => Outcome::Done,
+        false => Outcome::Impaired,
     })
 }
 
@@ -62,14 +70,54 @@ fn default_name(recording: &Path) -> PathBuf {
     recording.with_file_name(name)
 }
 
-fn text(report: &Report) -> String {
-    let cut = match &report.cut {
-        None => "nothing is missing".into(),
-        Some(cut) => format!(
-            "bytes {} to {} could not be used: {}",
-            cut.at_byte, cut.of_bytes, cut.why
-        ),
-    };
-    let (ticks, recording) = (report.ticks, &report.recording);
-    format!("{ticks} ticks recovered into {recording}; {cut}\n")
+/// One line for the new recording, and one for each loss.
+fn text(report: &Report, recovered: &Recovered) -> String {
+    let mut lines = vec![format!(
+        "{} ticks recovered into {}",
+        report.ticks, report.recording
+    )];
+    lines.extend(report.damage.iter().map(DamagedRange::to_string));
+    lines.extend(report.missing_ticks.iter().map(MissingTicks::to_string));
+    lines.extend(
+        report
+            .cut
+            .as_ref()
+            .map(|cut| cut_text(cut, report.last_tick)),
+    );
+    let attachments = report.missing_attachments.iter();
+    lines.extend(attachments.map(|name| format!("the attachment {name} is missing")));
+    lines.extend(other_losses(report, recovered));
+    if recovered.is_complete() {
+        lines.push("nothing is missing".into());
+    }
+    lines.join("\n") + "\n"
+}
+
+fn cut_text(cut: &Cut, last_tick: Option<u64>) -> String {
+    let (at_byte, of_bytes, why) = (cut.at_byte, cut.of_bytes, &cut.why);
+    let last = last_tick.unwrap_or_default();
+    format!(
+        "bytes {at_byte} to {of_bytes} could not be used: {why}; whatever was recorded after tick {last} is missing"
+    )
+}
+
+/// Losses without a place in the file.
+fn other_losses(report: &Report, recovered: &Recovered) -> Vec<String> {
+    let mut lines = Vec::new();
+    let before = report
+        .lost_records
+        .saturating_sub(recovered.missing_tick_count());
+    if before > 0 {
+        lines.push(format!("{before} other records (ticks or events) are lost"));
+    }
+    if report.unchecked_messages > 0 {
+        let count = report.unchecked_messages;
+        lines.push(format!(
+            "{count} messages have no CRC: whether they are altered is not known"
+        ));
+    }
+    if !recovered.had_summary && report.cut.is_none() {
+        lines.push("the summary at the end of the old file is missing or damaged; the new file has a new one".into());
+    }
+    lines
 }

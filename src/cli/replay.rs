@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::CliError;
+use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::print_result;
 use crate::experiment::{Difference, replay};
@@ -33,6 +34,7 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let recording = Recording::open(&args.recording)?;
+    warn_of_unchecked(&recording);
     let replayed = replay(&recording)
         .map_err(|e| CliError::Failed(format!("{}: {e}", args.recording.display())))?;
     let report = Report {

@@ -111,11 +111,20 @@ pub fn analyse_with_progress(
         false => open_loop(loop_signals.signals, band_hz, config)?,
     };
     let analysis = with_modes(estimate, config, filled_ticks, progress)?;
-    let verdict = analysis.verdict.with(Ending::of(recording).caution());
+    let verdict = analysis
+        .verdict
+        .with(Ending::of(recording).caution())
+        .with(loss_caution(recording));
     Ok(Analysis {
         verdict,
         ..analysis
     })
+}
+
+/// A warning that records are lost: their ticks were interpolated, or the results lack them.
+fn loss_caution(recording: &Recording) -> Option<String> {
+    let lost = recording.lost_records();
+    (lost > 0).then(|| format!("{lost} records of the run are lost"))
 }
 
 fn is_closed_loop(recording: &Recording) -> bool {

@@ -29,13 +29,27 @@ pub enum AnalysisError {
     /// The receiver of the progress cancelled the analysis.
     #[error("the analysis was cancelled; repeat it with `bench identify`")]
     Cancelled,
+    /// A reading that is older than any loop uses.
+    #[error(
+        "the reading of tick {tick} is {age_s:.3e} s old, but at most {limit_s} s are possible, so the recording was altered; record again"
+    )]
+    ReadingAge {
+        /// The tick.
+        tick: u64,
+        /// Age of its reading in seconds.
+        age_s: f64,
+        /// Largest age in seconds.
+        limit_s: f64,
+    },
     /// Too many ticks are missing.
     #[error(
-        "at least {missing} ticks are missing between the {ticks} recorded ones, but at most {allowed} can be interpolated; repeat the run with a lower loop.rate_hz or with real-time scheduling"
+        "at least {missing} ticks are missing between the {ticks} recorded ones, the last of them after tick {after}, but at most {allowed} can be interpolated; repeat the run, with a lower loop.rate_hz or with real-time scheduling if the loop missed them"
     )]
     Gaps {
         /// Missing ticks, counted until there were too many.
         missing: u64,
+        /// The last tick before the gap at which there were too many.
+        after: u64,
         /// Recorded ticks.
         ticks: u64,
         /// Number of ticks that can be interpolated.

@@ -4,7 +4,7 @@ use serde::{Serialize, Serializer};
 
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
-use crate::rt::record::EventKind;
+use crate::rt::record::{Event, EventKind, RequestKind};
 use crate::rt::thread::LoopOutcome;
 
 /// The end of a run.
@@ -39,12 +39,15 @@ impl Ending {
     pub fn of(recording: &Recording) -> Ending {
         let mut events = recording.events().iter();
         let completed = events.clone().any(|e| e.kind == EventKind::Completed);
+        let was_ordered = |e: &Event| e.kind == EventKind::Request(RequestKind::Stop);
+        let is_cut =
+            recording.truncated() || recording.was_damaged() && !events.clone().any(was_ordered);
         let trip = events.find_map(|event| match event.kind {
             EventKind::Trip(trip) => Some((trip, event.tick)),
             _ => None,
         });
         match Ending::by(trip, completed) {
-            Ending::Stopped if recording.truncated() => Ending::CutOff,
+            Ending::Stopped if is_cut => Ending::CutOff,
             ending => ending,
         }
     }

@@ -30,7 +30,7 @@ pub enum PlanError {
     Unstable,
     /// The recording lacks a part of the plan.
     #[error(
-        "the recording has no {0}, so it was not made by `bench chirp` or `bench control`; choose another recording"
+        "the recording has no {0}: it was not made by `bench chirp` or `bench control`, or that part was damaged; choose another recording"
     )]
     Missing(&'static str),
     /// The configuration cannot be written as TOML.

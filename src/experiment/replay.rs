@@ -93,12 +93,20 @@ fn ramp_ticks(recording: &Recording) -> Result<u64, PlanError> {
     ticks.map_err(|_| PlanError::Missing("valid number of `ramp_ticks` in its metadata"))
 }
 
+/// Refuses a recording with lost records before its last tick: a gap between ticks, or lost requests.
 fn require_no_gap(recording: &Recording) -> Result<(), ReplayError> {
-    match recording.gaps().iter().find(|gap| gap.lost > 0) {
+    let gap = recording.gaps().iter().find(|gap| gap.lost > 0);
+    let lost = recording.events().iter().find(|event| {
+        matches!(event.kind, EventKind::Lost { .. }) && event.tick < recording.last_tick()
+    });
+    match gap
+        .map(|gap| gap.after_tick)
+        .or(lost.map(|event| event.tick))
+    {
         None => Ok(()),
-        Some(gap) => Err(ReplayError::Gap {
+        Some(after) => Err(ReplayError::Gap {
             lost: recording.lost_records(),
-            after: gap.after_tick,
+            after,
         }),
     }
 }

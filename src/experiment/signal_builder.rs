@@ -14,6 +14,9 @@ const FILLED_RATIO: f64 = 1e-3;
 /// Times that differ by less than this ratio of a period are treated as equal.
 const SAME_TIME_RATIO: f64 = 1e-3;
 
+/// Largest age of a reading: the upper bound of `interlock.probe_stale_s`, at which a loop trips.
+const MAX_AGE_S: f64 = 10.0;
+
 /// The signals of a run at regular times.
 pub(super) struct RunSignals {
     /// Reference, command and position.
@@ -73,6 +76,7 @@ impl SignalBuilder {
     }
 
     pub(super) fn push(&mut self, record: &TickRecord) -> Result<(), AnalysisError> {
+        check_age(record)?;
         match self.before {
             None => self.first_s = seconds(record.scheduled_ns),
             Some(before) => self.fill(&before, record)?,
@@ -121,6 +125,7 @@ impl SignalBuilder {
         if all > self.allowed {
             return Err(AnalysisError::Gaps {
                 missing: all,
+                after: before.tick,
                 ticks: self.ticks,
                 allowed: self.allowed,
             });
@@ -189,6 +194,19 @@ fn aligned_currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
     setpoint_timing::at_regular_times(&input_a, &later)
 }
 
+/// Refuses a reading that no loop would have used: the resampling would need a grid of its age.
+fn check_age(record: &TickRecord) -> Result<(), AnalysisError> {
+    let age_s = seconds(record.probe_age_ns);
+    match age_s <= MAX_AGE_S {
+        true => Ok(()),
+        false => Err(AnalysisError::ReadingAge {
+            tick: record.tick,
+            age_s,
+            limit_s: MAX_AGE_S,
+        }),
+    }
+}
+
 fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
 }
@@ -217,6 +235,30 @@ mod tests {
             })?;
         }
         gathered.finish()
+    }
+
+    #[test]
+    fn rejects_reading_older_than_any_loop_uses() {
+        for (probe_age_ns, is_accepted) in [
+            (10_000_000_000, true),
+            (10_000_001_000, false),
+            (i64::MAX as u64, false),
+            (u64::MAX, false),
+        ] {
+            let mut gathered = SignalBuilder::of(10, 1000.0, false);
+            let record = TickRecord {
+                tick: 7,
+                probe_age_ns,
+                ..TickRecord::default()
+            };
+            match gathered.push(&record) {
+                Ok(()) => assert!(is_accepted, "{probe_age_ns}"),
+                Err(error) => assert!(
+                    !is_accepted && error.to_string().contains("tick 7"),
+                    "{error}"
+                ),
+            }
+        }
     }
 
     #[test]

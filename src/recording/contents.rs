@@ -10,7 +10,7 @@ use mcap::parse_record;
 use mcap::records::{Channel, Metadata, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::{Topic, error};
+use super::{METADATA_RECORD, Topic, error};
 
 /// Largest chunk after decompression; its header states how much memory is allocated.
 const CHUNK_BYTES: usize = 64 << 20;
@@ -27,10 +27,25 @@ pub(super) enum Part<'a> {
         data: &'a [u8],
     },
     Metadata(Metadata),
+    /// Messages that the file lacks here. Only of a file that is salvaged.
+    Missing {
+        topic: Topic,
+        messages: u64,
+    },
 }
 
 /// Receives the parts. An error means that the part is damaged.
 pub(super) type Take<'a> = dyn FnMut(Part<'_>) -> Result<(), String> + 'a;
+
+/// The use of the numbers of the messages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Numbering {
+    /// A gap is an error.
+    #[default]
+    Required,
+    /// A gap is reported as [`Part::Missing`].
+    CountsMissing,
+}
 
 /// The definitions in the records so far.
 #[derive(Default)]
@@ -39,11 +54,50 @@ pub(super) struct Contents {
     /// Topic and schema name of every channel.
     pub(super) channels: BTreeMap<u16, (String, String)>,
     topics: BTreeMap<u16, Topic>,
-    messages: [u64; 3],
+    numbering: Numbering,
+    channel_numbers: [ChannelNumbers; 3],
+    has_chunk: bool,
+    /// Whether the metadata record of this program is in the file.
+    has_own_metadata: bool,
+    /// Messages outside of the chunks, which no CRC covers.
+    pub(super) unchecked_messages: u64,
     pub(super) data_ended: bool,
 }
 
+/// The message numbers of a channel.
+#[derive(Clone, Copy, Debug, Default)]
+struct ChannelNumbers {
+    next: u64,
+    /// Every message has the number 0, which in MCAP means *not numbered*.
+    is_unused: bool,
+}
+
+impl ChannelNumbers {
+    /// Counts the next message; returns how many are missing before it.
+    fn count(&mut self, topic: Topic, number: u32) -> Result<u64, String> {
+        self.is_unused |= self.next == 1 && number == 0;
+        let expected = if self.is_unused { 0 } else { self.next as u32 };
+        let missing = number.wrapping_sub(expected);
+        if missing > u32::MAX / 2 || (self.is_unused && missing > 0) {
+            let name = topic.name();
+            return Err(format!(
+                "message {number} of {name} follows, but message {expected} was expected"
+            ));
+        }
+        self.next += u64::from(missing) + 1;
+        Ok(u64::from(missing))
+    }
+}
+
 impl Contents {
+    /// For a file that is salvaged, with definitions from elsewhere.
+    pub(super) fn salvaging(definitions: Option<Contents>) -> Contents {
+        Contents {
+            numbering: Numbering::CountsMissing,
+            ..definitions.unwrap_or_default()
+        }
+    }
+
     /// Takes one record of the file.
     pub(super) fn record(
         &mut self,
@@ -52,14 +106,12 @@ impl Contents {
         take: &mut Take,
     ) -> Result<(), String> {
         match opcode {
-            op::DATA_END => self.data_ended = true,
+            op::DATA_END => self.end_data(data),
             _ if self.data_ended => {} // the summary repeats earlier records
             op::CHUNK => self.chunk(data, take)?,
             op::ATTACHMENT => attachment(data, take)?,
-            op::METADATA => metadata(data, take)?,
-            op::MESSAGE => {
-                return Err("a message outside of the chunks, without a CRC".into());
-            }
+            op::METADATA => self.metadata(data, take)?,
+            op::MESSAGE => self.bare_message(data, take)?,
             op::SCHEMA | op::CHANNEL => self.define(opcode, data)?,
             _ => {} // indexes, and what a later version of MCAP may add
         }
@@ -69,6 +121,7 @@ impl Contents {
     /// Reads a chunk with a separate reader, which checks the CRC before it returns a record.
     fn chunk(&mut self, chunk: &[u8], take: &mut Take) -> Result<(), String> {
         check_chunk(chunk)?;
+        self.has_chunk = true;
         let mut reader = chunk_reader(chunk);
         while let Some(event) = reader.next_event() {
             match event.map_err(|e| error::why(&e))? {
@@ -83,7 +136,35 @@ impl Contents {
         Ok(())
     }
 
-    fn define(&mut self, opcode: u8, data: &[u8]) -> Result<(), String> {
+    /// A message that is in no chunk. In a file with chunks it is a damaged record.
+    fn bare_message(&mut self, data: &[u8], take: &mut Take) -> Result<(), String> {
+        if self.has_chunk {
+            return Err("a message outside of the chunks".into());
+        }
+        self.unchecked_messages += 1;
+        self.message(data, take)
+    }
+
+    /// The reader has checked the CRC of the data section, unless it is zero.
+    fn end_data(&mut self, data: &[u8]) {
+        self.data_ended = true;
+        if data.iter().any(|byte| *byte != 0) {
+            self.unchecked_messages = 0;
+        }
+    }
+
+    fn metadata(&mut self, data: &[u8], take: &mut Take) -> Result<(), String> {
+        match parse_record(op::METADATA, data).map_err(|e| error::why(&e))? {
+            Record::Metadata(metadata) => {
+                self.has_own_metadata |= metadata.name == METADATA_RECORD;
+                take(Part::Metadata(metadata))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds the definition of a schema or a channel.
+    pub(super) fn define(&mut self, opcode: u8, data: &[u8]) -> Result<(), String> {
         if !matches!(opcode, op::SCHEMA | op::CHANNEL) {
             return Ok(());
         }
@@ -113,20 +194,54 @@ impl Contents {
         let Some(&topic) = self.topics.get(&u16::from_le_bytes([c0, c1])) else {
             return Ok(()); // a channel of another program
         };
-        self.count(topic, u32::from_le_bytes([n0, n1, n2, n3]))?;
+        let number = u32::from_le_bytes([n0, n1, n2, n3]);
+        let missing = self.channel_numbers[topic as usize].count(topic, number)?;
+        self.report_missing(topic, number, missing, take)?;
         take(Part::Message { topic, data })
     }
 
-    fn count(&mut self, topic: Topic, number: u32) -> Result<(), String> {
-        let expected = self.messages[topic as usize] as u32;
-        self.messages[topic as usize] += 1;
-        if number == expected {
-            return Ok(());
+    fn report_missing(
+        &self,
+        topic: Topic,
+        number: u32,
+        messages: u64,
+        take: &mut Take,
+    ) -> Result<(), String> {
+        match self.numbering {
+            _ if messages == 0 => Ok(()),
+            Numbering::CountsMissing => take(Part::Missing { topic, messages }),
+            Numbering::Required => {
+                let (first, name) = (u64::from(number) - messages, topic.name());
+                Err(format!(
+                    "message {first} of {name} is missing, {number} follows"
+                ))
+            }
         }
-        Err(format!(
-            "message {expected} of {} is missing, {number} follows",
-            topic.name()
-        ))
+    }
+
+    /// Reports the messages after the last one, by the number of messages that the summary states.
+    pub(super) fn report_missing_at_end(
+        &self,
+        counts: &BTreeMap<u16, u64>,
+        take: &mut Take,
+    ) -> Result<(), String> {
+        for (channel, count) in counts {
+            let Some(&topic) = self.topics.get(channel) else {
+                continue;
+            };
+            let messages = count.saturating_sub(self.channel_numbers[topic as usize].next);
+            if messages > 0 {
+                take(Part::Missing { topic, messages })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Assumes the channels of this program if none is defined, for a file with its metadata whose definitions are damaged.
+    pub(super) fn assume_own_channels(&mut self) {
+        if self.has_own_metadata && self.channels.is_empty() {
+            self.topics.extend((1..).zip(Topic::ALL));
+        }
     }
 
     /// Whether the file has the channel with the ticks.
@@ -160,7 +275,10 @@ fn check_chunk(chunk: &[u8]) -> Result<(), String> {
     match header.compression.as_str() {
         _ if header.uncompressed_crc == 0 => Err("a chunk without a CRC".into()),
         "" if !is_framed(&data) => Err("a record that reaches beyond its chunk".into()),
-        _ => Ok(()),
+        "" | "lz4" | "zstd" => Ok(()),
+        other => Err(format!(
+            "a chunk with the compression {other:?}, which is none of lz4 and zstd"
+        )),
     }
 }
 
@@ -177,11 +295,34 @@ fn is_framed(mut records: &[u8]) -> bool {
     records.is_empty()
 }
 
+/// Whether a record has a CRC that holds, or is the metadata record of this program. A search for records trusts only those.
+pub(super) fn is_intact(opcode: u8, data: &[u8]) -> bool {
+    let no_take: &mut Take = &mut |_| Ok(());
+    match opcode {
+        op::CHUNK => {
+            check_chunk(data).is_ok() && matches!(chunk_reader(data).next_event(), Some(Ok(_)))
+        }
+        op::ATTACHMENT => attachment(data, no_take).is_ok(),
+        op::METADATA => {
+            let mut contents = Contents::default();
+            contents.metadata(data, no_take).is_ok() && contents.has_own_metadata
+        }
+        _ => false,
+    }
+}
+
 fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
     if !attachment_is_framed(data) {
         return Err("an attachment shorter than its own header".into());
     }
-    match parse_record(op::ATTACHMENT, data).map_err(|e| error::why(&e))? {
+    let failed = |error| {
+        format!(
+            "attachment {}: {}",
+            attachment_name(data),
+            error::why(&error)
+        )
+    };
+    match parse_record(op::ATTACHMENT, data).map_err(failed)? {
         Record::Attachment { crc: 0, .. } => Err("an attachment without a CRC".into()),
         Record::Attachment { header, data, .. } => take(Part::Attachment {
             name: header.name,
@@ -207,9 +348,11 @@ fn attachment_is_framed(record: &[u8]) -> bool {
         .is_some_and(|n| n >= 8 + 4)
 }
 
-fn metadata(data: &[u8], take: &mut Take) -> Result<(), String> {
-    match parse_record(op::METADATA, data).map_err(|e| error::why(&e))? {
-        Record::Metadata(metadata) => take(Part::Metadata(metadata)),
-        _ => Ok(()),
-    }
+/// The name in an attachment that is framed.
+fn attachment_name(record: &[u8]) -> String {
+    let name = record.get(16..).and_then(|rest| {
+        let (length, text) = rest.split_first_chunk::<4>()?;
+        text.get(..u32::from_le_bytes(*length) as usize)
+    });
+    String::from_utf8_lossy(name.unwrap_or_default()).into_owned()
 }

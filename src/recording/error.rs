@@ -50,6 +50,12 @@ pub enum RecordingError {
         /// The previous tick.
         after: u64,
     },
+    /// The file was removed while it was written.
+    #[error("{}: the recording was removed during the run, so its data are lost; record again, and do not change the folder during a run", path.display())]
+    Removed {
+        /// The file.
+        path: PathBuf,
+    },
     /// The thread of the recorder could not be started.
     #[error("{}: cannot start the thread of the recorder: {source}; raise the limit of processes (ulimit -u)", path.display())]
     NotStarted {
@@ -78,7 +84,7 @@ pub enum RecordingError {
         path: PathBuf,
     },
     /// An MCAP file of another program.
-    #[error("{}: an MCAP file without bench's channel /loop ({channels}); give a recording made by bench", path.display())]
+    #[error("{}: not a recording of bench: an MCAP file without bench's channel /loop ({channels}); give a recording made by bench", path.display())]
     OtherProgram {
         /// The file.
         path: PathBuf,
@@ -86,16 +92,16 @@ pub enum RecordingError {
         channels: String,
     },
     /// A recording without ticks.
-    #[error("{}: the recording has no ticks ({}), because the loop did not run; record again", path.display(), state(*is_cut))]
+    #[error("{}: the recording has no ticks ({}), so there is nothing to read; record again", path.display(), emptiness.why())]
     Empty {
         /// The file.
         path: PathBuf,
-        /// Whether the file ends early.
-        is_cut: bool,
+        /// Why it has none.
+        emptiness: Emptiness,
     },
     /// The content of the file was changed, or parts of it are missing.
     #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; \
-        save the data before the damage with `bench recover`", path.display())]
+        copy the intact data to a new recording with `bench recover`", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -108,10 +114,24 @@ pub enum RecordingError {
     },
 }
 
-fn state(is_cut: bool) -> &'static str {
-    match is_cut {
-        true => "it was cut off before its first half second was written",
-        false => "it is complete",
+/// Why a recording has no ticks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Emptiness {
+    /// The loop did not run.
+    Complete,
+    /// The file ends before the first ticks.
+    CutOff,
+    /// Everything with ticks is damaged.
+    Damaged,
+}
+
+impl Emptiness {
+    fn why(self) -> &'static str {
+        match self {
+            Emptiness::Complete => "it is complete",
+            Emptiness::CutOff => "it was cut off before its first half second was written",
+            Emptiness::Damaged => "every part of the file with ticks is damaged",
+        }
     }
 }
 

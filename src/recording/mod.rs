@@ -14,7 +14,8 @@
 //! | `thread` | [`spawn`]: the recorder on its own thread, which a full disk does not stop |
 //! | `walk`, `contents` | read a file record by record and return only checked data |
 //! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, counts gaps, streams [`Ticks`] |
-//! | `recover` | [`recover()`]: copies the readable part of a cut-off or damaged file to a complete one |
+//! | `summary`, `scanner`, `losses` | read a damaged file: pass over each damage to the next intact record |
+//! | `recover` | [`recover()`]: copies the intact parts of a cut-off or damaged file to a complete one |
 //!
 //! # Guarantees for a reader
 //!
@@ -23,7 +24,7 @@
 //!   it, otherwise as lost.
 //! * Every double is read back bit for bit, including -0.0 and NaN.
 //! * Changed data are never returned. The CRC of a chunk is checked before its first message, the CRC of an attachment before
-//!   its use. The messages of a channel are numbered, so a missing chunk is detected. In a complete file a CRC covers the
+//!   its use. Messages outside of chunks, which only other programs write, are counted if no CRC covers them. The messages of a channel are numbered, so a missing chunk is detected. In a complete file a CRC covers the
 //!   whole data section as well. A file that ends early is read up to its end and reported as cut off; only its metadata
 //!   record then has no CRC.
 //! * Times in a recording are scheduled times since the loop began: two runs at virtual pace have the same bytes in all
@@ -35,19 +36,23 @@ mod descriptor;
 mod digest;
 mod error;
 mod event_message;
+mod losses;
 pub mod messages;
 mod reader;
 mod recover;
+mod scanner;
 pub mod schema;
 mod stream;
+mod summary;
 mod thread;
 mod timing;
 mod walk;
 mod writer;
 
 pub use continuity::Gap;
-pub use error::RecordingError;
-pub use reader::{Cut, Recording, StoredAttachment};
+pub use error::{Emptiness, RecordingError};
+pub use losses::{Cut, DamagedRange, MissingTicks};
+pub use reader::{Recording, StoredAttachment};
 pub use recover::{Recovered, recover};
 pub use stream::Ticks;
 pub use thread::{Health, RecorderHandle, spawn};
@@ -59,6 +64,9 @@ pub const CONFIG_ATTACHMENT: &str = "config.toml";
 
 /// Name of the metadata record.
 pub const METADATA_RECORD: &str = "bench";
+
+/// Metadata key of a recovered recording: what is missing in it.
+const RECOVERED: &str = "recovered";
 
 /// The channels of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,16 +5,18 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use super::contents::{Contents, Part};
 use super::continuity::{Continuity, Gap};
 use super::digest::Digest;
+use super::error::Emptiness;
+use super::losses::{Cut, DamagedRange, MissingTicks};
 use super::messages::Timing;
-use super::stream::{Stream, Ticks, decode, published};
+use super::scanner::Scanner;
+use super::stream::{Decoded, Decoder, RecordReader, Stream, Ticks};
+use super::summary::Summary;
 use super::walk::{Stop, Walk};
-use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
-use crate::rt::record::{Event, LoopMessage};
+use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
+use crate::rt::record::{Event, TickRecord};
 
 /// A file inside the recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,17 +29,6 @@ pub struct StoredAttachment {
     pub data: Vec<u8>,
 }
 
-/// The end of the readable part of a recording that is not complete.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Cut {
-    /// The file is readable up to this byte.
-    pub at_byte: u64,
-    /// Size of the file.
-    pub of_bytes: u64,
-    /// What is wrong there.
-    pub why: String,
-}
-
 /// A recording that was read once from start to end. All checks have passed, everything except the ticks is in
 /// memory, and the ticks can be streamed any number of times.
 #[derive(Debug)]
@@ -45,6 +36,17 @@ pub struct Recording {
     path: PathBuf,
     cut: Option<Cut>,
     found: RecordingContents,
+    unchecked_messages: u64,
+    /// `None` if the file was not opened for salvage.
+    salvage: Option<Salvage>,
+}
+
+/// What is missing in a file that was opened for salvage.
+#[derive(Debug)]
+struct Salvage {
+    damage: Vec<DamagedRange>,
+    missing_attachments: Vec<String>,
+    has_summary: bool,
 }
 
 /// The contents of the file, without the ticks.
@@ -55,23 +57,21 @@ struct RecordingContents {
     events: Vec<Event>,
     timings: Vec<Timing>,
     gaps: Vec<Gap>,
-    account: Continuity,
+    missing_ticks: Vec<MissingTicks>,
+    /// Messages on `/loop` that are missing since the last tick.
+    missing_since_tick: u64,
+    last_tick: Option<TickRecord>,
+    period_by_ticks_ns: Option<u64>,
+    decoder: Decoder,
     digest: Digest,
 }
 
 impl Recording {
     /// Opens a recording. A file that ends early is read up to its end, see [`Recording::truncated`]; a damaged file is refused.
     pub fn open(path: &Path) -> Result<Recording, RecordingError> {
-        Recording::read(path, false)
-    }
-
-    /// As [`Recording::open`], but a damaged file is treated as cut off at the first damage.
-    pub fn salvage(path: &Path) -> Result<Recording, RecordingError> {
-        Recording::read(path, true)
-    }
-
-    fn read(path: &Path, salvage: bool) -> Result<Recording, RecordingError> {
-        let mut walk = Walk::new(open(path)?);
+        let file = open(path)?;
+        refuse_other_program(&file, path)?;
+        let mut walk = Walk::new(file);
         let mut found = RecordingContents::default();
         let stop = loop {
             match walk.step(&mut |part| found.take(part)) {
@@ -80,15 +80,82 @@ impl Recording {
                 Err(stop) => break Some(stop),
             }
         };
-        let cut = stop
-            .map(|stop| judge(path, stop, walk.offset, &found, salvage))
-            .transpose()?;
-        require_ticks(path, &walk.contents, &found, cut.is_some())?;
+        let cut = stop.map(|stop| judge(path, stop, walk.offset, &found));
+        let cut = cut.transpose()?;
+        let emptiness = match cut {
+            Some(_) => Emptiness::CutOff,
+            None => Emptiness::Complete,
+        };
+        require_ticks(path, &walk.contents, &found, emptiness)?;
         Ok(Recording {
             path: path.into(),
             cut,
             found,
+            unchecked_messages: walk.contents.unchecked_messages,
+            salvage: None,
         })
+    }
+
+    /// As [`Recording::open`], but passes over each damage to the next intact record. [`Recording::damage`] and
+    /// [`Recording::missing_ticks`] tell what is missing; an [`EventKind::Lost`](crate::rt::record::EventKind::Lost) is among
+    /// the events where messages are missing.
+    pub fn salvage(path: &Path) -> Result<Recording, RecordingError> {
+        let failed = |source| RecordingError::Read {
+            path: path.into(),
+            source,
+        };
+        let mut scanner = Scanner::new(open(path)?).map_err(failed)?;
+        let mut found = RecordingContents::default();
+        while scanner.step(&mut |part| found.take(part)).map_err(failed)? {}
+        found.end();
+        if found.account().ticks() == 0 && !scanner.has_magic {
+            return Err(RecordingError::NotMcap { path: path.into() });
+        }
+        let emptiness = match (&scanner.cut, scanner.damage.as_slice()) {
+            (Some(_), []) => Emptiness::CutOff,
+            (None, []) => Emptiness::Complete,
+            (_, [..]) => Emptiness::Damaged,
+        };
+        require_ticks(path, &scanner.contents, &found, emptiness)?;
+        Ok(Recording {
+            path: path.into(),
+            unchecked_messages: scanner.contents.unchecked_messages,
+            salvage: Some(Salvage {
+                missing_attachments: missing_attachments(&found, scanner.summary.as_ref()),
+                has_summary: scanner.summary.is_some(),
+                damage: scanner.damage,
+            }),
+            cut: scanner.cut,
+            found,
+        })
+    }
+
+    /// The parts of a salvaged file that could not be used, without that after a cut.
+    pub fn damage(&self) -> &[DamagedRange] {
+        self.salvage.as_ref().map_or(&[], |s| &s.damage)
+    }
+
+    /// The attachments that a salvaged file lacks.
+    pub fn missing_attachments(&self) -> &[String] {
+        self.salvage
+            .as_ref()
+            .map_or(&[], |s| &s.missing_attachments)
+    }
+
+    /// Whether a salvaged file has an intact summary.
+    pub(super) fn has_summary(&self) -> bool {
+        self.salvage.as_ref().is_none_or(|s| s.has_summary)
+    }
+
+    /// The ticks that are missing in a salvaged file, without those after a cut whose number is not known.
+    pub fn missing_ticks(&self) -> &[MissingTicks] {
+        &self.found.missing_ticks
+    }
+
+    /// Messages that no CRC covers, so that an alteration of them is not detected: those of a file without chunks and without a
+    /// CRC of its data section, which other programs write.
+    pub fn unchecked_messages(&self) -> u64 {
+        self.unchecked_messages
     }
 
     /// The file.
@@ -101,15 +168,21 @@ impl Recording {
         self.cut.is_some()
     }
 
+    /// Whether it was recovered from a file of which something was missing.
+    pub fn was_damaged(&self) -> bool {
+        self.found.metadata.contains_key(RECOVERED)
+    }
+
     /// The end of the readable part, if the recording was not finished.
     pub fn cut(&self) -> Option<&Cut> {
         self.cut.as_ref()
     }
 
-    /// The effective configuration of the run.
+    /// The effective configuration of the run; `None` also if it is empty, because it could not be recovered.
     pub fn config_toml(&self) -> Option<&str> {
-        self.attachment(CONFIG_ATTACHMENT)
-            .and_then(|a| std::str::from_utf8(&a.data).ok())
+        let attachment = self.attachment(CONFIG_ATTACHMENT)?;
+        let text = std::str::from_utf8(&attachment.data).ok();
+        text.filter(|text| !text.is_empty())
     }
 
     /// Version of the program, host, scheduling, `period_ns` and other properties of the run.
@@ -120,6 +193,11 @@ impl Recording {
     /// Period of the loop, if it is recorded.
     pub fn period_ns(&self) -> Option<u64> {
         self.found.metadata.get("period_ns")?.parse().ok()
+    }
+
+    /// The time between the first two consecutive ticks.
+    pub(super) fn period_by_ticks_ns(&self) -> Option<u64> {
+        self.found.period_by_ticks_ns
     }
 
     /// All attachments, in the order of the file.
@@ -144,17 +222,17 @@ impl Recording {
 
     /// Number of recorded ticks.
     pub fn tick_count(&self) -> u64 {
-        self.found.account.ticks()
+        self.found.account().ticks()
     }
 
     /// Number of the first tick.
     pub fn first_tick(&self) -> u64 {
-        self.found.account.first_tick().unwrap_or_default()
+        self.found.account().first_tick().unwrap_or_default()
     }
 
     /// Number of the last tick.
     pub fn last_tick(&self) -> u64 {
-        self.found.account.last_tick().unwrap_or_default()
+        self.found.account().last_tick().unwrap_or_default()
     }
 
     /// Every gap in the tick numbers.
@@ -164,12 +242,12 @@ impl Recording {
 
     /// Scheduled ticks that were not served.
     pub fn overruns(&self) -> u64 {
-        self.found.account.overruns()
+        self.found.account().overruns()
     }
 
     /// Records that were lost between loop and file, without those after a cut.
     pub fn lost_records(&self) -> u64 {
-        self.found.account.lost_records()
+        self.found.account().lost_records()
     }
 
     /// As [`super::Totals::loop_digest`].
@@ -185,51 +263,122 @@ impl Recording {
     /// Streams ticks and events in the order in which the loop published them.
     pub(super) fn published(&self) -> Result<Stream, RecordingError> {
         let count = self.tick_count() + self.events().len() as u64;
-        Ok(Stream::new(&self.path, Walk::new(open(&self.path)?), count))
+        Ok(Stream::new(&self.path, self.reader()?, count))
+    }
+
+    fn reader(&self) -> Result<RecordReader, RecordingError> {
+        let file = open(&self.path)?;
+        if self.salvage.is_none() {
+            return Ok(RecordReader::Walk(Box::new(Walk::new(file))));
+        }
+        let scanner = Scanner::new(file).map_err(|source| RecordingError::Read {
+            path: self.path.clone(),
+            source,
+        })?;
+        Ok(RecordReader::Scanner(Box::new(scanner)))
     }
 }
 
 impl RecordingContents {
+    fn account(&self) -> &Continuity {
+        &self.decoder.account
+    }
+
     fn take(&mut self, part: Part<'_>) -> Result<(), String> {
+        match self.decoder.decode(&part)? {
+            Some(Decoded::Tick(tick, gap)) => self.tick(&tick, gap),
+            Some(Decoded::Event(event)) => self.events.push(event),
+            Some(Decoded::Timing(timing)) => self.timings.push(timing),
+            None => {}
+        }
+        self.take_undecoded(part);
+        Ok(())
+    }
+
+    fn take_undecoded(&mut self, part: Part<'_>) {
         match part {
             Part::Message {
-                topic: Topic::Timing,
+                topic: topic @ (Topic::Loop | Topic::Event),
                 data,
-            } => self.timings.push(decode(data)?),
-            Part::Message { topic, data } => {
-                self.published(published(topic, data)?)?;
-                self.digest.add(topic as u8, data);
-            }
+            } => self.digest.add(topic as u8, data),
+            Part::Missing {
+                topic: Topic::Loop,
+                messages,
+            } => self.missing_since_tick += messages,
+            Part::Message { .. } | Part::Missing { .. } => {}
             Part::Attachment {
                 name,
                 media_type,
                 data,
-            } => {
-                self.attachments.push(StoredAttachment {
-                    name,
-                    media_type,
-                    data: data.into(),
-                });
-            }
+            } => self.attachments.push(StoredAttachment {
+                name,
+                media_type,
+                data: data.into(),
+            }),
             Part::Metadata(m) if m.name == METADATA_RECORD => self.metadata.extend(m.metadata),
             Part::Metadata(_) => {}
         }
-        Ok(())
     }
 
-    fn published(&mut self, published: LoopMessage) -> Result<(), String> {
-        match published {
-            LoopMessage::Event(event) => {
-                self.account.event(&event);
-                self.events.push(event);
-            }
-            LoopMessage::Tick(tick) => {
-                let refused = |last| format!("tick {} follows tick {last}", tick.tick);
-                self.gaps
-                    .extend(self.account.tick(&tick).map_err(|e| refused(e.0))?);
-            }
+    fn tick(&mut self, tick: &TickRecord, gap: Option<Gap>) {
+        self.gaps.extend(gap);
+        if self.missing_since_tick > 0 {
+            let first = match gap {
+                Some(gap) => gap.after_tick + 1,
+                None => tick.tick.saturating_sub(self.missing_since_tick),
+            };
+            self.add_missing(first, tick.tick.saturating_sub(1));
         }
-        Ok(())
+        if let Some(last) = &self.last_tick
+            && last.tick + 1 == tick.tick
+            && self.period_by_ticks_ns.is_none()
+        {
+            self.period_by_ticks_ns = tick.scheduled_ns.checked_sub(last.scheduled_ns);
+        }
+        self.last_tick = Some(*tick);
+    }
+
+    fn add_missing(&mut self, first_tick: u64, last_tick: u64) {
+        self.missing_ticks.push(MissingTicks {
+            first_tick,
+            last_tick,
+            ticks: std::mem::take(&mut self.missing_since_tick),
+        });
+    }
+
+    /// The messages that are missing after the last tick.
+    fn end(&mut self) {
+        if self.missing_since_tick > 0 {
+            let first = self.last_tick.map_or(0, |tick| tick.tick.saturating_add(1));
+            let last = first.saturating_add(self.missing_since_tick - 1);
+            self.add_missing(first, last);
+        }
+    }
+}
+
+/// The attachments that the summary names, and the configuration, as far as they were not found.
+fn missing_attachments(found: &RecordingContents, summary: Option<&Summary>) -> Vec<String> {
+    let mut missing: Vec<String> = summary.map_or(Vec::new(), |s| s.attachments.clone());
+    if !missing.iter().any(|name| name == CONFIG_ATTACHMENT) {
+        missing.push(CONFIG_ATTACHMENT.into());
+    }
+    missing.retain(|name| !found.attachments.iter().any(|a| a.name == *name));
+    missing
+}
+
+/// Refuses a file whose summary names channels, but not that with the ticks.
+fn refuse_other_program(file: &File, path: &Path) -> Result<(), RecordingError> {
+    let bytes = file.metadata().map_or(0, |m| m.len());
+    match Summary::read(file, bytes) {
+        Some(Summary { definitions, .. })
+            if !definitions.channels.is_empty() && !definitions.has_loop() =>
+        {
+            Err(RecordingError::OtherProgram {
+                path: path.into(),
+                channels: channels(&definitions),
+            })
+        }
+        _ => Ok(()),
     }
 }
 
@@ -249,16 +398,14 @@ fn judge(
     stop: Stop,
     at_byte: u64,
     found: &RecordingContents,
-    salvage: bool,
 ) -> Result<Cut, RecordingError> {
     let why = match stop {
         Stop::Cut => "the file ends there".into(),
-        Stop::Damaged(why) if salvage => why,
         Stop::Damaged(what) => {
             return Err(RecordingError::Damaged {
                 path: path.into(),
                 at_byte,
-                ticks: found.account.ticks(),
+                ticks: found.account().ticks(),
                 what,
             });
         }
@@ -282,15 +429,15 @@ fn require_ticks(
     path: &Path,
     contents: &Contents,
     found: &RecordingContents,
-    is_cut: bool,
+    emptiness: Emptiness,
 ) -> Result<(), RecordingError> {
-    if found.account.ticks() > 0 {
+    if found.account().ticks() > 0 {
         return Ok(());
     }
     let path = path.to_path_buf();
-    let is_cut_at_its_start = is_cut && contents.channels.is_empty();
-    if contents.has_loop() || is_cut_at_its_start {
-        return Err(RecordingError::Empty { path, is_cut });
+    let may_be_own = contents.channels.is_empty() && emptiness != Emptiness::Complete;
+    if contents.has_loop() || may_be_own {
+        return Err(RecordingError::Empty { path, emptiness });
     }
     let channels = channels(contents);
     Err(RecordingError::OtherProgram { path, channels })

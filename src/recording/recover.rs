@@ -1,22 +1,53 @@
-//! Copies the readable part of a cut-off or damaged recording to a complete one.
+//! Copies the intact parts of a cut-off or damaged recording to a complete one.
 
 use std::path::Path;
 
-use super::reader::{Cut, Recording};
-use super::{CONFIG_ATTACHMENT, Header, Recorder, RecordingError, Totals};
+use super::losses::{Cut, DamagedRange, MissingTicks};
+use super::reader::Recording;
+use super::{CONFIG_ATTACHMENT, Header, RECOVERED, Recorder, RecordingError, Totals};
 
 /// The result of a recovery.
 #[derive(Debug)]
 pub struct Recovered {
     /// Counts of the new recording.
     pub totals: Totals,
-    /// The end of the readable part of the old recording; `None` if it was complete.
+    /// The end of the readable part of the old recording; `None` if its data were read to their end.
     pub cut: Option<Cut>,
+    /// The other parts of the old recording that could not be used.
+    pub damage: Vec<DamagedRange>,
+    /// The ticks that are missing because of the damage, without those after a cut.
+    pub missing_ticks: Vec<MissingTicks>,
+    /// The attachments that are missing because of the damage.
+    pub missing_attachments: Vec<String>,
+    /// Whether the summary of the old recording was intact. The new one has a new summary, so nothing is lost with it.
+    pub had_summary: bool,
+    /// Messages that no CRC covers: whether they are altered is not known.
+    pub unchecked_messages: u64,
 }
 
-/// Copies everything in `from` before its cut or its first damage to the new file `to`: the messages, byte for byte, the
-/// configuration, the metadata (with an additional entry `recovered` that describes the cut) and the attachments. `from` is
-/// not changed.
+impl Recovered {
+    /// Whether everything that the loop published is in the new recording, verified by a CRC.
+    pub fn is_complete(&self) -> bool {
+        self.is_undamaged() && self.totals.lost_records == 0
+    }
+
+    /// Whether nothing is missing because of a cut or a damage of the file.
+    pub fn is_undamaged(&self) -> bool {
+        self.cut.is_none()
+            && self.damage.is_empty()
+            && self.missing_attachments.is_empty()
+            && self.unchecked_messages == 0
+    }
+
+    /// The missing ticks whose number is known.
+    pub fn missing_tick_count(&self) -> u64 {
+        self.missing_ticks.iter().map(|missing| missing.ticks).sum()
+    }
+}
+
+/// Copies everything in `from` that is intact to the new file `to`: the messages, byte for byte, the configuration, the
+/// metadata (with an additional entry `recovered` that describes what is missing) and the attachments. An event `lost` counts the
+/// missing messages at their place. `from` is not changed.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
     let old = Recording::salvage(from)?;
     let mut new = Recorder::create(to, &header(&old))?;
@@ -33,25 +64,38 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
     Ok(Recovered {
         totals: new.finish(&results)?,
         cut: old.cut().cloned(),
+        damage: old.damage().to_vec(),
+        missing_ticks: old.missing_ticks().to_vec(),
+        missing_attachments: old.missing_attachments().to_vec(),
+        had_summary: old.has_summary(),
+        unchecked_messages: old.unchecked_messages(),
     })
 }
 
 fn header(old: &Recording) -> Header {
     let mut metadata = old.metadata().clone();
-    if let Some(Cut {
-        at_byte,
-        of_bytes,
-        why,
-    }) = old.cut()
-    {
-        metadata.insert(
-            "recovered".into(),
-            format!("readable up to byte {at_byte} of {of_bytes}: {why}"),
-        );
+    let losses = losses(old);
+    if !losses.is_empty() {
+        metadata.insert(RECOVERED.into(), losses.join("; "));
     }
+    let period_ns = old.period_ns().or(old.period_by_ticks_ns());
     Header {
         config_toml: old.config_toml().unwrap_or_default().into(),
-        period_ns: old.period_ns().unwrap_or_default(),
+        period_ns: period_ns.unwrap_or_default(),
         metadata,
     }
+}
+
+/// What is missing, in words.
+fn losses(old: &Recording) -> Vec<String> {
+    let mut losses = Vec::new();
+    losses.extend(old.cut().map(|cut| {
+        let (at_byte, of_bytes, why) = (cut.at_byte, cut.of_bytes, &cut.why);
+        format!("readable up to byte {at_byte} of {of_bytes}: {why}")
+    }));
+    losses.extend(old.damage().iter().map(DamagedRange::to_string));
+    losses.extend(old.missing_ticks().iter().map(MissingTicks::to_string));
+    let attachments = old.missing_attachments().iter();
+    losses.extend(attachments.map(|name| format!("the attachment {name} is missing")));
+    losses
 }

@@ -4,16 +4,43 @@ use std::path::{Path, PathBuf};
 
 use prost::Message;
 
-use super::contents::Part;
+use super::contents::{Part, Take};
+use super::continuity::{Continuity, Gap};
 use super::messages;
+use super::scanner::Scanner;
 use super::walk::{Stop, Walk};
 use super::{RecordingError, Topic};
-use crate::rt::record::{Event, LoopMessage, TickRecord};
+use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+
+/// A reader of the records of a file.
+pub(super) enum RecordReader {
+    /// Of an undamaged file.
+    Walk(Box<Walk>),
+    /// Of a damaged file.
+    Scanner(Box<Scanner>),
+}
+
+impl RecordReader {
+    fn step(&mut self, take: &mut Take) -> Result<bool, Stop> {
+        match self {
+            RecordReader::Walk(walk) => walk.step(take),
+            RecordReader::Scanner(scanner) => scanner.step(take).map_err(Stop::Read),
+        }
+    }
+
+    fn offset(&self) -> u64 {
+        match self {
+            RecordReader::Walk(walk) => walk.offset,
+            RecordReader::Scanner(scanner) => scanner.offset,
+        }
+    }
+}
 
 /// Ticks and events of a recording, read on demand.
 pub(super) struct Stream {
     path: PathBuf,
-    walk: Walk,
+    reader: RecordReader,
+    decoder: Decoder,
     chunk: Vec<LoopMessage>,
     next: usize,
     /// Number of entries still to be returned, as counted when the file was opened.
@@ -37,11 +64,12 @@ impl Iterator for Stream {
 }
 
 impl Stream {
-    /// A stream of the first `left` ticks and events of the file under `walk`.
-    pub(super) fn new(path: &Path, walk: Walk, left: u64) -> Stream {
+    /// A stream of the first `left` ticks and events of a file.
+    pub(super) fn new(path: &Path, reader: RecordReader, left: u64) -> Stream {
         Stream {
             path: path.into(),
-            walk,
+            reader,
+            decoder: Decoder::default(),
             chunk: Vec::new(),
             next: 0,
             left,
@@ -52,13 +80,14 @@ impl Stream {
     fn read_chunk(&mut self) -> Result<(), RecordingError> {
         self.chunk.clear();
         self.next = 0;
-        let chunk = &mut self.chunk;
-        let stepped = self.walk.step(&mut |part| match part {
-            Part::Message {
-                topic: topic @ (Topic::Loop | Topic::Event),
-                data,
-            } => published(topic, data).map(|p| chunk.push(p)),
-            _ => Ok(()),
+        let (chunk, decoder) = (&mut self.chunk, &mut self.decoder);
+        let stepped = self.reader.step(&mut |part| {
+            match decoder.decode(&part)? {
+                Some(Decoded::Tick(tick, _)) => chunk.push(LoopMessage::Tick(tick)),
+                Some(Decoded::Event(event)) => chunk.push(LoopMessage::Event(event)),
+                Some(Decoded::Timing(_)) | None => {}
+            }
+            Ok(())
         });
         match stepped {
             Ok(true) => Ok(()),
@@ -74,7 +103,7 @@ impl Stream {
     fn changed(&self) -> RecordingError {
         RecordingError::Damaged {
             path: self.path.clone(),
-            at_byte: self.walk.offset,
+            at_byte: self.reader.offset(),
             ticks: 0,
             what: "the file was changed since it was opened".into(),
         }
@@ -104,21 +133,66 @@ impl Iterator for Ticks {
     }
 }
 
-/// The record of the loop in a message on `/loop` or `/event`.
-pub(super) fn published(topic: Topic, data: &[u8]) -> Result<LoopMessage, String> {
-    if topic == Topic::Loop {
-        let message: messages::Loop = decode(data)?;
-        return TickRecord::try_from(&message)
-            .map(LoopMessage::Tick)
-            .map_err(|e| e.to_string());
-    }
-    let message: messages::Event = decode(data)?;
-    Event::try_from(&message)
-        .map(LoopMessage::Event)
-        .map_err(|e| e.to_string())
+/// Decodes the messages of a recording in their order.
+#[derive(Debug, Default)]
+pub(super) struct Decoder {
+    pub(super) account: Continuity,
 }
 
-/// Decodes a message.
-pub(super) fn decode<M: Message + Default>(data: &[u8]) -> Result<M, String> {
+/// A decoded message.
+pub(super) enum Decoded {
+    Tick(TickRecord, Option<Gap>),
+    Event(Event),
+    Timing(messages::Timing),
+}
+
+impl Decoder {
+    /// Decodes a message and counts it; `None` for other parts. Messages on `/loop` and `/event` that are missing are a
+    /// [`EventKind::Lost`].
+    pub(super) fn decode(&mut self, part: &Part<'_>) -> Result<Option<Decoded>, String> {
+        match part {
+            Part::Message { topic, data } => self.message(*topic, data).map(Some),
+            Part::Missing { topic, messages } => Ok(self.missing(*topic, *messages)),
+            Part::Attachment { .. } | Part::Metadata(_) => Ok(None),
+        }
+    }
+
+    fn message(&mut self, topic: Topic, data: &[u8]) -> Result<Decoded, String> {
+        match topic {
+            Topic::Loop => self.tick(&decode(data)?),
+            Topic::Event => {
+                let message: messages::Event = decode(data)?;
+                let event = Event::try_from(&message).map_err(|e| e.to_string())?;
+                Ok(self.event(event))
+            }
+            Topic::Timing => decode(data).map(Decoded::Timing),
+        }
+    }
+
+    fn tick(&mut self, message: &messages::Loop) -> Result<Decoded, String> {
+        let tick = TickRecord::try_from(message).map_err(|e| e.to_string())?;
+        let refused = |last| format!("tick {} follows tick {last}", tick.tick);
+        let gap = self.account.tick(&tick).map_err(|e| refused(e.0))?;
+        Ok(Decoded::Tick(tick, gap))
+    }
+
+    fn event(&mut self, event: Event) -> Decoded {
+        self.account.event(&event);
+        Decoded::Event(event)
+    }
+
+    fn missing(&mut self, topic: Topic, records: u64) -> Option<Decoded> {
+        match topic {
+            Topic::Loop | Topic::Event => {
+                let tick = self.account.last_tick().unwrap_or_default();
+                let kind = EventKind::Lost { records };
+                Some(self.event(Event { tick, kind }))
+            }
+            Topic::Timing => None,
+        }
+    }
+}
+
+fn decode<M: Message + Default>(data: &[u8]) -> Result<M, String> {
     M::decode(data).map_err(|e| e.to_string())
 }

@@ -15,7 +15,8 @@ use super::error;
 /// Bytes that are read at a time.
 const READ_BYTES: usize = 64 << 10;
 /// Largest record. A larger length is damaged, and no memory is allocated for it.
-const RECORD_BYTES: usize = 256 << 20;
+pub(super) const RECORD_BYTES: usize = 256 << 20;
+
 /// Why a walk ended before the end of a complete file.
 pub(super) enum Stop {
     /// The file ends early.

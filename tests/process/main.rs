@@ -3,6 +3,7 @@ mod command_line;
 mod common;
 mod disk;
 mod kill;
+mod recover;
 mod remedies;
 mod replay;
 mod stop;

@@ -2,8 +2,8 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use bench::recording::{Header, Recorder, Recording, RecordingError};
-use bench::rt::record::{Event, LoopMessage, TickRecord};
+use bench::recording::{Header, MissingTicks, Recorder, Recording, RecordingError, recover};
+use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use proptest::prelude::*;
 
 use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
@@ -53,17 +53,14 @@ fn check(bytes: &[u8], path: &Path) -> Result<(), TestCaseError> {
         );
     }
     match Recording::salvage(path) {
-        Ok(recording) => check_contents(&recording, bytes.len())?,
+        Ok(recording) => check_salvaged(&recording, bytes.len())?,
         Err(error) => prop_assert!(opened.is_err(), "opened, but not salvaged: {error}"),
     }
     Ok(())
 }
 
 fn check_contents(recording: &Recording, of_bytes: usize) -> Result<(), TestCaseError> {
-    let ticks: Vec<_> = recording
-        .ticks()
-        .and_then(Iterator::collect)
-        .expect("has just been read");
+    let ticks = ticks_in(recording);
     prop_assert_eq!(ticks.len() as u64, recording.tick_count());
     prop_assert!(
         ticks
@@ -85,6 +82,48 @@ fn check_contents(recording: &Recording, of_bytes: usize) -> Result<(), TestCase
             prop_assert!(cut.at_byte <= of_bytes as u64 && cut.of_bytes == of_bytes as u64)
         }
         None => prop_assert_eq!(&recording.metadata()["host"], "test"),
+    }
+    Ok(())
+}
+
+fn ticks_in(recording: &Recording) -> Vec<TickRecord> {
+    let ticks = recording.ticks().and_then(Iterator::collect);
+    ticks.expect("has just been read")
+}
+
+/// Every tick and event is one of the original, in the original order, and nothing is missing unless a damage or a cut is
+/// reported.
+fn check_salvaged(recording: &Recording, of_bytes: usize) -> Result<(), TestCaseError> {
+    let ticks = ticks_in(recording);
+    prop_assert_eq!(ticks.len() as u64, recording.tick_count());
+    prop_assert!(ticks.is_sorted_by(|a, b| a.tick < b.tick), "order of ticks");
+    for tick in &ticks {
+        let original = ORIGINAL.ticks.get(tick.tick as usize);
+        prop_assert_eq!(original.map(bits), Some(bits(tick)), "altered tick");
+    }
+    let is_original = |event: &&Event| !matches!(event.kind, EventKind::Lost { .. });
+    let events: Vec<&Event> = recording.events().iter().filter(is_original).collect();
+    let mut originals = ORIGINAL.events.iter();
+    prop_assert!(
+        events.iter().all(|event| originals.any(|o| o == *event)),
+        "altered events"
+    );
+    prop_assert!(
+        recording.config_toml().is_none_or(|c| c == CONFIG),
+        "altered configuration"
+    );
+    let is_reported = recording.cut().is_some() || !recording.damage().is_empty();
+    let is_all = ticks.len() == ORIGINAL.ticks.len()
+        && events.len() == ORIGINAL.events.len()
+        && recording.config_toml().is_some()
+        && recording.attachment("result.json").is_some()
+        && recording
+            .metadata()
+            .get("host")
+            .is_some_and(|host| host == "test");
+    prop_assert!(is_all || is_reported, "a loss that is not reported");
+    for damage in recording.damage() {
+        prop_assert!(damage.from_byte < damage.to_byte && damage.to_byte <= of_bytes as u64);
     }
     Ok(())
 }
@@ -118,6 +157,94 @@ fn single_altered_byte_is_never_returned_as_data() {
         bytes[at] ^= flip;
         check(&bytes, &path).unwrap_or_else(|e| panic!("byte {at} ^ {flip:#x}: {e}"));
         bytes[at] ^= flip;
+    }
+}
+
+/// The ticks of the chunk that contains a byte.
+fn ticks_at(byte: usize) -> std::ops::Range<u64> {
+    // 100 ms a tick are five ticks a chunk; the first chunk has the definitions, and the last one the end of the run.
+    let chunks = chunks(&ORIGINAL.bytes);
+    match chunks
+        .iter()
+        .position(|(at, length)| (*at..at + length).contains(&byte))
+    {
+        None | Some(0) => 0..0,
+        Some(chunk) => 5 * (chunk as u64 - 1)..5 * chunk as u64,
+    }
+}
+
+#[test]
+fn recovery_after_one_altered_bit_loses_the_ticks_of_one_chunk_at_most_and_says_so() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let (path, to) = (dir.path().join("altered.mcap"), dir.path().join("to.mcap"));
+    let mut bytes = ORIGINAL.bytes.clone();
+    for at in 0..bytes.len() {
+        let flip = 1 << (at % 8);
+        bytes[at] ^= flip;
+        std::fs::write(&path, &bytes).expect("temporary file");
+        bytes[at] ^= flip;
+        let recovered = recover(&path, &to).unwrap_or_else(|e| panic!("byte {at}: {e}"));
+        let new = Recording::open(&to).unwrap_or_else(|e| panic!("byte {at}: {e}"));
+        let found: Vec<u64> = ticks_in(&new).iter().map(|tick| tick.tick).collect();
+        let may_be_lost = ticks_at(at);
+        let absent: Vec<u64> = (0..30).filter(|tick| !found.contains(tick)).collect();
+        assert!(
+            absent.iter().all(|tick| may_be_lost.contains(tick)),
+            "byte {at}: {absent:?} are missing"
+        );
+        let reported = recovered.missing_ticks.iter();
+        let reported: Vec<u64> = reported.flat_map(|m| m.first_tick..=m.last_tick).collect();
+        assert_eq!(reported, absent, "byte {at}");
+        assert_eq!(new.lost_records() > 0, recovered.totals.lost_records > 0);
+        if recovered.is_complete() {
+            check_contents(&new, 0).unwrap_or_else(|e| panic!("byte {at}: {e}"));
+            assert!(absent.is_empty() && new.events() == ORIGINAL.events && !new.truncated());
+        }
+        std::fs::remove_file(&to).expect("just written");
+    }
+}
+
+#[test]
+fn recovery_finds_the_channels_without_their_definitions() {
+    // The file is cut, so it has no summary, and its first chunk, which defines the channels, is damaged.
+    let chunks = chunks(&ORIGINAL.bytes);
+    let mut bytes = ORIGINAL.bytes[..chunks[4].0].to_vec();
+    bytes[chunks[0].0 + chunks[0].1 - 8] ^= 1;
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("altered.mcap");
+    std::fs::write(&path, &bytes).expect("temporary file");
+    let recording = Recording::salvage(&path).expect("three chunks are intact");
+    assert_eq!(recording.tick_count(), 15);
+    check_salvaged(&recording, bytes.len()).expect("original ticks");
+}
+
+#[test]
+fn recovery_resumes_after_bytes_that_are_missing_or_overwritten() {
+    let chunks = chunks(&ORIGINAL.bytes);
+    let (second, third) = (chunks[2].0, chunks[3].0);
+    let removed = [&ORIGINAL.bytes[..second + 20], &ORIGINAL.bytes[third - 7..]].concat();
+    let mut zeroed = ORIGINAL.bytes.clone();
+    zeroed[second..third].fill(0);
+    let noise = [
+        &ORIGINAL.bytes[..second],
+        &[6; 1000],
+        &ORIGINAL.bytes[third..],
+    ]
+    .concat();
+    for bytes in [removed, zeroed, noise] {
+        let dir = tempfile::tempdir().expect("temporary directory");
+        let path = dir.path().join("altered.mcap");
+        std::fs::write(&path, &bytes).expect("temporary file");
+        let recording = Recording::salvage(&path).expect("the other chunks are intact");
+        let missing = MissingTicks {
+            first_tick: 5,
+            last_tick: 9,
+            ticks: 5,
+        };
+        assert_eq!(recording.missing_ticks(), [missing]);
+        assert_eq!(recording.tick_count(), 25);
+        assert_eq!(recording.lost_records(), 5);
+        check_salvaged(&recording, bytes.len()).expect("original ticks");
     }
 }
 
