@@ -115,6 +115,12 @@ fn show_state(campaign: &Campaign<'_>) {
     for why in &campaign.rejected {
         print_note(&format!("{why}; the point is measured again"));
     }
+    if campaign.unverified > 0 {
+        print_note(&format!(
+            "the files of {} points have no checksum, because an earlier version wrote them, so an altered value is not detected; remove them from the folder points/ to measure these points again",
+            campaign.unverified
+        ));
+    }
     let (done, missing) = (campaign.done().len(), campaign.missing().len());
     if done > 0 {
         print_note(&format!(

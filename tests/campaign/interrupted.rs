@@ -277,6 +277,73 @@ fn rejects_results_of_simulation_for_devices_and_the_reverse() {
     }
 }
 
+/// A folder with one finished point, and the file of the point.
+fn store_with_one_point(folder: &Path, grid: &Grid, point: &PointResult) -> PathBuf {
+    let config = load(&Source::default()).expect("the default profile");
+    let opened = Store::open(folder, grid, &config, false).expect("a new folder");
+    let place = GridPoint { row: 1, column: 0 };
+    opened.store.add(place, point).expect("a point");
+    folder.join("points/0001-0000.json")
+}
+
+fn measured_point() -> PointResult {
+    PointResult {
+        cnmp: Cnmp::Detected,
+        why: "two zeros".into(),
+        modes_hz: vec![29.3, 101.25],
+        signs: "+-".into(),
+        zeros_rad_s: vec![[12.5, 340.0]],
+        loop_digest: "0123456789abcdef".into(),
+        load_check: None,
+    }
+}
+
+#[test]
+fn altered_file_of_a_point_is_not_used() {
+    let config = load(&Source::default()).expect("the default profile");
+    let grid = Grid::new(vec![0.0, 0.08], vec![0.1], &config).expect("a grid");
+    let point = measured_point();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = store_with_one_point(folder.path(), &grid, &point);
+    let bytes = std::fs::read(&path).expect("the file of the point");
+    let mut rejected = 0;
+    for at in 0..bytes.len() {
+        let mut altered = bytes.clone();
+        altered[at] ^= 1 << (at % 7);
+        std::fs::write(&path, altered).expect("room");
+        let opened = Store::open(folder.path(), &grid, &config, false).expect("the folder");
+        rejected += opened.rejected.len();
+        // Spaces between the values may be altered.
+        for (_, result) in opened.done {
+            assert_eq!(result, point, "byte {at}");
+        }
+        assert_eq!(opened.unverified, 0, "byte {at}");
+    }
+    assert!(
+        (bytes.len() / 2..=bytes.len()).contains(&rejected),
+        "{rejected}"
+    );
+}
+
+#[test]
+fn file_of_a_point_without_checksum_is_used_and_counted() {
+    let config = load(&Source::default()).expect("the default profile");
+    let grid = Grid::new(vec![0.0, 0.08], vec![0.1], &config).expect("a grid");
+    let point = measured_point();
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = store_with_one_point(folder.path(), &grid, &point);
+    let mut record = json(&path);
+    let removed = record
+        .as_object_mut()
+        .expect("an object")
+        .remove("checksum");
+    assert!(removed.is_some_and(|checksum| checksum.is_string()));
+    std::fs::write(&path, record.to_string()).expect("room");
+    let opened = Store::open(folder.path(), &grid, &config, false).expect("the folder");
+    assert_eq!((opened.done.len(), opened.unverified), (1, 1));
+    assert_eq!(opened.done[0].1, point);
+}
+
 #[test]
 fn asymmetry_offset_applies_to_the_simulated_stage_and_not_to_the_model() {
     let bench = Bench::new();

@@ -37,6 +37,8 @@ pub struct Campaign<'a> {
     done: Vec<(GridPoint, PointResult)>,
     /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
+    /// Number of finished points whose files have no checksum.
+    pub unverified: usize,
 }
 
 impl<'a> Campaign<'a> {
@@ -53,6 +55,7 @@ impl<'a> Campaign<'a> {
             store,
             done,
             rejected,
+            unverified,
         } = Store::open(folder, grid, config, on_devices)?;
         Ok(Campaign {
             config,
@@ -61,6 +64,7 @@ impl<'a> Campaign<'a> {
             keep_recordings,
             done,
             rejected,
+            unverified,
         })
     }
 

@@ -1,7 +1,8 @@
 //! The folder of a campaign: `campaign.json` with all settings, and one file for each point in `points/`.
 //!
 //! Each file is written completely or not at all. The file of a point that is damaged or belongs to other settings (each file
-//! contains the checksum of its `campaign.json`) is ignored: the point is measured again. A process that works on the folder
+//! contains the checksum of its `campaign.json` and one of its own content) is ignored: the point is measured again. Files of
+//! earlier versions have no checksum of their content; they are used and counted. A process that works on the folder
 //! holds a lock on it. The operating system releases the lock when the process ends, in any way.
 
 use std::fs::File;
@@ -42,6 +43,27 @@ struct Record {
     campaign: String,
     place: GridPoint,
     point: PointResult,
+    /// Checksum of the record without this entry. Earlier versions wrote none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    checksum: Option<String>,
+}
+
+impl Record {
+    /// CRC-32 of the text of the record without its checksum.
+    fn content_checksum(&self) -> Result<String, CampaignError> {
+        let content = Record {
+            checksum: None,
+            ..self.clone()
+        };
+        Ok(checksum(&[&json(&content)?]))
+    }
+}
+
+/// The result in the file of a point.
+enum StoredPoint {
+    Verified(PointResult),
+    /// Without a checksum.
+    Unverified(PointResult),
 }
 
 /// The folder of a campaign in progress.
@@ -63,6 +85,8 @@ pub struct OpenedStore {
     pub done: Vec<(GridPoint, PointResult)>,
     /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
+    /// Number of finished points whose files have no checksum.
+    pub unverified: usize,
 }
 
 impl Store {
@@ -97,10 +121,14 @@ impl Store {
     }
 
     fn read_points(self, grid: &Grid) -> OpenedStore {
-        let (mut done, mut rejected) = (Vec::new(), Vec::new());
+        let (mut done, mut rejected, mut unverified) = (Vec::new(), Vec::new(), 0);
         for point in grid.points() {
             match self.read(point) {
-                Ok(Some(result)) => done.push((point, result)),
+                Ok(Some(StoredPoint::Verified(result))) => done.push((point, result)),
+                Ok(Some(StoredPoint::Unverified(result))) => {
+                    unverified += 1;
+                    done.push((point, result));
+                }
                 Ok(None) => {}
                 Err(why) => rejected.push(format!("{} {why}", self.path(point).display())),
             }
@@ -109,16 +137,19 @@ impl Store {
             store: self,
             done,
             rejected,
+            unverified,
         }
     }
 
     /// Writes the result of a point.
     pub fn add(&self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError> {
-        let record = Record {
+        let mut record = Record {
             campaign: self.campaign.clone(),
             place: point,
             point: result.clone(),
+            checksum: None,
         };
+        record.checksum = Some(record.content_checksum()?);
         write(&self.path(point), &json(&record)?)
     }
 
@@ -137,7 +168,7 @@ impl Store {
     }
 
     /// The result of a point, if it exists; or why its file is ignored.
-    fn read(&self, point: GridPoint) -> Result<Option<PointResult>, String> {
+    fn read(&self, point: GridPoint) -> Result<Option<StoredPoint>, String> {
         let text = match std::fs::read_to_string(self.path(point)) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             text => text.map_err(|e| format!("cannot be read ({e})"))?,
@@ -147,7 +178,12 @@ impl Store {
         if record.campaign != self.campaign || record.place != point {
             return Err("is of another campaign or another point".into());
         }
-        Ok(Some(record.point))
+        let expected = record.content_checksum().map_err(|e| e.to_string())?;
+        match record.checksum {
+            None => Ok(Some(StoredPoint::Unverified(record.point))),
+            Some(checksum) if checksum == expected => Ok(Some(StoredPoint::Verified(record.point))),
+            Some(_) => Err("is torn or damaged (its checksum is wrong)".into()),
+        }
     }
 }
 
