@@ -56,6 +56,7 @@ struct Report {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
     let plan = calibration::check(&config)?;
+    check_target(args.write.as_deref())?;
     let setup = args.run.setup(&config)?;
     if !args.bench.json {
         print_text(&plan_text(&plan, &config, !args.no_delay))?;
@@ -70,6 +71,28 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         Some(_) => exit(&report.run),
         None => Outcome::Failed,
     })
+}
+
+/// Refuses, before any motion, a file for the calibration that exists or cannot be created.
+fn check_target(target: Option<&Path>) -> Result<(), CliError> {
+    let Some(target) = target else {
+        return Ok(());
+    };
+    let file = target.display();
+    if target.exists() {
+        return Err(CliError::Failed(format!(
+            "--write {file}: the file exists, and a calibration is never overwritten, so nothing was moved; choose another file with --write"
+        )));
+    }
+    match target.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() && !folder.is_dir() => {
+            Err(CliError::Failed(format!(
+                "--write {file}: there is no folder {}, so nothing was moved; create it, or choose another file with --write",
+                folder.display()
+            )))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Steps and chirp with their extremes, printed before the first run.

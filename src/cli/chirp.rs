@@ -184,9 +184,11 @@ fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
 
 fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
     let path = recording.display();
-    CliError::Failed(format!(
-        "{error}; the recording of the run is complete: {path}"
-    ))
+    let state = match recording.exists() {
+        true => "is complete",
+        false => "was removed",
+    };
+    CliError::Failed(format!("{error}; the recording of the run {state}: {path}"))
 }
 
 /// The plan of the run, printed before it starts.

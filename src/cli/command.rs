@@ -10,12 +10,13 @@ use super::{
     calibrate, campaign, chirp, completions, config, control, doctor, emulate, identify, linearity,
     margins, model, recover, replay,
 };
+use crate::experiment::survive_file_size_limit;
 
 /// Identifies and controls a precision-motion stage.
 ///
 /// Without `--config`, every run uses the simulated stage of the thesis. Exit codes: 0 success; 1 failure, for example
 /// an interlock trip; 2 wrong usage or configuration, no motion; 3 success, but with overruns or lost records
-/// (identify: the recorded run was not completed; recover: records are lost).
+/// (identify: the recorded run was not completed; recover: something is missing).
 #[derive(Debug, Parser)]
 #[command(name = "bench", version, max_term_width = 80, after_help = GLOSSARY)]
 pub struct Cli {
@@ -65,6 +66,8 @@ enum Command {
 /// Parses the arguments of the process, runs the command and reports an error: as text on standard error and, with
 /// `--json`, as an object on standard output.
 pub fn main() -> Outcome {
+    // Without the handler a write beyond `ulimit -f` ends the process; the program works without it.
+    let _ = survive_file_size_limit();
     let json = std::env::args_os().any(|argument| argument == "--json");
     match Cli::try_parse() {
         Ok(cli) => run(cli).unwrap_or_else(|error| failed(&error, json)),

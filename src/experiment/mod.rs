@@ -53,5 +53,5 @@ pub use run::{Run, run};
 pub use run_error::RunError;
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};
-pub use signals::{StopSignals, abandon_on_signal, stop_on_signal};
+pub use signals::{StopSignals, abandon_on_signal, stop_on_signal, survive_file_size_limit};
 pub use tracking::{TrackingMetrics, tracking_metrics};

@@ -44,9 +44,15 @@ pub struct Run {
 }
 
 impl Run {
-    /// Counts of the recording, which contains all ticks by now.
+    /// Counts of the recording, which contains all ticks by now. Fails if the file was removed during the run.
     pub fn totals(&mut self) -> Result<Totals, RecordingError> {
-        self.recorder.complete()
+        let totals = self.recorder.complete()?;
+        match self.path.exists() {
+            true => Ok(totals),
+            false => Err(RecordingError::Removed {
+                path: self.path.clone(),
+            }),
+        }
     }
 
     /// Adds the results and closes the file.
@@ -143,13 +149,28 @@ fn create_recording(
         metadata,
     };
     create_folder(folder)?;
-    let path = file_name::recording(folder, &plan.label(), SystemTime::now());
-    let mut recorder = Recorder::create(&path, &header).map_err(RunError::Create)?;
+    let mut recorder = create_under_free_name(folder, &plan.label(), &header)?;
     for (name, media_type, text) in plan.attachments()? {
         let attached = recorder.attach(name, media_type, text.as_bytes());
         attached.map_err(RunError::Create)?;
     }
     Ok(recorder)
+}
+
+/// Another process may take a free name before this one does: then the next free name is used.
+fn create_under_free_name(
+    folder: &Path,
+    label: &str,
+    header: &Header,
+) -> Result<Recorder, RunError> {
+    let now = SystemTime::now();
+    loop {
+        let path = file_name::recording(folder, label, now);
+        match Recorder::create(&path, header) {
+            Err(RecordingError::Exists { .. }) if path.exists() => {}
+            created => return created.map_err(RunError::Create),
+        }
+    }
 }
 
 fn create_folder(folder: &Path) -> Result<(), RunError> {

@@ -44,6 +44,17 @@ impl StopSignals {
     }
 }
 
+/// Lets a write beyond the limit of the file size (`ulimit -f`) fail with an error. By default, SIGXFSZ would kill the process.
+///
+/// # Errors
+/// When the system refuses the handler.
+pub fn survive_file_size_limit() -> std::io::Result<()> {
+    let runtime = runtime()?;
+    let _within = runtime.enter();
+    // The handler stays installed for the life of the process.
+    signal(SignalKind::from_raw(libc::SIGXFSZ)).map(drop)
+}
+
 /// Whether this process ignores a signal: bit `number - 1` of `SigIgn` [Linux, proc_pid_status(5)].
 fn is_ignored(kind: SignalKind) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

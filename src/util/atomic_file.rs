@@ -11,10 +11,18 @@ use std::path::{Path, PathBuf};
 /// Those of the file system.
 pub fn write_atomic(path: &Path, text: &str) -> std::io::Result<()> {
     let partial = PathBuf::from(format!("{}.partial", path.display()));
-    let mut file = File::create(&partial)?;
+    let written = write_synced(&partial, text).and_then(|()| std::fs::rename(&partial, path));
+    if written.is_err() {
+        // The error of writing is the one to report.
+        let _ = std::fs::remove_file(&partial);
+    }
+    written
+}
+
+fn write_synced(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
     file.write_all(text.as_bytes())?;
-    file.sync_all()?;
-    std::fs::rename(&partial, path)
+    file.sync_all()
 }
 
 /// As [`write_atomic`], and brings the name in its folder to the disk: after a power failure the file is present.
@@ -41,16 +49,14 @@ fn sync_folder(path: &Path) -> std::io::Result<()> {
     }
 }
 
-/// Writes a file and overwrites none: if the name is taken, the file is `STEM-2.EXT`, `STEM-3.EXT`, ... Returns its path.
+/// As [`write_atomic`], but overwrites no file: if the name is taken, the file is `STEM-2.EXT`, `STEM-3.EXT`, ... Returns its
+/// path. An empty file holds the name until the content is complete.
 ///
 /// # Errors
 /// Those of the file system. The incomplete file is removed.
 pub fn write_new(path: &Path, text: &str) -> std::io::Result<PathBuf> {
-    let (mut file, path) = create_free(path)?;
-    let written = file
-        .write_all(text.as_bytes())
-        .and_then(|()| file.sync_all());
-    if let Err(error) = written {
+    let path = create_free(path)?;
+    if let Err(error) = write_atomic(&path, text) {
         // The error of writing is the one to report.
         let _ = std::fs::remove_file(&path);
         return Err(error);
@@ -58,13 +64,13 @@ pub fn write_new(path: &Path, text: &str) -> std::io::Result<PathBuf> {
     Ok(path)
 }
 
-/// Creates the file under the first free name.
-fn create_free(path: &Path) -> std::io::Result<(File, PathBuf)> {
+/// Creates an empty file under the first free name.
+fn create_free(path: &Path) -> std::io::Result<PathBuf> {
     let mut name = path.to_owned();
     let mut number = 1;
     loop {
         match File::create_new(&name) {
-            Ok(file) => return Ok((file, name)),
+            Ok(_) => return Ok(name),
             Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
             Err(_) => {
                 number += 1;

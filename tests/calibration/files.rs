@@ -21,6 +21,15 @@ fn bench(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     )
 }
 
+/// Number of recordings in the default folder of `folder`.
+fn recordings(folder: &Path) -> usize {
+    let entries = std::fs::read_dir(folder.join("recordings")).expect("the folder");
+    let names = entries.map(|entry| entry.expect("an entry").path());
+    names
+        .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
+        .count()
+}
+
 /// Makes a calibration in `folder` and returns its text.
 fn calibrate(folder: &Path) -> (Value, String) {
     let (code, report, errors) = bench(folder, &["calibrate", "--write", "mine.toml"]);
@@ -51,6 +60,7 @@ fn calibration_file_has_date_devices_and_delay_and_is_not_overwritten() {
                 .extension()
                 .is_some()
     );
+    let recorded = recordings(folder.path());
     let (code, _, errors) = bench(
         folder.path(),
         &["calibrate", "--no-delay", "--write", "mine.toml"],
@@ -58,6 +68,12 @@ fn calibration_file_has_date_devices_and_delay_and_is_not_overwritten() {
     assert!(
         code == 1 && errors.contains("mine.toml") && errors.contains("--write"),
         "{errors}"
+    );
+    assert!(errors.contains("nothing was moved"), "{errors}");
+    assert_eq!(
+        recordings(folder.path()),
+        recorded,
+        "refused before any motion"
     );
     assert_eq!(
         std::fs::read_to_string(folder.path().join("mine.toml")).expect("the file"),

@@ -50,7 +50,7 @@ fn disk_full_stops_the_run_and_keeps_the_written_part() {
         assert!(!message.contains("panicked"), "{message}");
 
         let recover = bench(&["recover"]).arg(&path).output().expect("it runs");
-        assert_eq!(recover.status.code(), Some(0), "{}", stderr(&recover));
+        assert_eq!(recover.status.code(), Some(3), "{}", stderr(&recover));
         let stem = path.file_stem().expect("a name").to_str().expect("text");
         let saved =
             Recording::open(&path.with_file_name(format!("{stem}_recovered.mcap"))).expect("whole");
@@ -143,4 +143,95 @@ fn unwritable_folder_is_reported_before_any_motion() {
         std::fs::read_to_string(&file).expect("still there"),
         "a file instead of a folder"
     );
+}
+
+#[test]
+fn file_size_limit_stops_the_run_instead_of_killing_the_program() {
+    // SIGXFSZ has its default action, which ends a process.
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let script = "ulimit -f 2048; exec \"$0\" \"$@\"";
+    let output = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_bench"), "chirp", "--out"])
+        .arg(folder.path())
+        .output()
+        .expect("a shell");
+    let message = stderr(&output);
+    assert_eq!(
+        output.status.code(),
+        Some(1),
+        "{:?}: {message}",
+        output.status
+    );
+    assert!(
+        message.contains("File too large")
+            && message.contains("the run was stopped with zero current"),
+        "{message}"
+    );
+}
+
+#[test]
+fn runs_started_at_the_same_time_get_names_of_their_own() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments = ["control", "--slow", "--duration", "1", "--out"];
+    let start = |_| {
+        let mut command = bench(&arguments);
+        command.arg(folder.path()).stdout(Stdio::null());
+        command.stderr(Stdio::piped()).spawn().expect("it starts")
+    };
+    let started: Vec<_> = (0..12).map(start).collect();
+    for child in started {
+        let output = child.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+    let entries = std::fs::read_dir(folder.path()).expect("the folder");
+    let names = entries.map(|entry| entry.expect("an entry").path());
+    let recordings = names.filter(|path| path.extension().is_some_and(|e| e == "mcap"));
+    assert_eq!(recordings.count(), 12);
+}
+
+#[test]
+fn recording_removed_during_a_run_is_reported_as_removed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let arguments = [
+        &["control", "--slow", "--duration", "3"][..],
+        &AT_1_KHZ,
+        &NO_OVERRUN_LIMIT,
+    ];
+    let mut running = Running::start(&arguments.concat(), &out);
+    running.until_slept(100);
+    std::fs::remove_dir_all(&out).expect("the folder");
+    running.until_ended();
+    let output = running.end();
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(
+        message.contains("the recording was removed during the run")
+            && !message.contains("complete"),
+        "{message}"
+    );
+}
+
+#[test]
+fn full_disk_leaves_no_incomplete_results() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (runs, results) = (folder.path().join("runs"), folder.path().join("results"));
+    let arguments = [
+        &["chirp", "--duration", "8", "--start", "5Hz"][..],
+        &AT_1_KHZ[..4],
+    ]
+    .concat();
+    let run = bench(&arguments).arg("--out").arg(&runs).output();
+    let run = run.expect("it runs");
+    assert_eq!(run.status.code(), Some(0), "{}", stderr(&run));
+    let recording = recording_in(&runs);
+    // Four blocks are 2 or 4 KiB; the response has some hundred lines of more than 50 bytes.
+    let recording = recording.to_str().expect("text");
+    let output = run_with_file_limit(4, &["identify", recording], &results);
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert!(message.contains("File too large"), "{message}");
+    let left = std::fs::read_dir(&results).expect("the folder");
+    let names: Vec<_> = left.map(|entry| entry.expect("an entry").path()).collect();
+    assert!(names.is_empty(), "{names:?}");
 }
