@@ -74,9 +74,18 @@ pub struct CalibrationSettings {
     pub when_expired: OnInvalidCalibration,
     /// What happens if it was made with other devices.
     pub when_other_devices: OnInvalidCalibration,
-    /// Name of the person who confirms gains beyond 0.75 to 1.25. Without it, such a calibration is refused.
+    /// Name of the person who confirms gains outside 0.75 to 1.25 (of a reversed probe -1.25 to -0.75). Without it, such a
+    /// calibration is refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepted_by: Option<String>,
+}
+
+impl CalibrationSettings {
+    /// The name of the person who confirms unusual gains. A blank text is not a name.
+    pub fn confirming_name(&self) -> Option<&str> {
+        let name = self.accepted_by.as_deref()?.trim();
+        (!name.is_empty()).then_some(name)
+    }
 }
 
 /// What happens if a calibration is not valid.

@@ -1,7 +1,9 @@
 //! Relations between settings, which ranges of single settings cannot express.
 
 use super::purpose::Purpose;
-use super::{ChirpSettings, Config, IdentifySettings, MotorSettings, relations};
+use super::{
+    CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, relations,
+};
 use crate::util::finding::Finding;
 
 /// Longest excitation in ticks, more than an hour at 5 kHz. It is analysed as one record, with about 80 bytes per tick.
@@ -16,6 +18,9 @@ pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     travel(config, &mut errors);
     force(&config.motor, &mut errors);
     staleness(config, &mut errors);
+    if purpose != Purpose::Recorded {
+        confirming_name(&config.calibration, &mut errors);
+    }
     let for_control = purpose.includes(Purpose::Control);
     let is_swept = config.control.reference.is_swept();
     if purpose.includes(Purpose::Chirp) || for_control && is_swept {
@@ -76,6 +81,13 @@ fn staleness(config: &Config, errors: &mut Errors) {
         format!(
             "is {stale_s} s, but in normal operation a reading is up to {oldest_s} s old (probe.latency_s + transport_s + 1/rate_hz); set a larger value"
         )
+    });
+}
+
+fn confirming_name(calibration: &CalibrationSettings, errors: &mut Errors) {
+    let is_blank = calibration.accepted_by.is_some() && calibration.confirming_name().is_none();
+    errors.require(!is_blank, "calibration.accepted_by", || {
+        "is blank; give the name of the person who confirms the gains, or leave it out".into()
     });
 }
 

@@ -9,7 +9,7 @@ use super::error::ExperimentError;
 use super::plan::Plan;
 use super::run::{Run, run};
 use crate::config::Config;
-use crate::rig::calibration::{Calibration, load_calibration};
+use crate::rig::calibration::{Calibration, ConnectedDevices, load_calibration};
 use crate::rig::devices::{self, OpenRig};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
@@ -127,17 +127,19 @@ fn configured_calibration(
     config: &Config,
     opened: &OpenRig,
 ) -> Result<Option<Calibration>, ExperimentError> {
-    let (settings, now) = (&config.calibration, SystemTime::now());
-    let loaded = load_calibration(settings, &opened.amplifier, &opened.probe, now)?;
-    let Some((calibration, warnings)) = loaded else {
+    let devices = ConnectedDevices {
+        amplifier: &opened.amplifier,
+        probe: &opened.probe,
+    };
+    let (settings, limit_a) = (&config.calibration, config.interlock.current_error_a);
+    let loaded = load_calibration(settings, limit_a, Some(devices), SystemTime::now())?;
+    let Some(loaded) = loaded else {
         return Ok(None);
     };
-    let file = settings.file.as_deref().unwrap_or_default();
-    calibration.check(file, settings, config.interlock.current_error_a)?;
-    for warning in warnings {
+    for warning in loaded.warnings {
         tracing::warn!("{warning}");
     }
-    Ok(Some(calibration))
+    Ok(Some(loaded.calibration))
 }
 
 /// Adds the result of a run to its recording as JSON and closes the file; returns the JSON.

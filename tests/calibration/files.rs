@@ -174,6 +174,8 @@ fn gains_beyond_25_percent_need_a_name_and_large_current_offsets_are_refused() {
         (current(1.26), "amplifier.current_gain = 1.26", 2, 0),
         (probe(0.74), "probe.gain = 0.74", 2, 0),
         (probe(0.0), "probe.gain = 0.0", 2, 0),
+        (probe(-0.74), "-1.25 to -0.75 of a reversed probe", 2, 0),
+        (probe(-1.26), "probe.gain = -1.26", 2, 0),
         (offset, "amplifier.current_offset_a = 0.9", 2, 2),
     ];
     for (text, place, without_name, with_name) in cases {
@@ -196,6 +198,66 @@ fn gains_beyond_25_percent_need_a_name_and_large_current_offsets_are_refused() {
             let is_explained = errors.contains(place) && errors.contains("nothing was moved");
             assert!(expected == 0 || is_explained, "{errors}");
         }
+    }
+}
+
+/// The compliance of the stage is twice that of its model: the unmodelled mode adds residue/omega^2 = 1/k with
+/// k = 72000 N/m, the stiffness of the model.
+fn twice_as_soft(folder: &Path) {
+    let omega_rad_s = std::f64::consts::TAU * 1500.0;
+    let residue_per_kg = omega_rad_s * omega_rad_s / 72_000.0;
+    let text = format!(
+        "calibrate.scale_by = \"model\"\ncalibrate.amplitude_a = 1.0\n[[sim.unmodelled]]\nfrequency_hz = 1500.0\ndamping_ratio = 0.5\nresidue_per_kg = {residue_per_kg:?}\n"
+    );
+    std::fs::write(folder.join("soft.toml"), text).expect("a good disk");
+}
+
+#[test]
+fn refuses_measured_gain_without_naming_a_file_or_denying_the_motion() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    twice_as_soft(folder.path());
+    let calibrate = ["calibrate", "--no-delay", "--config", "soft.toml"];
+    let (code, report, errors) = bench(folder.path(), &calibrate);
+    assert_eq!(
+        (code, &report["calibration"]),
+        (1, &Value::Null),
+        "{errors}"
+    );
+    let why = report["why"].as_str().expect("a reason");
+    let (gain, rest) = why
+        .strip_prefix("probe.gain = ")
+        .and_then(|text| text.split_once(" is outside 0.75 to 1.25"))
+        .expect(why);
+    // The compliance of the model over that of the stage; the fit has an error of less than 0.1 %.
+    let gain: f64 = gain.parse().expect("a number");
+    assert!((gain - 0.5).abs() < 5e-4, "{gain}");
+    assert!(rest.contains("; check scale") && rest.contains("calibration.accepted_by"));
+    assert!(!why.contains("nothing was moved") && !why.contains("calibration as measured"));
+    let confirmed = [
+        &calibrate[..],
+        &["--set", "calibration.accepted_by=A. Smith"],
+    ]
+    .concat();
+    let (code, report, errors) = bench(folder.path(), &confirmed);
+    assert_eq!(code, 0, "{errors}");
+    let confirmed_gain = report["calibration"]["probe"]["gain"].as_f64();
+    assert!((confirmed_gain.expect("a number") - gain).abs() < 1e-4);
+}
+
+#[test]
+fn rejects_blank_name_of_the_confirming_person() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for name in ["", "  ", "\t"] {
+        let text = format!("calibration.accepted_by = {name:?}\n");
+        std::fs::write(folder.path().join("blank.toml"), text).expect("a good disk");
+        let (code, _, errors) = bench(
+            folder.path(),
+            &["config", "check", "--config", "blank.toml"],
+        );
+        assert!(
+            code == 2 && errors.contains("`calibration.accepted_by` is blank; give the name"),
+            "{name:?}: {code} {errors}"
+        );
     }
 }
 

@@ -119,9 +119,10 @@ fn static_steps(
 /// The measured calibration, if a run may use it.
 fn checked(calibration: Calibration, config: &Config) -> Result<Calibration, String> {
     let (settings, current_error_a) = (&config.calibration, config.interlock.current_error_a);
-    let checked = calibration.check("as measured", settings, current_error_a);
-    checked.map_err(|error| error.to_string())?;
-    Ok(calibration)
+    match calibration.check(settings, current_error_a) {
+        Ok(()) => Ok(calibration),
+        Err(defect) => Err(defect.to_string()),
+    }
 }
 
 fn fitted(

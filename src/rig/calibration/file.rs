@@ -80,6 +80,37 @@ pub struct ChainCalibration {
     pub delay_sigma_s: Option<f64>,
 }
 
+/// A value of a calibration with which no run is made. Its text ends with the remedy.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum CalibrationDefect {
+    /// A gain of the amplifier so far from 1 that an error is more likely.
+    #[error(
+        "amplifier.current_gain = {gain:.4} is outside 0.75 to 1.25; check scale and wiring of the amplifier and repeat `bench calibrate`, or set calibration.accepted_by = \"NAME\" to confirm the value with your name"
+    )]
+    CurrentGain {
+        /// Its value.
+        gain: f64,
+    },
+    /// A gain of the probe so far from 1 or -1 that an error is more likely.
+    #[error(
+        "probe.gain = {gain:.4} is outside 0.75 to 1.25, and outside -1.25 to -0.75 of a reversed probe; check scale and range of the probe and repeat `bench calibrate`, or set calibration.accepted_by = \"NAME\" to confirm the value with your name"
+    )]
+    ProbeGain {
+        /// Its value.
+        gain: f64,
+    },
+    /// An offset of the current that the check of the measured current cannot distinguish from a drive that does not follow.
+    #[error(
+        "amplifier.current_offset_a = {offset_a:.4} A exceeds interlock.current_error_a = {limit_a} A; correct the offset of the drive and repeat `bench calibrate`"
+    )]
+    CurrentOffset {
+        /// The offset.
+        offset_a: f64,
+        /// The limit.
+        limit_a: f64,
+    },
+}
+
 /// A calibration that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationError {
@@ -99,29 +130,13 @@ pub enum CalibrationError {
     /// The calibration cannot be written.
     #[error("the calibration cannot be written as TOML: {0}; report this with the configuration")]
     Text(String),
-    /// A gain so far from 1 that an error is more likely.
-    #[error(
-        "calibration {file}: {key} = {gain:.4} is beyond 0.75 to 1.25; check scale and wiring of the device and repeat `bench calibrate`, or set calibration.accepted_by = \"NAME\" to confirm the value with your name; nothing was moved"
-    )]
-    Gain {
+    /// A value with which no run is made.
+    #[error("calibration {file}: {defect}; nothing was moved")]
+    Defect {
         /// The file.
         file: String,
-        /// The key in the file.
-        key: &'static str,
-        /// Its value.
-        gain: f64,
-    },
-    /// An offset of the current that the check of the measured current could not tell from a drive that does not follow.
-    #[error(
-        "calibration {file}: amplifier.current_offset_a = {offset_a:.4} A exceeds interlock.current_error_a = {limit_a} A; correct the offset of the drive and repeat `bench calibrate`; nothing was moved"
-    )]
-    Offset {
-        /// The file.
-        file: String,
-        /// The offset.
-        offset_a: f64,
-        /// The limit.
-        limit_a: f64,
+        /// The value.
+        defect: CalibrationDefect,
     },
     /// Too old, or of other devices.
     #[error(
@@ -137,18 +152,39 @@ pub enum CalibrationError {
     },
 }
 
-/// The calibration of a run, with warnings; `None` if none is configured.
+/// The connected devices, by which a calibration is compared with them.
+#[derive(Clone, Copy, Debug)]
+pub struct ConnectedDevices<'a> {
+    /// Identity of the amplifier, as it reports it.
+    pub amplifier: &'a str,
+    /// Identity of the probe, as far as it is known.
+    pub probe: &'a str,
+}
+
+/// A calibration from its file, checked.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadedCalibration {
+    /// The calibration.
+    pub calibration: Calibration,
+    /// Defects that the configuration accepts with a warning.
+    pub warnings: Vec<String>,
+}
+
+/// The configured calibration; `None` if none is configured. `devices` are the connected ones; without them their identity is
+/// not checked. `current_error_a` is the limit within which the measured current must follow the commands.
+///
+/// # Errors
+/// If the file cannot be used, or contains a value with which no run is made.
 pub fn load_calibration(
     settings: &CalibrationSettings,
-    amplifier: &str,
-    probe: &str,
+    current_error_a: f64,
+    devices: Option<ConnectedDevices>,
     now: SystemTime,
-) -> Result<Option<(Calibration, Vec<String>)>, CalibrationError> {
+) -> Result<Option<LoadedCalibration>, CalibrationError> {
     let Some(file) = &settings.file else {
         return Ok(None);
     };
-    let text = config::text_of_file(file, "calibration")?;
-    let calibration: Calibration = config::typed(file, &text)?;
+    let calibration = read(file, settings, current_error_a)?;
     let expired = Check {
         file,
         setting: "calibration.when_expired",
@@ -159,13 +195,30 @@ pub fn load_calibration(
         file,
         setting: "calibration.when_other_devices",
         reaction: settings.when_other_devices,
-        defect: other_device(&calibration, amplifier, probe),
+        defect: devices.and_then(|devices| other_device(&calibration, devices)),
     };
     let warnings = [expired.warning()?, other_device.warning()?];
-    Ok(Some((
+    Ok(Some(LoadedCalibration {
         calibration,
-        warnings.into_iter().flatten().collect(),
-    )))
+        warnings: warnings.into_iter().flatten().collect(),
+    }))
+}
+
+/// The calibration in a file, if its values allow a run.
+fn read(
+    file: &str,
+    settings: &CalibrationSettings,
+    current_error_a: f64,
+) -> Result<Calibration, CalibrationError> {
+    let text = config::text_of_file(file, "calibration")?;
+    let calibration: Calibration = config::typed(file, &text)?;
+    match calibration.check(settings, current_error_a) {
+        Ok(()) => Ok(calibration),
+        Err(defect) => Err(CalibrationError::Defect {
+            file: file.into(),
+            defect,
+        }),
+    }
 }
 
 /// A check of a calibration, and the configured reaction to a defect.
@@ -215,10 +268,11 @@ fn expired(
     )))
 }
 
-fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Option<String> {
+fn other_device(calibration: &Calibration, devices: ConnectedDevices) -> Option<String> {
+    let (amplifier, probe) = (&calibration.amplifier.device, &calibration.probe.device);
     let pairs = [
-        ("amplifier", &calibration.amplifier.device, amplifier),
-        ("probe", &calibration.probe.device, probe),
+        ("amplifier", amplifier, devices.amplifier),
+        ("probe", probe, devices.probe),
     ];
     let mut pairs = pairs.into_iter();
     let (kind, calibrated, connected) = pairs.find(|(_, theirs, ours)| theirs != ours)?;
@@ -231,35 +285,31 @@ fn other_device(calibration: &Calibration, amplifier: &str, probe: &str) -> Opti
 const GAIN_TOLERANCE: f64 = 0.25;
 
 impl Calibration {
-    /// Refuses gains beyond 1 +- 0.25 that nobody confirmed with a name, and an offset of the current beyond `current_error_a`,
-    /// the limit within which the measured current must follow the commands. The probe may be reversed. `file` names the
-    /// calibration in the error.
+    /// Refuses gains outside 1 +- 0.25 that nobody confirmed with a name, and an offset of the current beyond `current_error_a`,
+    /// the limit within which the measured current must follow the commands. The gain of a reversed probe is near -1.
     pub fn check(
         &self,
-        file: &str,
         settings: &CalibrationSettings,
         current_error_a: f64,
-    ) -> Result<(), CalibrationError> {
-        let gains = [
-            ("amplifier.current_gain", self.amplifier.current_gain, 1.0),
-            ("probe.gain", self.probe.gain, self.probe.gain.signum()),
-        ];
-        let is_confirmed = settings.accepted_by.is_some();
-        let is_near = |gain: f64, nominal: f64| (gain - nominal).abs() <= GAIN_TOLERANCE;
-        let wrong = gains.into_iter();
-        let mut wrong = wrong.filter(|(_, gain, nominal)| !is_near(*gain, *nominal));
-        if let (Some((key, gain, _)), false) = (wrong.next(), is_confirmed) {
-            let file = file.into();
-            return Err(CalibrationError::Gain { file, key, gain });
+    ) -> Result<(), CalibrationDefect> {
+        if settings.confirming_name().is_none() {
+            self.check_gains()?;
         }
-        let offset_a = self.amplifier.current_offset_a;
-        match offset_a.abs() <= current_error_a {
+        let (offset_a, limit_a) = (self.amplifier.current_offset_a, current_error_a);
+        match offset_a.abs() <= limit_a {
             true => Ok(()),
-            false => Err(CalibrationError::Offset {
-                file: file.into(),
-                offset_a,
-                limit_a: current_error_a,
-            }),
+            false => Err(CalibrationDefect::CurrentOffset { offset_a, limit_a }),
+        }
+    }
+
+    fn check_gains(&self) -> Result<(), CalibrationDefect> {
+        let (current, probe) = (self.amplifier.current_gain, self.probe.gain);
+        if !is_near_one(current) {
+            return Err(CalibrationDefect::CurrentGain { gain: current });
+        }
+        match is_near_one(probe.abs()) {
+            true => Ok(()),
+            false => Err(CalibrationDefect::ProbeGain { gain: probe }),
         }
     }
 
@@ -275,4 +325,8 @@ impl Calibration {
         let head = "# Written by `bench calibrate`. To use it, name it in a configuration: [calibration] file = \"this file\".\n";
         std::fs::File::create_new(path)?.write_all(format!("{head}{text}").as_bytes())
     }
+}
+
+fn is_near_one(gain: f64) -> bool {
+    (gain - 1.0).abs() <= GAIN_TOLERANCE
 }

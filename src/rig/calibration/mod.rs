@@ -20,6 +20,6 @@ mod file;
 
 pub use correction::Correction;
 pub use file::{
-    AmplifierCalibration, Calibration, CalibrationError, ChainCalibration, ProbeCalibration,
-    load_calibration,
+    AmplifierCalibration, Calibration, CalibrationDefect, CalibrationError, ChainCalibration,
+    ConnectedDevices, LoadedCalibration, ProbeCalibration, load_calibration,
 };
