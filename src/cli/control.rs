@@ -6,17 +6,17 @@ use super::analysis_output;
 use super::chirp::{outcome, outputs};
 pub(super) use super::control_options::Args;
 use super::error::CliError;
-use super::margins::{
-    Pole, closed_loop, pole_list, require_modulus_margin, require_stability, text as margins_text,
-};
+use super::margins::text as margins_text;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::run_options::{close, exit, run_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose};
-use crate::control::{ClosedLoop, Margins, StepMetrics, step_metrics};
+use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles, step_metrics};
 use crate::excitation::Extremes;
-use crate::experiment::{Plan, Run, RunSummary, TrackingMetrics, tracking_metrics};
+use crate::experiment::{
+    Plan, Run, RunSummary, TrackingMetrics, closed_loop, require_margins, tracking_metrics,
+};
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 use crate::util::decimal::Decimal;
@@ -49,13 +49,12 @@ struct Predicted {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
-    let predicted = predicted(&config, &closed_loop)?;
-    if !args.run.is_simulated(&config) {
-        require_stability(&config, &predicted.margins)?;
-    }
+    let margins = closed_loop.margins();
+    require_margins(&config, &margins, args.run.stage(&config))?;
+    let predicted = predicted(margins, &config, &closed_loop);
     let plan = Plan::control(config.clone())?;
     if !args.bench.json {
-        let poles = pole_list(&closed_loop.poles(), &config);
+        let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
         print_text(&plan_text(&plan, &predicted, &poles))?;
     }
     let mut run = args.run.run(&plan, "control")?;
@@ -67,15 +66,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     })
 }
 
-/// The margins and the step by the model. Refuses a loop with too small a margin.
-fn predicted(config: &Config, closed_loop: &ClosedLoop) -> Result<Predicted, CliError> {
-    let margins = closed_loop.margins();
-    require_modulus_margin(config, &margins)?;
+/// The margins and the step by the model.
+fn predicted(margins: Margins, config: &Config, closed_loop: &ClosedLoop) -> Predicted {
     let step = match margins.stable {
         true => predicted_step(config, closed_loop),
         false => None,
     };
-    Ok(Predicted { margins, step })
+    Predicted { margins, step }
 }
 
 /// The result of a run: tracking, or responses of a swept reference.

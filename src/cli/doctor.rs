@@ -4,16 +4,12 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::margins::{closed_loop, require_modulus_margin, require_stability};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::table::wrap;
 use crate::config::{Config, Purpose};
-use crate::control::Margins;
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
-use crate::experiment::{Plan, predicted_extremes};
-use crate::rig::devices;
 
 /// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]
@@ -41,19 +37,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The checks that `bench chirp` and `bench control` make before they open a device.
 fn run_checks(args: &Args) -> RunChecks {
-    RunChecks {
-        chirp: predicted_travel_m(&args.bench).map_err(|error| error.to_string()),
-        control: control_margins(&args.bench).map_err(|error| error.to_string()),
-    }
+    let (chirp, control) = (loaded(args, Purpose::Chirp), loaded(args, Purpose::Control));
+    RunChecks::of(chirp, control)
 }
 
-fn predicted_travel_m(bench: &BenchOptions) -> Result<f64, CliError> {
-    let config = bench.load(Purpose::Chirp, &[])?;
-    Ok(predicted_extremes(&config)?.travel_m)
-}
-
-fn control_margins(bench: &BenchOptions) -> Result<Margins, CliError> {
-    loop_margins(&bench.load(Purpose::Control, &[])?)
+fn loaded(args: &Args, purpose: Purpose) -> Result<Config, String> {
+    let config = args.bench.load(purpose, &[]);
+    config.map_err(|error| error.to_string())
 }
 
 /// The findings and the conclusion. `options` are those of the runs on the command line.
@@ -122,17 +112,6 @@ fn count_text((severity, count): &(Severity, usize)) -> String {
         _ => "s",
     };
     format!("{count} {}{plural}", severity.word().to_lowercase())
-}
-
-fn loop_margins(config: &Config) -> Result<Margins, CliError> {
-    let margins = closed_loop(config)?.margins();
-    require_modulus_margin(config, &margins)?;
-    if !devices::is_simulated(config) {
-        require_stability(config, &margins)?;
-    }
-    // Refuses a controller or a reference that cannot be built.
-    Plan::control(config.clone())?;
-    Ok(margins)
 }
 
 /// The options of this command as options of the runs.

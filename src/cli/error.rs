@@ -17,16 +17,6 @@ pub enum CliError {
     /// A configuration, model, device, run or recording is refused, or failed.
     #[error(transparent)]
     Experiment(ExperimentError),
-    /// The stability margin of the loop is too small.
-    #[error(
-        "refused: {why}; choose a controller designed for this rate and delay (--controller FILE), or {alternative}; nothing was moved"
-    )]
-    Margin {
-        /// What is too small, with its limit.
-        why: String,
-        /// What else allows the run.
-        alternative: &'static str,
-    },
     /// Wrong options or arguments.
     #[error("{0}")]
     Usage(String),
@@ -109,7 +99,7 @@ impl CliError {
             CliError::Study(error) => {
                 matches!(error, StudyError::File { .. } | StudyError::Shards(_))
             }
-            CliError::Margin { .. } | CliError::Usage(_) => false,
+            CliError::Usage(_) => false,
         };
         match is_failure {
             true => Outcome::Failed,
@@ -122,7 +112,6 @@ impl CliError {
         match self {
             CliError::Experiment(error) => experiment_kind(error),
             CliError::Usage(_) => ErrorKind::Usage,
-            CliError::Margin { .. } => ErrorKind::Margin,
             CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
             CliError::Campaign(_) => ErrorKind::Campaign,
@@ -158,6 +147,7 @@ fn experiment_kind(error: &ExperimentError) -> ErrorKind {
         ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
         ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
         ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
+        ExperimentError::Margin(_) => ErrorKind::Margin,
         ExperimentError::Plant(_) => ErrorKind::Model,
         ExperimentError::Devices(_) => ErrorKind::Devices,
         ExperimentError::Calibration(_) => ErrorKind::Calibration,

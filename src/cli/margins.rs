@@ -1,8 +1,5 @@
 //! `bench margins`: the stability margins of a loop.
 
-use std::f64::consts::PI;
-
-use nalgebra::Complex;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -14,8 +11,8 @@ use super::outcome::Outcome;
 use super::output::print_result;
 use super::table::{table, wrap};
 use crate::config::{Config, ProbeSettings, Purpose};
-use crate::control::{ClosedLoop, ControllerText, Margins};
-use crate::model::plant::{self, LoopPlant, ModalModel};
+use crate::control::{Margins, Pole, listed_poles};
+use crate::experiment::closed_loop;
 use crate::report::number::angular_frequency;
 use crate::util::decimal::Decimal;
 
@@ -43,16 +40,6 @@ struct Report {
     delay_s: f64,
 }
 
-/// A pole of the closed loop in the s plane; one of each conjugate pair.
-#[derive(Debug, Serialize)]
-pub(super) struct Pole {
-    re_rad_s: f64,
-    im_rad_s: f64,
-    frequency_hz: f64,
-    damping_ratio: f64,
-    stable: bool,
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     let closed_loop = closed_loop(&config)?;
@@ -65,7 +52,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let report = Report {
         margins: margins_json(&margins)?,
-        poles: pole_list(&poles, &config),
+        poles: listed_poles(&poles, config.servo.rate_hz),
         delay_s: match args.continuous {
             true => 0.0,
             false => closed_loop.plant().delay_s(),
@@ -95,91 +82,15 @@ fn margins_json(margins: &Margins) -> Result<Value, CliError> {
     Ok(json)
 }
 
-/// The poles of a loop, unstable ones first.
-pub(super) fn pole_list(poles: &[Complex<f64>], config: &Config) -> Vec<Pole> {
-    let nyquist_rad_s = PI * config.servo.rate_hz;
-    let is_listed = |s: &&Complex<f64>| s.im >= 0.0 && (s.re >= 0.0 || s.norm() < nyquist_rad_s);
-    let mut listed: Vec<Pole> = poles.iter().filter(is_listed).map(Pole::of).collect();
-    listed.sort_by(|a, b| b.re_rad_s.total_cmp(&a.re_rad_s));
-    listed
-}
-
-impl Pole {
-    fn of(s: &Complex<f64>) -> Pole {
-        let omega_rad_s = s.norm();
-        Pole {
-            re_rad_s: s.re,
-            im_rad_s: s.im,
-            frequency_hz: omega_rad_s / (2.0 * PI),
-            // A pole at the origin is not damped.
-            damping_ratio: -s.re / omega_rad_s.max(f64::MIN_POSITIVE),
-            stable: s.re < 0.0,
-        }
-    }
-
-    fn row(&self) -> Vec<String> {
-        let re = Decimal(self.re_rad_s);
-        let s = match self.im_rad_s {
-            0.0 => format!("{re:+.3}"),
-            im => format!("{re:+.3} +- {im:.3}j"),
-        };
-        let (hz, damping) = (self.frequency_hz, Decimal(self.damping_ratio));
-        vec![s, format!("{hz:.3}"), format!("{damping:+.4}")]
-    }
-}
-
-/// The loop of a configuration around the model of its plant.
-pub(super) fn closed_loop(config: &Config) -> Result<ClosedLoop, CliError> {
-    let text = ControllerText::find(&config.control.controller)?;
-    let design = text.design(config.servo.rate_hz)?;
-    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
-    let plant = LoopPlant::new(config, &modes);
-    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
-    Ok(ClosedLoop::new(
-        plant,
-        modes,
-        force_constant_n_per_a,
-        design,
-    )?)
-}
-
-/// Refuses a loop with less than the configured modulus margin.
-pub(super) fn require_modulus_margin(config: &Config, margins: &Margins) -> Result<(), CliError> {
-    let least = config.control.min_modulus_margin;
-    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
-    let why = match margins.stable {
-        true if margins.modulus_margin < least => {
-            let margin = margins.modulus_margin;
-            format!(
-                "the modulus margin of the {name} controller at {rate_hz} Hz is {margin:.3}, below"
-            )
-        }
-        false if least > 0.0 => {
-            format!(
-                "the loop with the {name} controller at {rate_hz} Hz is unstable, so its modulus margin is below"
-            )
-        }
-        _ => return Ok(()),
+/// A row of the table of unstable poles.
+fn pole_row(pole: &Pole) -> Vec<String> {
+    let re = Decimal(pole.re_rad_s);
+    let s = match pole.im_rad_s {
+        0.0 => format!("{re:+.3}"),
+        im => format!("{re:+.3} +- {im:.3}j"),
     };
-    Err(CliError::Margin {
-        why: format!("{why} the limit of {least} (control.min_modulus_margin)"),
-        alternative: "lower control.min_modulus_margin if a smaller margin is acceptable",
-    })
-}
-
-/// Refuses an unstable loop on devices, whatever `control.min_modulus_margin` is.
-pub(super) fn require_stability(config: &Config, margins: &Margins) -> Result<(), CliError> {
-    if margins.stable {
-        return Ok(());
-    }
-    let (name, rate_hz) = (&config.control.controller, config.servo.rate_hz);
-    Err(CliError::Margin {
-        why: format!(
-            "the loop with the {name} controller at {rate_hz} Hz is unstable by the model, and such a loop is \
-             never run on devices"
-        ),
-        alternative: "add --simulate to run it on the simulated stage",
-    })
+    let (hz, damping) = (pole.frequency_hz, Decimal(pole.damping_ratio));
+    vec![s, format!("{hz:.3}"), format!("{damping:+.4}")]
 }
 
 /// Rates and delays of the signal path as text.
@@ -232,7 +143,7 @@ pub(super) fn text(config: &Config, margins: &Margins, poles: &[Pole]) -> String
 
 fn unstable_text(poles: &[Pole]) -> String {
     let unstable = poles.iter().filter(|pole| !pole.stable);
-    let rows: Vec<Vec<String>> = unstable.map(Pole::row).collect();
+    let rows: Vec<Vec<String>> = unstable.map(pole_row).collect();
     let header = ["unstable pole rad/s", "Hz", "damping"];
     let text = "UNSTABLE: the closed loop has poles in the right half plane, and so no margins";
     wrap(text, 2) + &table(&header, &rows)

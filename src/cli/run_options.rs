@@ -11,8 +11,9 @@ use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
 use crate::config::Config;
-use crate::experiment::{self, Plan, Run, RunSummary, Runner, Setup, TimingSummary, TripSummary};
-use crate::rig::devices;
+use crate::experiment::{
+    self, Plan, Run, RunSummary, Runner, Setup, Stage, TimingSummary, TripSummary,
+};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
 
@@ -36,9 +37,17 @@ pub(super) struct RunOptions {
 }
 
 impl RunOptions {
+    /// The stage of the run.
+    pub fn stage(&self, config: &Config) -> Stage {
+        match self.simulate {
+            true => Stage::Simulated,
+            false => Stage::of(config),
+        }
+    }
+
     /// Whether the run is on the simulated stage.
     pub fn is_simulated(&self, config: &Config) -> bool {
-        self.simulate || devices::is_simulated(config)
+        self.stage(config) == Stage::Simulated
     }
 
     /// The requested pace, or that of the rig. Devices run in real time only.

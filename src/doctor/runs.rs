@@ -4,6 +4,9 @@ use super::finding::{Finding, Subject};
 use crate::config::Config;
 use crate::control::Margins;
 use crate::excitation::Excitation;
+use crate::experiment::{
+    ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
+};
 use crate::rig::devices;
 
 /// The results of the checks of the commands.
@@ -13,6 +16,30 @@ pub struct RunChecks {
     pub chirp: Result<f64, String>,
     /// The margins of the loop that `bench control` closes, or why it refuses.
     pub control: Result<Margins, String>,
+}
+
+impl RunChecks {
+    /// Makes the checks of the commands. The configurations are those of `bench chirp` and of `bench control`, or why they are
+    /// refused.
+    pub fn of(chirp: Result<Config, String>, control: Result<Config, String>) -> RunChecks {
+        let text = |error: ExperimentError| error.to_string();
+        RunChecks {
+            chirp: chirp.and_then(|config| predicted_travel_m(&config).map_err(text)),
+            control: control.and_then(|config| loop_margins(&config).map_err(text)),
+        }
+    }
+}
+
+fn predicted_travel_m(config: &Config) -> Result<f64, ExperimentError> {
+    Ok(predicted_extremes(config)?.travel_m)
+}
+
+fn loop_margins(config: &Config) -> Result<Margins, ExperimentError> {
+    let margins = closed_loop(config)?.margins();
+    require_margins(config, &margins, Stage::of(config))?;
+    // Refuses a controller or a reference that cannot be built.
+    Plan::control(config.clone())?;
+    Ok(margins)
 }
 
 /// Number of ticks of the longer one of both runs.
@@ -48,7 +75,7 @@ pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
         ),
     };
     let control = match &checks.control {
-        Ok(margins) => judge_margins(margins, min_modulus_margin),
+        Ok(margins) => accepted_loop(margins, min_modulus_margin),
         Err(why) => refused(
             Subject::Control,
             why,
@@ -58,7 +85,8 @@ pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
     [chirp, control]
 }
 
-fn judge_margins(margins: &Margins, min_modulus_margin: f64) -> Finding {
+/// The finding for a loop that `bench control` accepts.
+fn accepted_loop(margins: &Margins, min_modulus_margin: f64) -> Finding {
     if !margins.stable {
         return Subject::Control.warning(
             "the closed loop is unstable in the model, and no modulus margin is required: the run would trip",

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::analysis_error::{AnalysisError, ClosedLoopError};
+use super::loop_check::closed_loop_of;
 use super::plan::Plan;
 use super::plan_error::PlanError;
 use super::response_estimate::{ClosedResponses, MeasuredMargins, ResponseEstimate};
@@ -13,7 +14,6 @@ use crate::control::ClosedLoop;
 use crate::identify::Frf;
 use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::identify::modal::Estimate;
-use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::recording::Recording;
 
 /// Estimates plant and loop by the instrumental-variable method, with the reference as the instrument.
@@ -59,23 +59,10 @@ fn require_swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
 }
 
 /// The loop of the recorded controller and the configured model.
-fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, AnalysisError> {
-    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
-    Ok(loop_around(modes, recording, config)?)
-}
-
-fn loop_around(
-    modes: Vec<plant::Mode>,
-    recording: &Recording,
-    config: &Config,
-) -> Result<ClosedLoop, ClosedLoopError> {
+fn model(recording: &Recording, config: &Config) -> Result<ClosedLoop, ClosedLoopError> {
     let controller = Plan::of(recording)?.controller;
     let controller = controller.ok_or(PlanError::Missing("controller"))?;
-    let design = controller.design(config.servo.rate_hz)?;
-    let plant = LoopPlant::new(config, &modes);
-    let force_constant_n_per_a = config.motor.force_constant_n_per_a;
-    let closed_loop = ClosedLoop::new(plant, modes, force_constant_n_per_a, design)?;
-    Ok(closed_loop)
+    Ok(closed_loop_of(&controller, config)?)
 }
 
 fn margins(loop_gain: &Frf, sensitivity: &Frf) -> MeasuredMargins {

@@ -1,6 +1,7 @@
 //! Why an experiment was refused or failed.
 
 use super::analysis_error::AnalysisError;
+use super::loop_check::MarginError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
 use crate::config::ConfigError;
@@ -17,6 +18,9 @@ pub enum ExperimentError {
     /// The run cannot be planned.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// The stability margin of the loop is too small.
+    #[error(transparent)]
+    Margin(#[from] MarginError),
     /// The excitation would trip an interlock by the model.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),

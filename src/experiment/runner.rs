@@ -6,6 +6,7 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use super::error::ExperimentError;
+use super::loop_check::{Stage, closed_loop_of, require_margins};
 use super::plan::Plan;
 use super::run::{Run, run};
 use crate::config::Config;
@@ -48,11 +49,18 @@ impl Setup {
         }
     }
 
+    /// The stage of a run.
+    fn stage(&self, config: &Config) -> Stage {
+        match self.simulate {
+            true => Stage::Simulated,
+            false => Stage::of(config),
+        }
+    }
+
     fn open(&self, config: &Config) -> Result<OpenRig, ExperimentError> {
-        let mut opened = if self.simulate || devices::is_simulated(config) {
-            devices::simulate(config)?
-        } else {
-            devices::open(config)?
+        let mut opened = match self.stage(config) {
+            Stage::Simulated => devices::simulate(config)?,
+            Stage::Devices => devices::open(config)?,
         };
         for note in &opened.notes {
             tracing::warn!("{note}");
@@ -95,6 +103,7 @@ impl Runner {
         phase: &'static str,
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
+        require_stable_loop(plan, self.setup.stage(&plan.config))?;
         let opened = self.setup.open(&plan.config)?;
         let plan = calibrated(plan, &opened, calibration)?;
         self.progress.begin(phase, 0);
@@ -102,6 +111,15 @@ impl Runner {
         let (pace, folder) = (self.setup.pace, &self.setup.folder);
         Ok(run(&plan, opened.rig, pace, folder, &mut update)?)
     }
+}
+
+/// Refuses the loop of a plan, if it has one, before a device is opened.
+fn require_stable_loop(plan: &Plan, stage: Stage) -> Result<(), ExperimentError> {
+    let Some(controller) = &plan.controller else {
+        return Ok(());
+    };
+    let margins = closed_loop_of(controller, &plan.config)?.margins();
+    Ok(require_margins(&plan.config, &margins, stage)?)
 }
 
 /// The plan with the devices, and with the given or the configured calibration.
@@ -151,4 +169,37 @@ pub fn close(run: Run, result: &impl Serialize) -> Result<String, ExperimentErro
     })?;
     run.finish(&json)?;
     Ok(json + "\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::{Purpose, Source, load};
+    use crate::experiment::MarginError;
+
+    #[test]
+    fn refuses_unstable_loop_before_a_device_is_opened() {
+        let sets = [
+            "control.controller=fast",
+            "control.min_modulus_margin=0",
+            "amplifier.device.interface=no-such-can",
+            "probe.device.line.port=/dev/ttyNONE9",
+        ];
+        let config = load(&Source {
+            config: Some("lab".into()),
+            sets: sets.map(String::from).to_vec(),
+            options: Vec::new(),
+            purpose: Purpose::Control,
+        })
+        .unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let runner = Runner::new(Setup::on_devices(folder.path().into()));
+        let refused = runner.run(&Plan::control(config).unwrap(), "control");
+        let error = refused.err().expect("a refusal");
+        let is_unstable = matches!(
+            error,
+            ExperimentError::Margin(MarginError::UnstableOnDevices { .. })
+        );
+        assert!(is_unstable, "{error}");
+    }
 }
