@@ -34,13 +34,12 @@ impl Severity {
 
 /// Defines the subjects, each with its name in the text output and in JSON.
 macro_rules! subjects {
-    ($($(#[$doc:meta])* $variant:ident = $name:literal,)+) => {
+    ($($(#[$doc:meta])+ $variant:ident = $name:literal,)+) => {
         /// The examined subject.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
         #[serde(into = "&'static str")]
-        #[allow(missing_docs, reason = "the names of the variants are self-explanatory")]
         pub enum Subject {
-            $($(#[$doc])* $variant,)+
+            $($(#[$doc])+ $variant,)+
         }
 
         impl Subject {
@@ -55,32 +54,55 @@ macro_rules! subjects {
 }
 
 subjects! {
+    /// The kinds of the configured devices.
     Configuration = "configuration",
-    /// Only for `bench chirp`.
+    /// The configuration of `bench chirp`; a failure does not stop `bench control`.
     Chirp = "chirp",
-    /// Only for `bench control`.
+    /// The configuration of `bench control`; a failure does not stop `bench chirp`.
     Control = "control",
+    /// The kernel and its preemption.
     Kernel = "kernel",
+    /// The clock source.
     Clock = "clock",
+    /// The frequency governors of the processors.
     Processors = "processors",
+    /// The limit of the kernel for the run time of real-time threads.
     Throttling = "throttling",
+    /// The thread of the loop.
     Loop = "loop",
+    /// The priority that the loop is granted.
     Scheduler = "scheduler",
+    /// Whether the memory can be locked.
     Memory = "memory",
+    /// The processor that the loop is bound to.
     Processor = "processor",
+    /// How late the loop wakes up.
     Lateness = "lateness",
+    /// The predicted load of the CAN bus.
     BusLoad = "bus load",
+    /// The support of CAN by the kernel.
     CanKernel = "CAN kernel",
+    /// The network interface of the CAN bus.
     CanInterface = "CAN interface",
+    /// The error state of the CAN controller.
     CanState = "CAN state",
+    /// The error counters of the CAN controller.
     CanErrors = "CAN errors",
+    /// The restart of the CAN controller after a bus-off.
     CanRestart = "CAN restart",
+    /// The transmit queue of the CAN interface.
     CanQueue = "CAN queue",
+    /// The nodes on the CAN bus.
     CanNodes = "CAN nodes",
+    /// The CANopen drive.
     Drive = "drive",
+    /// The VESC.
     Vesc = "VESC",
+    /// The serial port of the probe.
     SerialPort = "serial port",
+    /// The readings of the probe.
     Readings = "readings",
+    /// The folder of the recordings and its free space.
     Recordings = "recordings",
 }
 
