@@ -11,14 +11,16 @@ use super::excitation_options::ExcitationOptions;
 use super::help::with_setting;
 use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
-use super::output::{print_result, print_text};
+use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
 use super::table::{labelled, wrap};
 use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::Extremes;
-use crate::experiment::{ExcitationPlan, Plan, RunSummary, abandon_on_signal, predicted_extremes};
+use crate::experiment::{
+    ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
+};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
@@ -118,6 +120,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.config()?;
     let expected = predicted_extremes(&config)?;
     if args.plan {
+        warn(&check_calibration(&config, args.run.stage(&config))?);
         let plan = ExcitationPlan::new(&config, expected);
         print_result(args.bench.json, &plan, plan_output::text)?;
         return Ok(Outcome::Done);

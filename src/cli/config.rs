@@ -10,9 +10,10 @@ use serde::Serialize;
 use super::error::CliError;
 use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
-use super::output::{print_json, print_result, print_text};
+use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
 use crate::config::{Config, Purpose, profiles};
+use crate::experiment::check_named_files;
 
 /// What to do with the configuration.
 #[derive(Clone, Debug, clap::Args)]
@@ -127,6 +128,7 @@ fn show(args: &ConfigArgs) -> Result<(), CliError> {
 
 fn check(args: &ConfigArgs) -> Result<(), CliError> {
     let config = args.load(Purpose::All)?;
+    warn(&check_named_files(&config)?);
     let title = &config.title;
     let result = serde_json::json!({ "valid": true, "title": title });
     print_result(args.bench.json, &result, |_| format!("valid: {title}\n"))

@@ -8,11 +8,11 @@ use super::error::CliError;
 use super::help::GLOSSARY;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::print_result;
+use super::output::{print_result, warn};
 use super::table::{table, wrap};
 use crate::config::{Config, ProbeSettings, Purpose};
 use crate::control::{Margins, Pole, listed_poles};
-use crate::experiment::closed_loop;
+use crate::experiment::{Stage, check_calibration, closed_loop};
 use crate::report::number::angular_frequency;
 use crate::util::decimal::Decimal;
 
@@ -42,6 +42,7 @@ struct Report {
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
+    warn(&check_calibration(&config, Stage::of(&config))?);
     let closed_loop = closed_loop(&config)?;
     let (margins, poles) = match args.continuous {
         true => (

@@ -16,6 +16,13 @@ pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print_text(&format!("{text}\n"))
 }
 
+/// Prints warnings to standard error.
+pub(super) fn warn(warnings: &[String]) {
+    for warning in warnings {
+        tracing::warn!("{warning}");
+    }
+}
+
 /// Prints the result of a command as its JSON object or as text.
 pub(super) fn print_result<T: Serialize>(
     json: bool,

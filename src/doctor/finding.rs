@@ -98,6 +98,8 @@ subjects! {
     Drive = "drive",
     /// The VESC.
     Vesc = "VESC",
+    /// The calibration file.
+    Calibration = "calibration",
     /// The serial port of the probe.
     SerialPort = "serial port",
     /// The readings of the probe.

@@ -5,7 +5,7 @@
 //!  trial          a thread like the loop's, for 1 s    |
 //!  scheduler      the privileges of that thread        |  facts, gathered without side effects
 //!  can_interface  can_nodes  drive  vesc               |      |
-//!  serial_port    readings                             |      v
+//!  calibration    serial_port  readings                             |      v
 //!  recordings     folder, space                        |  findings: a function of facts and settings
 //!  runs           whether the commands accept the     /
 //!                 configuration
@@ -19,6 +19,7 @@
 
 mod amplifier;
 pub mod bus_load;
+mod calibration;
 pub mod can_interface;
 pub mod can_nodes;
 pub mod drive;
@@ -57,6 +58,7 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
     examine_configuration(config, checks, &mut report);
     examine_system(config, pace, &mut report);
     amplifier::examine(&config.amplifier, &config.servo, &mut report);
+    report.extend(calibration::findings(config, report.figures.drive.as_ref()));
     examine_probe(config, &mut report);
     let space = recordings::gather(out, runs::longest_ticks(config));
     report.extend([recordings::finding(&space)]);

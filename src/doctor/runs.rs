@@ -102,7 +102,7 @@ fn accepted_loop(margins: &Margins, min_modulus_margin: f64) -> Finding {
 }
 
 /// A refusal of a command, whose text ends with the remedy, if there is one.
-fn refused(subject: Subject, why: &str, default_remedy: &str) -> Finding {
+pub(super) fn refused(subject: Subject, why: &str, default_remedy: &str) -> Finding {
     let finding = subject.refused(&why.trim_end_matches("; nothing was moved"));
     let remedy = finding.remedy.unwrap_or_else(|| default_remedy.to_string());
     subject.failure(finding.what, remedy)

@@ -10,7 +10,7 @@ use super::loop_check::{Stage, closed_loop_of, require_margins};
 use super::plan::Plan;
 use super::run::{Run, run};
 use crate::config::Config;
-use crate::rig::calibration::{Calibration, ConnectedDevices, load_calibration};
+use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::devices::{self, OpenRig};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
@@ -145,12 +145,11 @@ fn configured_calibration(
     config: &Config,
     opened: &OpenRig,
 ) -> Result<Option<Calibration>, ExperimentError> {
-    let devices = ConnectedDevices {
-        amplifier: &opened.amplifier,
-        probe: &opened.probe,
+    let devices = KnownDevices {
+        amplifier: Some(&opened.amplifier),
+        probe: Some(&opened.probe),
     };
-    let (settings, limit_a) = (&config.calibration, config.interlock.current_error_a);
-    let loaded = load_calibration(settings, limit_a, Some(devices), SystemTime::now())?;
+    let loaded = load_calibration(config, devices, SystemTime::now())?;
     let Some(loaded) = loaded else {
         return Ok(None);
     };

@@ -300,3 +300,128 @@ fn rejects_invalid_calibration_file_with_its_name() {
         "{errors}"
     );
 }
+
+/// The commands that judge a calibration without a run, with the exit code for a calibration that the run refuses.
+const WITHOUT_A_RUN: [(&[&str], i32); 4] = [
+    (&["config", "check"], 2),
+    (&["margins"], 2),
+    (&["chirp", "--plan"], 2),
+    (&["doctor"], 1),
+];
+
+/// What a command says about the calibration.
+fn complaint(report: &Value, errors: &str) -> String {
+    let findings = report["findings"].as_array();
+    let failure = findings
+        .into_iter()
+        .flatten()
+        .find(|finding| finding["subject"] == "calibration" && finding["verdict"] == "failure");
+    failure.map_or(errors.to_string(), |failure| failure["what"].to_string())
+}
+
+#[test]
+fn refuses_without_a_run_the_calibration_that_the_run_refuses() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (_, text) = calibrate(folder.path());
+    let cases = [
+        ("damaged.toml", "not toml [".to_string(), "TOML"),
+        (
+            "nan.toml",
+            text.replace("current_gain = 1.0", "current_gain = nan"),
+            "current_gain",
+        ),
+        (
+            "gain.toml",
+            text.replace("current_gain = 1.0", "current_gain = 0.5"),
+            "amplifier.current_gain = 0.5",
+        ),
+        (
+            "other.toml",
+            text.replacen("device = \"simulated\"", "device = \"canopen 0x1-0x2\"", 1),
+            "canopen 0x1-0x2",
+        ),
+    ];
+    for (name, text, _) in &cases {
+        std::fs::write(folder.path().join(name), text).expect("a good disk");
+    }
+    let absent = ("absent.toml", String::new(), "absent.toml");
+    for (name, _, word) in cases.iter().chain([&absent]) {
+        let file = format!("calibration.file={name}");
+        for (command, expected) in WITHOUT_A_RUN {
+            let refused = [command, &["--set", &file]].concat();
+            let (code, report, errors) = bench(folder.path(), &refused);
+            let complaint = complaint(&report, &errors);
+            assert!(
+                code == expected && complaint.contains(word),
+                "{command:?} {name}: {code} {complaint}"
+            );
+        }
+    }
+}
+
+#[test]
+fn accepts_without_a_run_the_calibration_that_the_run_accepts() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    calibrate(folder.path());
+    for (command, _) in WITHOUT_A_RUN {
+        let accepted = [command, &["--set", "calibration.file=mine.toml"]].concat();
+        let (code, report, errors) = bench(folder.path(), &accepted);
+        if command == ["doctor"] {
+            let findings = report["findings"].as_array().expect("a list");
+            let mut findings = findings.iter();
+            let found = findings.find(|finding| finding["subject"] == "calibration");
+            assert_eq!(found.expect("a finding")["verdict"], "ok", "{report}");
+        } else {
+            assert_eq!(code, 0, "{command:?}: {errors}");
+        }
+        assert!(!errors.contains("calibration"), "{command:?}: {errors}");
+    }
+}
+
+#[test]
+fn states_that_the_amplifier_of_a_calibration_was_not_checked() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    calibrate(folder.path());
+    let devices = [
+        "--config",
+        "lab",
+        "--set",
+        "amplifier.device.interface=no-such-can",
+        "--set",
+        "probe.device.line.port=/dev/ttyNONE9",
+        "--set",
+        "calibration.file=mine.toml",
+    ];
+    // The identity of the probe is its port, which the configuration names.
+    for (reaction, expected) in [("warn", 0), ("refuse", 2)] {
+        let reaction = format!("calibration.when_other_devices={reaction}");
+        let check = [&["config", "check"], &devices[..], &["--set", &reaction]].concat();
+        let (code, _, errors) = bench(folder.path(), &check);
+        assert_eq!(code, expected, "{errors}");
+        assert!(
+            errors.contains("made for the probe \"simulated\""),
+            "{errors}"
+        );
+        let is_stated =
+            errors.contains("not checked whether it belongs to the connected amplifier");
+        assert_eq!(is_stated, expected == 0, "{errors}");
+    }
+}
+
+#[test]
+fn config_check_refuses_absent_controller_and_reference() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let reference = "[control.reference]\nkind = \"file\"\npath = \"absent.csv\"\n";
+    std::fs::write(folder.path().join("reference.toml"), reference).expect("a good disk");
+    let cases = [
+        ("--set", "control.controller=absent.toml", "absent.toml"),
+        ("--config", "reference.toml", "absent.csv"),
+    ];
+    for (option, value, file) in cases {
+        let (code, _, errors) = bench(folder.path(), &["config", "check", option, value]);
+        assert!(
+            code == 2 && errors.contains(file),
+            "{value}: {code} {errors}"
+        );
+    }
+}

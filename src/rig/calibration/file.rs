@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{self, CalibrationSettings, ConfigError, OnInvalidCalibration};
+use crate::config::{self, CalibrationSettings, Config, ConfigError, OnInvalidCalibration};
 
 /// The result of `bench calibrate`, with the date and the devices.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -152,39 +152,40 @@ pub enum CalibrationError {
     },
 }
 
-/// The connected devices, by which a calibration is compared with them.
+/// The identities of the devices, as far as they are known. An unknown one is not compared with a calibration.
 #[derive(Clone, Copy, Debug)]
-pub struct ConnectedDevices<'a> {
-    /// Identity of the amplifier, as it reports it.
-    pub amplifier: &'a str,
-    /// Identity of the probe, as far as it is known.
-    pub probe: &'a str,
+pub struct KnownDevices<'a> {
+    /// The amplifier, as it reports itself.
+    pub amplifier: Option<&'a str>,
+    /// The probe.
+    pub probe: Option<&'a str>,
 }
 
 /// A calibration from its file, checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadedCalibration {
+    /// Path of the file.
+    pub file: String,
     /// The calibration.
     pub calibration: Calibration,
     /// Defects that the configuration accepts with a warning.
     pub warnings: Vec<String>,
 }
 
-/// The configured calibration; `None` if none is configured. `devices` are the connected ones; without them their identity is
-/// not checked. `current_error_a` is the limit within which the measured current must follow the commands.
+/// The configured calibration; `None` if none is configured.
 ///
 /// # Errors
-/// If the file cannot be used, or contains a value with which no run is made.
+/// If the file cannot be used, contains a value with which no run is made, or belongs to other devices.
 pub fn load_calibration(
-    settings: &CalibrationSettings,
-    current_error_a: f64,
-    devices: Option<ConnectedDevices>,
+    config: &Config,
+    devices: KnownDevices,
     now: SystemTime,
 ) -> Result<Option<LoadedCalibration>, CalibrationError> {
+    let settings = &config.calibration;
     let Some(file) = &settings.file else {
         return Ok(None);
     };
-    let calibration = read(file, settings, current_error_a)?;
+    let calibration = read(file, settings, config.interlock.current_error_a)?;
     let expired = Check {
         file,
         setting: "calibration.when_expired",
@@ -195,10 +196,11 @@ pub fn load_calibration(
         file,
         setting: "calibration.when_other_devices",
         reaction: settings.when_other_devices,
-        defect: devices.and_then(|devices| other_device(&calibration, devices)),
+        defect: other_device(&calibration, devices),
     };
     let warnings = [expired.warning()?, other_device.warning()?];
     Ok(Some(LoadedCalibration {
+        file: file.clone(),
         calibration,
         warnings: warnings.into_iter().flatten().collect(),
     }))
@@ -268,17 +270,19 @@ fn expired(
     )))
 }
 
-fn other_device(calibration: &Calibration, devices: ConnectedDevices) -> Option<String> {
+fn other_device(calibration: &Calibration, devices: KnownDevices) -> Option<String> {
     let (amplifier, probe) = (&calibration.amplifier.device, &calibration.probe.device);
-    let pairs = [
+    let mut pairs = [
         ("amplifier", amplifier, devices.amplifier),
         ("probe", probe, devices.probe),
-    ];
-    let mut pairs = pairs.into_iter();
-    let (kind, calibrated, connected) = pairs.find(|(_, theirs, ours)| theirs != ours)?;
-    Some(format!(
-        "it was made for the {kind} {calibrated:?}, but {connected:?} is connected"
-    ))
+    ]
+    .into_iter();
+    pairs.find_map(|(kind, calibrated, connected)| {
+        let connected = connected.filter(|connected| connected != calibrated)?;
+        Some(format!(
+            "it was made for the {kind} {calibrated:?}, but {connected:?} is connected"
+        ))
+    })
 }
 
 /// Largest deviation of a gain from 1 (or -1 for a reversed probe) that needs no confirmation.

@@ -21,5 +21,5 @@ mod file;
 pub use correction::Correction;
 pub use file::{
     AmplifierCalibration, Calibration, CalibrationDefect, CalibrationError, ChainCalibration,
-    ConnectedDevices, LoadedCalibration, ProbeCalibration, load_calibration,
+    KnownDevices, LoadedCalibration, ProbeCalibration, load_calibration,
 };

@@ -50,7 +50,7 @@ impl CanAmplifier for CanopenSettings {
 }
 
 /// `canopen 0x0000029C-0x00000402-0x00010001-0x000004D2`: vendor, product, revision and serial number.
-fn identity_text(identity: [Option<u32>; 4]) -> String {
+pub fn identity_text(identity: [Option<u32>; 4]) -> String {
     let numbers = identity.map(|number| match number {
         Some(number) => format!("0x{number:08X}"),
         None => "?".into(),

@@ -129,12 +129,15 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
     })
 }
 
+/// Identity of amplifier and probe of the simulated stage.
+pub const SIMULATED: &str = "simulated";
+
 /// The simulated stage with the rates, delays and resolutions of the configured devices.
 pub fn simulate(config: &Config) -> Result<OpenRig, DevicesError> {
     Ok(OpenRig {
         rig: Box::new(SimulatedRig::new(config)?),
-        amplifier: "simulated".into(),
-        probe: "simulated".into(),
+        amplifier: SIMULATED.into(),
+        probe: SIMULATED.into(),
         notes: Vec::new(),
         watch: None,
     })

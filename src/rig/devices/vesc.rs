@@ -38,12 +38,17 @@ impl CanAmplifier for VescSettings {
         let node = self.node;
         let opened = Vesc::open(driver_settings(self, requirements), host);
         let vesc = opened.map_err(|why| AmplifierError::Vesc { node, why })?;
-        Ok((Box::new(vesc), format!("vesc {node}")))
+        Ok((Box::new(vesc), identity(self)))
     }
 
     fn emulate(&self) -> Arc<Mutex<dyn EmulatedAmplifier>> {
         Arc::new(Mutex::new(EmulatedVesc::new(self.node)))
     }
+}
+
+/// `vesc 1`: the number on the bus, because a VESC does not report an identity.
+pub fn identity(device: &VescSettings) -> String {
+    format!("vesc {}", device.node)
 }
 
 /// The settings of the driver.
