@@ -14,10 +14,10 @@ use super::connections::{OutsideEnds, connect};
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
+use super::run::servo;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::{State, Trip};
 use crate::rt::clock::TickTiming;
-use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
 use crate::rt::publisher::SLOTS_PER_TICK;
 use crate::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
@@ -127,16 +127,8 @@ impl Replay {
         let (connections, outside) = connect(SLOTS_PER_TICK);
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
-        let config = &plan.config;
-        let interlocks = Interlocks::new(
-            &config.interlock,
-            &config.amplifier,
-            &config.motor,
-            &config.servo,
-        );
         Ok(Replay {
-            servo: Servo::new(Box::new(rig), interlocks, connections)
-                .with_correction(correction)
+            servo: servo(&plan.config, Box::new(rig), connections, correction)
                 .with_ramps(ramp_ticks),
             outside,
             feed,

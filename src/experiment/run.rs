@@ -15,7 +15,9 @@ use super::file_name;
 use super::plan::{KIND, Plan, RAMP_TICKS};
 use super::run_error::RunError;
 use super::signals::{StopSignals, runtime};
+use crate::config::Config;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
+use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
 use crate::rt::servo::{Connections, Request, Servo};
@@ -115,6 +117,22 @@ fn queue_start(requests: &mut Producer<Request>, program: Box<dyn Program>) {
     }
 }
 
+/// The loop of a configuration, with its interlocks and the correction of the calibration.
+pub(super) fn servo(
+    config: &Config,
+    rig: Box<dyn Rig>,
+    connections: Connections,
+    correction: Option<Correction>,
+) -> Servo {
+    let interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
+    Servo::new(rig, interlocks, connections).with_correction(correction)
+}
+
 fn prepare_loop(
     plan: &Plan,
     rig: Box<dyn Rig>,
@@ -123,15 +141,7 @@ fn prepare_loop(
     ramp_ticks: u64,
 ) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
-    let interlocks = Interlocks::new(
-        &config.interlock,
-        &config.amplifier,
-        &config.motor,
-        &config.servo,
-    );
-    let servo = Servo::new(rig, interlocks, connections)
-        .with_correction(plan.correction())
-        .with_ramps(ramp_ticks);
+    let servo = servo(config, rig, connections, plan.correction()).with_ramps(ramp_ticks);
     let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
     prepare(servo, &config.servo, pace, tail_ticks)
         .map_err(RunError::system("start the thread of the loop"))
