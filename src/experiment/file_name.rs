@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
+use crate::util::atomic_file::numbered_names;
+
 /// `2026-11-21T16-21-09Z_chirp.mcap` in `folder`, with `-2`, `-3`, ... where that is taken.
 pub(super) fn recording(folder: &Path, what: &str, now: SystemTime) -> PathBuf {
     let time = humantime::format_rfc3339_seconds(now).to_string();
-    let stem = format!("{}_{what}", time.replace(':', "-"));
-    let first = folder.join(format!("{stem}.mcap"));
-    let numbered = (2..).map(|n: u32| folder.join(format!("{stem}-{n}.mcap")));
-    let mut paths = std::iter::once(first.clone()).chain(numbered);
-    paths.find(|path| !path.exists()).unwrap_or(first)
+    let first = folder.join(format!("{}_{what}.mcap", time.replace(':', "-")));
+    let free = numbered_names(&first).find(|path| !path.exists());
+    free.unwrap_or(first)
 }
 
 #[cfg(test)]

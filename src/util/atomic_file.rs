@@ -66,18 +66,19 @@ pub fn write_new(path: &Path, text: &str) -> std::io::Result<PathBuf> {
 
 /// Creates an empty file under the first free name.
 fn create_free(path: &Path) -> std::io::Result<PathBuf> {
-    let mut name = path.to_owned();
-    let mut number = 1;
-    loop {
+    for name in numbered_names(path) {
         match File::create_new(&name) {
-            Ok(_) => return Ok(name),
-            Err(error) if error.kind() != ErrorKind::AlreadyExists => return Err(error),
-            Err(_) => {
-                number += 1;
-                name = numbered(path, number);
-            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            created => return created.map(|_| name),
         }
     }
+    Err(ErrorKind::AlreadyExists.into())
+}
+
+/// The name, then `STEM-2.EXT`, `STEM-3.EXT`, ...
+pub fn numbered_names(path: &Path) -> impl Iterator<Item = PathBuf> {
+    let numbers = 2..=u32::MAX;
+    std::iter::once(path.to_owned()).chain(numbers.map(|number| numbered(path, number)))
 }
 
 /// `STEM-NUMBER.EXT`.
