@@ -100,7 +100,7 @@ fn rejects_invalid_flags_with_value_and_limit() {
         ),
         ("chirp --seed -1", &["-1"]),
         (
-            "calibrate --config lab --seed 3",
+            "calibrate --config lab --seed 3 --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9",
             &["--seed 3 is for the simulated stage", "--simulate"],
         ),
         // A command without random numbers has no seed.

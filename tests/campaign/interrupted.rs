@@ -193,7 +193,7 @@ fn rejects_invalid_campaigns_with_the_reason() {
     let bench = Bench::new();
     for (arguments, words) in [
         (
-            "campaign --config lab",
+            "campaign --config lab --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9",
             "standard input is not a terminal; start it in a terminal, or add --simulate",
         ),
         ("campaign --config xy", "the model `xy` does not have both"),

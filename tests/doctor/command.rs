@@ -149,8 +149,7 @@ fn rejects_invalid_configuration_like_other_commands() {
     Bench::new()
         .run("doctor --frobnicate")
         .is_refused(&["--frobnicate"]);
-    let overload =
-        "doctor --config lab --set loop.rate_hz=5000 --set amplifier.device.bit_rate=125000";
+    let overload = "doctor --config lab --set loop.rate_hz=5000 --set amplifier.device.bit_rate=125000 --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9";
     Bench::new()
         .run(overload)
         .is_refused(&["125000 bit/s", "the limit of 80 %"]);

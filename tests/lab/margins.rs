@@ -7,6 +7,14 @@ use serde_json::Value;
 
 use crate::aliases::{lab, modes, response};
 
+/// Devices that do not exist in place of those of the profile `lab`, which this machine may have.
+const NO_DEVICES: [&str; 4] = [
+    "--set",
+    "amplifier.device.interface=no-such-can",
+    "--set",
+    "probe.device.line.port=/dev/ttyNONE9",
+];
+
 fn bench(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
     let mut command = Command::cargo_bin("bench").expect("built");
     let output = command
@@ -155,6 +163,7 @@ fn rejects_controller_below_the_modulus_margin_limit() {
         "--set",
         "control.min_modulus_margin=0",
     ];
+    let devices = [&devices[..], &NO_DEVICES].concat();
     let (code, _, errors) = bench(folder.path(), &devices);
     assert_eq!(code, 2, "{errors}");
     for word in [
@@ -217,7 +226,11 @@ fn rejects_virtual_pace_mixed_devices_and_missing_interfaces() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (code, _, errors) = bench(
         folder.path(),
-        &["chirp", "--config", "lab", "--pace", "virtual"],
+        &[
+            &["chirp", "--config", "lab", "--pace", "virtual"],
+            &NO_DEVICES[..],
+        ]
+        .concat(),
     );
     assert!(code == 2 && errors.contains("--simulate"), "{errors}");
     let (code, _, errors) = bench(
@@ -228,25 +241,18 @@ fn rejects_virtual_pace_mixed_devices_and_missing_interfaces() {
             "lab",
             "--set",
             "amplifier.device.kind=simulated",
+            "--set",
+            "probe.device.line.port=/dev/ttyNONE9",
         ],
     );
     assert!(
         code == 2 && errors.contains("capancdt") && errors.contains("both"),
         "{errors}"
     );
-    // No motion; the error names the missing device. The names are set, because this machine may have the devices of the profile.
+    // No motion; the error names the missing device.
     let (code, _, errors) = bench(
         folder.path(),
-        &[
-            "control",
-            "--config",
-            "lab",
-            "--slow",
-            "--set",
-            "probe.device.line.port=/dev/ttyNONE9",
-            "--set",
-            "amplifier.device.interface=no-such-can",
-        ],
+        &[&["control", "--config", "lab", "--slow"], &NO_DEVICES[..]].concat(),
     );
     assert!(
         code == 2 && errors.contains("/dev/ttyNONE9") && errors.contains("nothing was moved"),

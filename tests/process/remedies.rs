@@ -43,7 +43,10 @@ const REFUSED: [(&str, &str); 66] = [
         "chirp.amplitude",
     ),
     ("calibrate --amplitude 20A", "calibrate.amplitude_a"),
-    ("calibrate --config lab --pace virtual", "--simulate"),
+    (
+        "calibrate --config lab --pace virtual --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9",
+        "--simulate",
+    ),
     // Closed loop
     ("control --frequency 5Hz", "such a reference"),
     ("control --reference square", "step, hold"),
@@ -63,7 +66,10 @@ const REFUSED: [(&str, &str); 66] = [
     ("margins --controller improper.toml", "a pole"),
     ("margins --config lab --set loop.rate_hz=20000", "the rate"),
     // Campaign
-    ("campaign --config lab", "--simulate"),
+    (
+        "campaign --config lab --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9",
+        "--simulate",
+    ),
     ("campaign --config xy", "sr4dof"),
     ("campaign --asymmetry 2%", "`bench chirp`"),
     (
