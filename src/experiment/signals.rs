@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn each_stop_signal_end_the_wait_and_not_the_process() {
+    fn each_stop_signal_ends_the_wait_and_not_the_process() {
         let _alone = one_at_a_time();
         for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let (release, held) = std::sync::mpsc::channel::<()>();
@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn each_stop_signal_set_the_flag_and_wait_for_the_work() {
+    fn each_stop_signal_sets_the_flag_and_waits_for_the_work() {
         let _alone = one_at_a_time();
         for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let ended = stop_on_signal(|stop| {

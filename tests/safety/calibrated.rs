@@ -72,7 +72,7 @@ fn largest_set_point_a(bench: &Bench) -> f64 {
 }
 
 #[test]
-fn a_small_probe_gain_does_not_hide_a_reading_beyond_the_soft_limit() {
+fn trips_by_the_raw_reading_beyond_the_soft_limit() {
     let limit_m = stage().interlock.soft_limit_m;
     let correction = Correction {
         probe_gain: 0.02,
@@ -93,7 +93,7 @@ fn a_small_probe_gain_does_not_hide_a_reading_beyond_the_soft_limit() {
 }
 
 #[test]
-fn a_corrected_position_beyond_the_soft_limit_trips_within_a_reading_below_it() {
+fn trips_by_the_corrected_position_beyond_the_soft_limit() {
     let limit_m = stage().interlock.soft_limit_m;
     let correction = Correction {
         probe_gain: 1.25,
@@ -109,7 +109,7 @@ fn a_corrected_position_beyond_the_soft_limit_trips_within_a_reading_below_it() 
 }
 
 #[test]
-fn a_small_current_gain_does_not_raise_the_set_point_beyond_the_peak() {
+fn refuses_set_point_beyond_the_peak_current() {
     let peak_a = stage().motor.peak_current_a();
     let correction = Correction {
         current_gain: 0.1,
@@ -126,7 +126,7 @@ fn a_small_current_gain_does_not_raise_the_set_point_beyond_the_peak() {
 }
 
 #[test]
-fn the_motor_is_heated_by_the_larger_of_current_and_set_point() {
+fn heats_the_motor_by_the_larger_of_current_and_set_point() {
     let config = stage();
     let (rated_a, tau_s) = (
         config.motor.continuous_current_a(),
@@ -151,7 +151,7 @@ fn the_motor_is_heated_by_the_larger_of_current_and_set_point() {
 }
 
 #[test]
-fn an_accepted_set_point_far_from_the_one_sent_trips() {
+fn trips_when_the_accepted_set_point_differs_from_the_one_sent() {
     let limit_a = stage().interlock.current_error_a;
     for side in [1.0, -1.0] {
         let returned = |error_a: f64| {
@@ -168,7 +168,7 @@ fn an_accepted_set_point_far_from_the_one_sent_trips() {
 }
 
 #[test]
-fn an_amplifier_may_limit_size_and_slope_of_the_set_point() {
+fn allows_the_amplifier_to_limit_size_and_slope() {
     let mut config = stage();
     config.amplifier.current_limit_a = 1.0;
     let jump = |tick: u64| if tick < AT { 0.2 } else { 2.0 };
@@ -183,7 +183,7 @@ fn an_amplifier_may_limit_size_and_slope_of_the_set_point() {
 }
 
 #[test]
-fn an_amplifier_that_reports_itself_disabled_trips_a_run() {
+fn trips_when_the_amplifier_reports_itself_disabled() {
     let mut bench = run(IDENTITY, 0.1, &[(AT..AT + 1, Fault::ReportsDisabled)]);
     let trip = first_trip(&mut bench, 2 * AT);
     assert_eq!(trip, Some((Trip::AmplifierDisabled, AT)));
