@@ -70,7 +70,7 @@ impl Operator for TerminalOperator<'_> {
     fn ask(&mut self, question: &Question) -> Reply {
         // Lines typed during a run are not answers.
         while self.lines.try_recv().is_ok() {}
-        self.tell(&question.text);
+        self.report(&question.text);
         loop {
             print_message(&format!("{}: ", wrap(&choices(question), 2).trim_end()));
             let Some(line) = self.line() else {
@@ -83,7 +83,7 @@ impl Operator for TerminalOperator<'_> {
         }
     }
 
-    fn tell(&mut self, text: &str) {
+    fn report(&mut self, text: &str) {
         print_message(&wrapped(&format!("bench: {text}")));
     }
 }

@@ -22,7 +22,7 @@ const NICE: libc::c_int = 15;
 #[derive(Debug, Default)]
 pub struct Health {
     written: AtomicU64,
-    thrown_away: AtomicU64,
+    discarded: AtomicU64,
     failed: AtomicBool,
 }
 
@@ -34,8 +34,8 @@ impl Health {
     }
 
     /// Records that were taken from the ring after writing had failed. They are in no file.
-    pub fn thrown_away(&self) -> u64 {
-        self.thrown_away.load(Ordering::Relaxed)
+    pub fn discarded(&self) -> u64 {
+        self.discarded.load(Ordering::Relaxed)
     }
 
     /// Whether writing has failed: the run should be stopped. [`RecorderHandle::join`] returns the reason.
@@ -146,7 +146,7 @@ fn take(
     let counter = if outcome.is_ok() {
         &health.written
     } else {
-        &health.thrown_away
+        &health.discarded
     };
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -28,7 +28,7 @@ fn json_schema_accepts_and_rejects_as_the_program_does() {
         .iter()
         .map(|path| show(&format!("--config {}", path.display())))
         .collect();
-    let good = documents.len();
+    let valid = documents.len();
     for (pointer, value) in [
         ("/loop/rate_hz", json!(0)),
         ("/plant/mass_asymmetry", json!("10%")),
@@ -54,7 +54,7 @@ fn json_schema_accepts_and_rejects_as_the_program_does() {
     for (index, found) in errors.iter().enumerate() {
         assert_eq!(
             found.as_array().expect("a list").is_empty(),
-            index < good,
+            index < valid,
             "document {index}: {found}"
         );
     }

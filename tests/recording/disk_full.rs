@@ -88,11 +88,11 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     assert!(error.to_string().contains("No space left"), "{error}");
     assert!(health.failed());
     assert_eq!(
-        health.written() + health.thrown_away(),
+        health.written() + health.discarded(),
         40_000,
         "every record is accounted for"
     );
-    assert!(health.thrown_away() >= 15_000, "{}", health.thrown_away());
+    assert!(health.discarded() >= 15_000, "{}", health.discarded());
     assert_written_part_readable(&path, health.written());
 }
 

@@ -31,7 +31,7 @@ fn recording_contains_all_messages_sent_before_the_loop_ended() {
         (20_000, 3, 0)
     );
     assert_eq!(
-        (health.written(), health.thrown_away(), health.failed()),
+        (health.written(), health.discarded(), health.failed()),
         (20_003, 0, false)
     );
     let recording = Recording::open(&path).expect("complete");

@@ -50,7 +50,7 @@ pub trait Operator {
     /// Asks a question and waits for the answer.
     fn ask(&mut self, question: &Question) -> Reply;
     /// Shows a message that needs no answer.
-    fn tell(&mut self, text: &str);
+    fn report(&mut self, text: &str);
 }
 
 /// The rig whose stage the operator loads.
@@ -60,7 +60,7 @@ pub trait LoadedRig {
     /// Makes a chirp at a point; `None` if the run was stopped.
     fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError>;
     /// Stores the result of a point.
-    fn keep(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError>;
+    fn store(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError>;
 }
 
 /// A campaign on a stage that an operator loads.
@@ -175,7 +175,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         loop {
             match self.ask(&mut visit) {
                 NextStep::End(end) => return Ok(end),
-                NextStep::KeepFailed(result) => return self.keep(point, confirmed(*result)),
+                NextStep::KeepFailed(result) => return self.store(point, confirmed(*result)),
                 NextStep::Check { confirmed } => {
                     state.load = load;
                     if let Some(end) = self.measure(&mut visit, &state.unloaded, confirmed)? {
@@ -239,7 +239,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
             visit.failed = Some(result);
             return Ok(None);
         }
-        self.keep(visit.point, result).map(Some)
+        self.store(visit.point, result).map(Some)
     }
 
     fn load_question(
@@ -281,8 +281,8 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         }
     }
 
-    fn keep(&mut self, point: GridPoint, result: PointResult) -> Result<PointEnd, CampaignError> {
-        self.rig.keep(point, &result)?;
+    fn store(&mut self, point: GridPoint, result: PointResult) -> Result<PointEnd, CampaignError> {
+        self.rig.store(point, &result)?;
         let check = result.load_check.as_ref();
         let load = match check.map(|check| (check.finding(), check.confirmed_by_hand)) {
             Some((_, true)) => "load confirmed by hand",
@@ -291,7 +291,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         };
         let cnmp = result.cnmp.name();
         self.operator
-            .tell(&format!("stored: CNMP zeros {cnmp}; {load}"));
+            .report(&format!("stored: CNMP zeros {cnmp}; {load}"));
         Ok(PointEnd::Kept)
     }
 }

@@ -208,7 +208,7 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         })
     }
 
-    fn keep(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError> {
+    fn store(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError> {
         self.campaign.store.add(point, result)?;
         self.campaign.done.push((point, result.clone()));
         Ok(())

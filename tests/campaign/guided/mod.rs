@@ -72,7 +72,7 @@ impl Operator for Scripted<'_> {
         reply
     }
 
-    fn tell(&mut self, _text: &str) {}
+    fn report(&mut self, _text: &str) {}
 }
 
 /// The simulated stage with the actual load; it is run, recorded and analysed like devices.
@@ -142,7 +142,7 @@ impl LoadedRig for Simulated<'_> {
         Ok(Some(result))
     }
 
-    fn keep(&mut self, place: GridPoint, point: &PointResult) -> Result<(), CampaignError> {
+    fn store(&mut self, place: GridPoint, point: &PointResult) -> Result<(), CampaignError> {
         self.stored.push((place, point.clone()));
         Ok(())
     }

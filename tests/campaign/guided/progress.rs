@@ -2,7 +2,12 @@
 
 use bench::experiment::campaign::{GridPoint, Reply};
 
-use super::{DONE, all, campaign, config, grid, no_action, set_required};
+use super::{DONE, Outcome, all, campaign, config, grid, no_action, set_required};
+
+/// Rows of the stored points, in their order.
+fn stored_rows(outcome: &Outcome) -> Vec<usize> {
+    outcome.stored.iter().map(|(place, _)| place.row).collect()
+}
 
 #[test]
 fn skipped_points_stay_missing_and_stopped_campaign_continues() {
@@ -13,14 +18,7 @@ fn skipped_points_stay_missing_and_stopped_campaign_continues() {
         (set_required(&config, &grid, 1, 0), DONE),
     ];
     let outcome = campaign(&config, &grid, &all(&grid), script);
-    assert_eq!(
-        outcome
-            .stored
-            .iter()
-            .map(|(place, _)| place.row)
-            .collect::<Vec<_>>(),
-        [1]
-    );
+    assert_eq!(stored_rows(&outcome), [1]);
     assert!(
         outcome.asked[2].text.contains("point 2 of 2") && outcome.asked[2].text.contains("add 3."),
         "{:?}",
@@ -59,14 +57,7 @@ fn skipped_points_stay_missing_and_stopped_campaign_continues() {
             (set_required(&config, &grid, 1, 0), DONE),
         ],
     );
-    assert_eq!(
-        continued
-            .stored
-            .iter()
-            .map(|(place, _)| place.row)
-            .collect::<Vec<_>>(),
-        [1]
-    );
+    assert_eq!(stored_rows(&continued), [1]);
     assert!(
         campaign(&config, &grid, &[], vec![]).asked.is_empty(),
         "no point is missing, so that nothing is asked"

@@ -31,7 +31,7 @@ fn share_of_accurate_rows(profile: &str, (low_hz, high_hz): (f64, f64)) -> Optio
         "plants.py",
         &[json!({"what": "frf", "config": config, "frequency_hz": frequencies})],
     )?;
-    let good = rows
+    let matching = rows
         .iter()
         .zip(answers[0].as_array().expect("a list"))
         .filter(|(row, truth)| {
@@ -40,7 +40,7 @@ fn share_of_accurate_rows(profile: &str, (low_hz, high_hz): (f64, f64)) -> Optio
             (row[1] / re.hypot(im) - 1.0).abs() < 0.01
                 && (360.0 * (turns - turns.round())).abs() < 1.0
         });
-    Some(good.count() as f64 / rows.len() as f64)
+    Some(matching.count() as f64 / rows.len() as f64)
 }
 
 #[test]
