@@ -1,0 +1,30 @@
+//! Quantities with units as typed: `0.1A`, `20s`, `5Hz`, `50um`, `8%`.
+//!
+//! A bare number is in SI units. A percentage refers to the reference of the quantity: an operating point is given in
+//! percent of the beam length, a ratio in percent of 1. No other quantity has a reference, and none is given in percent;
+//! tolerances of other settings ([`crate::model::study`]) are in percent of the nominal value.
+//!
+//! ```
+//! use bench::util::quantity::{Current, Length};
+//!
+//! let amplitude: Current = "100mA".parse()?;
+//! assert_eq!(amplitude.si(), 0.1);
+//! let error = "5s".parse::<Length>().unwrap_err().to_string();
+//! assert_eq!(error, "`5s` is a time in s; give a length in m, such as 50um or 3.8mm");
+//! # Ok::<(), bench::util::quantity::QuantityError>(())
+//! ```
+
+mod dimension;
+mod measure;
+mod setting;
+#[cfg(test)]
+mod tests;
+mod typed;
+
+pub use dimension::Dimension;
+pub use measure::{
+    AngularFrequency, Current, Frequency, Length, Measure, OfAngularFrequency, OfCurrent,
+    OfDimension, OfFrequency, OfLength, OfRatio, OfSpeed, OfTime, Ratio, Speed, Time, si,
+};
+pub use setting::OperatingPoint;
+pub use typed::{Quantity, QuantityError};
