@@ -8,6 +8,8 @@
 use nalgebra::Complex;
 use serde::Serialize;
 
+use crate::util::numeric::is_within;
+
 /// A frequency at which |L| passes through 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Crossing {
@@ -38,6 +40,13 @@ pub struct Margins {
     pub crossings: Vec<Crossing>,
     /// Whether sampling, delay and amplifier are neglected.
     pub continuous: bool,
+}
+
+impl Margins {
+    /// Whether the modulus margin is at least `least`. One that is not a finite number is not: |S| was not found.
+    pub fn has_modulus_margin(&self, least: f64) -> bool {
+        self.modulus_margin.is_finite() && is_within(least, self.modulus_margin)
+    }
 }
 
 /// Margins of `response`, from a rising grid that is fine enough to show every crossing. Each crossing and the peak of |S|
@@ -233,6 +242,21 @@ mod tests {
             .map(|i| (l(f64::from(i) * 7e-3) + 1.0).inv().norm())
             .fold(0.0, f64::max);
         assert!((found.modulus_margin * brute - 1.0).abs() < 1e-7);
+    }
+
+    #[test]
+    fn a_loop_that_is_not_a_number_has_no_modulus_margin() {
+        let unknown = |_: f64| Complex::new(f64::NAN, f64::NAN);
+        let found = margins(&unknown, &grid(1.0, 100.0, &[]), true, true);
+        assert!(!found.has_modulus_margin(0.0), "{found:?}");
+        // L = 1 at all frequencies: S = 1/2, so the modulus margin is 2.
+        let known = margins(
+            &|_| Complex::new(1.0, 0.0),
+            &grid(1.0, 100.0, &[]),
+            true,
+            true,
+        );
+        assert!(known.has_modulus_margin(2.0) && !known.has_modulus_margin(2.1));
     }
 
     #[test]

@@ -5,10 +5,21 @@ use super::design::ChosenExcitation;
 use super::extremes::Extremes;
 use super::limits::Limits;
 use super::waveform::Excitation;
+use crate::util::numeric::is_within;
 
 /// An excitation that the interlocks would trip, or whose record could not be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ExcitationError {
+    /// The model gives no number.
+    #[error(
+        "the {what} of the excitation by the model is not a number, so no limit can be checked; check the model with `bench model modes`, or lower {setting}"
+    )]
+    NotANumber {
+        /// The figure.
+        what: &'static str,
+        /// The setting to lower.
+        setting: &'static str,
+    },
     /// Beyond the motor or the amplifier.
     #[error(
         "the largest current of the excitation is {current_a:.3} A, above {what} of {limit_a:.3} A; lower {setting}"
@@ -117,42 +128,52 @@ impl Limits {
         frequency_hz: Option<f64>,
         setting: &'static str,
     ) -> Result<(), ExcitationError> {
+        check_numbers(extremes, setting)?;
         self.check_current(extremes.current_a, setting)?;
         self.check_slew(extremes.slew_a_per_s, setting)?;
         self.check_heat(extremes.thermal_current_a, setting)?;
-        if extremes.travel_m > self.travel_m {
-            return Err(ExcitationError::Travel {
-                travel_um: extremes.travel_m * 1e6,
+        self.check_travel(extremes.travel_m, frequency_hz, setting)
+    }
+
+    fn check_travel(
+        &self,
+        travel_m: f64,
+        frequency_hz: Option<f64>,
+        setting: &'static str,
+    ) -> Result<(), ExcitationError> {
+        match is_within(travel_m, self.travel_m) {
+            true => Ok(()),
+            false => Err(ExcitationError::Travel {
+                travel_um: travel_m * 1e6,
                 frequency_hz,
                 limit_um: self.travel_m * 1e6,
                 setting,
-            });
+            }),
         }
-        Ok(())
     }
 
     fn check_slew(&self, slew_a_per_s: f64, setting: &'static str) -> Result<(), ExcitationError> {
         let limit_a_per_s = self.slew_a_per_s;
-        if slew_a_per_s > limit_a_per_s {
-            return Err(ExcitationError::Slew {
+        match is_within(slew_a_per_s, limit_a_per_s) {
+            true => Ok(()),
+            false => Err(ExcitationError::Slew {
                 slew_a_per_s,
                 limit_a_per_s,
                 setting,
-            });
+            }),
         }
-        Ok(())
     }
 
     fn check_heat(&self, thermal_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
         let limit_a = self.continuous_current_a;
-        if thermal_a > limit_a {
-            return Err(ExcitationError::Heat {
+        match is_within(thermal_a, limit_a) {
+            true => Ok(()),
+            false => Err(ExcitationError::Heat {
                 thermal_a,
                 limit_a,
                 setting,
-            });
+            }),
         }
-        Ok(())
     }
 
     fn check_current(&self, current_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
@@ -160,7 +181,8 @@ impl Limits {
             (self.peak_current_a, "the motor's peak current"),
             (self.amplifier_current_a, "the amplifier's limit"),
         ];
-        match limits.into_iter().find(|(limit_a, _)| current_a > *limit_a) {
+        let mut limits = limits.into_iter();
+        match limits.find(|(limit_a, _)| !is_within(current_a, *limit_a)) {
             Some((limit_a, what)) => Err(ExcitationError::Current {
                 current_a,
                 limit_a,
@@ -169,6 +191,20 @@ impl Limits {
             }),
             None => Ok(()),
         }
+    }
+}
+
+/// Refuses extremes that are not numbers.
+fn check_numbers(extremes: &Extremes, setting: &'static str) -> Result<(), ExcitationError> {
+    let figures = [
+        ("current", extremes.current_a),
+        ("slew rate", extremes.slew_a_per_s),
+        ("thermal current", extremes.thermal_current_a),
+        ("travel", extremes.travel_m),
+    ];
+    match figures.into_iter().find(|(_, value)| value.is_nan()) {
+        Some((what, _)) => Err(ExcitationError::NotANumber { what, setting }),
+        None => Ok(()),
     }
 }
 
@@ -211,6 +247,25 @@ mod tests {
             frequency_hz: 1.0,
             current_a,
         }];
+    }
+
+    #[test]
+    fn rejects_a_position_or_current_that_is_not_a_number() {
+        let config = load(&Source::default()).unwrap();
+        let limits = config.excitation_limits();
+        for (signals, figure) in [
+            ([(0.0, 0.0), (0.0, f64::NAN), (0.0, 1e-6)], "travel"),
+            ([(0.0, 0.0), (f64::NAN, 0.0), (0.1, 1e-6)], "current"),
+            // The square is beyond the largest number, and the thermal model subtracts infinity from infinity.
+            ([(1e300, 0.0), (1e300, 0.0), (0.0, 0.0)], "thermal current"),
+        ] {
+            let extremes = Extremes::over(signals.into_iter(), &limits);
+            let checked = limits.check(&extremes, None, "the amplitude");
+            assert!(
+                matches!(checked, Err(ExcitationError::NotANumber { what, .. }) if what == figure),
+                "{figure}: {checked:?}"
+            );
+        }
     }
 
     #[test]

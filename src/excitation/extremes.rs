@@ -4,8 +4,9 @@ use serde::Serialize;
 
 use super::limits::Limits;
 use super::waveform::Excitation;
+use crate::util::numeric::larger;
 
-/// The extremes of an excitation.
+/// The extremes of an excitation. An extreme is not a number if a value of any tick is not a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Extremes {
     /// Largest travel in metres.
@@ -80,21 +81,22 @@ impl RunningExtremes {
 
     fn push(&mut self, command_a: f64, position_m: f64) {
         self.push_command(command_a);
-        if position_m.abs() > self.extremes.travel_m {
-            self.extremes.travel_m = position_m.abs();
+        let travel_m = larger(self.extremes.travel_m, position_m.abs());
+        if travel_m > self.extremes.travel_m {
             self.extremes.travel_tick = self.ticks;
         }
+        self.extremes.travel_m = travel_m;
         self.ticks += 1;
     }
 
     fn push_command(&mut self, command_a: f64) {
         let extremes = &mut self.extremes;
         let slew_a_per_s = (command_a - self.before_a).abs() / self.period_s;
-        extremes.current_a = extremes.current_a.max(command_a.abs());
-        extremes.slew_a_per_s = extremes.slew_a_per_s.max(slew_a_per_s);
+        extremes.current_a = larger(extremes.current_a, command_a.abs());
+        extremes.slew_a_per_s = larger(extremes.slew_a_per_s, slew_a_per_s);
         self.before_a = command_a;
         self.square_a2 += command_a * command_a;
         self.heat_a2 += self.cooling * (command_a * command_a - self.heat_a2);
-        extremes.thermal_current_a = extremes.thermal_current_a.max(self.heat_a2.sqrt());
+        extremes.thermal_current_a = larger(extremes.thermal_current_a, self.heat_a2.sqrt());
     }
 }

@@ -118,7 +118,7 @@ pub fn require_margins(
     let (least, margin) = (config.control.min_modulus_margin, margins.modulus_margin);
     let controller = RatedController::of(config);
     match (margins.stable, stage) {
-        (true, _) if margin < least => Err(MarginError::Low {
+        (true, _) if !margins.has_modulus_margin(least) => Err(MarginError::Low {
             controller,
             margin,
             least,

@@ -75,6 +75,13 @@ impl FollowingError {
 
     /// Adds the command of the previous tick and the current measured since. Checks at the end of each window.
     pub(super) fn check(&mut self, command_a: f64, actual_a: f64, now: Tick) -> Result<(), Trip> {
+        // The band of the measured current would drop a value that is not a number.
+        if !actual_a.is_finite() {
+            return Err(Trip::CurrentNotFollowed {
+                actual_a,
+                command_a,
+            });
+        }
         let began_ns = *self.began_ns.get_or_insert(now.scheduled_ns);
         self.commanded = self.commanded.with(command_a);
         self.measured = self.measured.with(actual_a);
@@ -136,6 +143,12 @@ mod tests {
 
     fn sine(hz: f64, tick: f64) -> f64 {
         (std::f64::consts::TAU * hz * tick * 1e-3).sin()
+    }
+
+    #[test]
+    fn rejects_nan_measured_current() {
+        let actual_a = |tick: u64| if tick == 20 { f64::NAN } else { 0.0 };
+        assert_eq!(first_trip(100, |_| 0.0, actual_a), Some(20));
     }
 
     #[test]

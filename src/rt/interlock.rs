@@ -10,6 +10,7 @@ use bench_hal::{Reading, Tick, Validity};
 use super::arming::Trip;
 use super::following_error::FollowingError;
 use crate::config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
+use crate::util::numeric::is_within;
 
 /// The limits, and the state that their checks need.
 #[derive(Clone, Debug)]
@@ -111,12 +112,12 @@ impl Interlocks {
         if !position_m.is_finite() {
             return Err(Trip::ProbeInvalid);
         }
-        match position_m.abs() > limit_m {
-            true => Err(Trip::Travel {
+        match is_within(position_m.abs(), limit_m) {
+            true => Ok(()),
+            false => Err(Trip::Travel {
                 position_m,
                 limit_m,
             }),
-            false => Ok(()),
         }
     }
 
@@ -182,7 +183,7 @@ impl Interlocks {
         if !command_a.is_finite() {
             return Err(Trip::CommandNotFinite);
         }
-        if command_a.abs() > self.limits.peak_current_a {
+        if !is_within(command_a.abs(), self.limits.peak_current_a) {
             return Err(Trip::PeakCurrent {
                 command_a,
                 limit_a: self.limits.peak_current_a,
@@ -190,7 +191,8 @@ impl Interlocks {
         }
         let thermal_a2 =
             self.thermal_a2 + self.limits.cooling * (command_a * command_a - self.thermal_a2);
-        if thermal_a2 > self.limits.continuous_current_a * self.limits.continuous_current_a {
+        let limit_a2 = self.limits.continuous_current_a * self.limits.continuous_current_a;
+        if !is_within(thermal_a2, limit_a2) {
             return Err(Trip::ContinuousCurrent {
                 thermal_a: thermal_a2.sqrt(),
                 limit_a: self.limits.continuous_current_a,

@@ -1,4 +1,15 @@
-//! Numerical helpers: evenly spaced values, roots by bisection, assignment by distance, confidence of a proportion.
+//! Numerical helpers: comparison with a limit, evenly spaced values, roots by bisection, assignment by distance, confidence of a proportion.
+
+/// Whether a value is at most a limit. A value that is not a number is beyond every limit, whereas `value > limit` would
+/// accept it.
+pub fn is_within(value: f64, limit: f64) -> bool {
+    value <= limit
+}
+
+/// The larger one of two values; not a number if one of them is not a number, whereas [`f64::max`] would drop it.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a >= b || a.is_nan() { a } else { b }
+}
 
 /// `count` evenly spaced values, two or more, both ends among them exactly.
 pub fn linspace(from: f64, to: f64, count: usize) -> impl Iterator<Item = f64> {
@@ -79,6 +90,14 @@ pub fn wilson_interval(yes: u64, all: u64) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_value_that_is_not_a_number_is_beyond_every_limit() {
+        assert!(is_within(-1.0, 2.0) && is_within(2.0, 2.0) && !is_within(2.1, 2.0));
+        assert!(!is_within(f64::NAN, f64::INFINITY) && !is_within(1.0, f64::NAN));
+        assert_eq!((larger(1.0, 2.0), larger(2.0, 1.0)), (2.0, 2.0));
+        assert!(larger(1.0, f64::NAN).is_nan() && larger(f64::NAN, 1.0).is_nan());
+    }
 
     #[test]
     fn linspace_has_both_ends_exactly() {
