@@ -1,5 +1,7 @@
 //! `bench linearity`: the same multisine at several amplitudes.
 
+use std::ops::RangeInclusive;
+
 use serde::Serialize;
 
 use super::analysis_output;
@@ -32,6 +34,8 @@ const LINES: [(&str, &str); 2] = [
 ];
 /// Largest number of amplitudes.
 const MAX_AMPLITUDES: usize = 10;
+/// Allowed ratios of the planned amplitude.
+const SCALES: RangeInclusive<f64> = 1e-6..=1e6;
 
 /// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]
@@ -58,13 +62,13 @@ impl Args {
     fn scales(&self) -> Result<Vec<f64>, CliError> {
         let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
-        let is_positive = scales.iter().all(|scale| scale.is_finite() && *scale > 0.0);
+        let is_allowed = scales.iter().all(|scale| SCALES.contains(scale));
         let is_rising = scales.windows(2).all(|pair| pair[0] < pair[1]);
-        if is_positive && is_rising && (2..=MAX_AMPLITUDES).contains(&scales.len()) {
+        if is_allowed && is_rising && (2..=MAX_AMPLITUDES).contains(&scales.len()) {
             return Ok(scales);
         }
         Err(CliError::Usage(format!(
-            "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios above 0, for example 0.5,1,2"
+            "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios from 0.000001 to 1000000, for example 0.5,1,2"
         )))
     }
 

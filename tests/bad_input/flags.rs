@@ -103,6 +103,19 @@ fn rejects_invalid_flags_with_value_and_limit() {
             "calibrate --config lab --seed 3 --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9",
             &["--seed 3 is for the simulated stage", "--simulate"],
         ),
+        (
+            "linearity --scales 1e300,1",
+            &["--scales [1.0, 1e300]", "0.000001 to 1000000"],
+        ),
+        ("linearity --scales 1e-300,1", &["--scales", "0.000001"]),
+        (
+            "linearity --scales 1e6,1",
+            &["at 1000000 of", "the motor's peak current"],
+        ),
+        (
+            "model modes --operating-point 1e308",
+            &["is 1e308 m", "-0.5 to 0.5 m"],
+        ),
         // A command without random numbers has no seed.
         ("model modes --seed 1", &["unexpected argument", "--seed"]),
         ("margins --seed 1", &["unexpected argument", "--seed"]),

@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::prediction::predicted_extremes;
 use super::run::Run;
 use super::runner::Runner;
-use crate::config::Config;
+use crate::config::{Config, validate};
 use crate::excitation::Extremes;
 use crate::identify::modal::FittedMode;
 
@@ -38,16 +38,20 @@ fn plan_amplitude(planned: &Config, scale: f64) -> Result<AmplitudePlan, Experim
     for point in &mut config.chirp.amplitude {
         point.current_a *= scale;
     }
-    let predicted = predicted_extremes(&config).map_err(|error| {
-        ExperimentError::Refused(format!(
-            "at {scale} of the planned amplitude: {error}; nothing was moved"
-        ))
-    })?;
+    let predicted = predicted_extremes(&config).map_err(|error| refused(scale, &error))?;
+    // Amplitudes that are not allowed could not be read back from the recording.
+    validate(&config).map_err(|error| refused(scale, &error))?;
     Ok(AmplitudePlan {
         scale,
         config,
         predicted,
     })
+}
+
+fn refused(scale: f64, why: &impl std::fmt::Display) -> ExperimentError {
+    ExperimentError::Refused(format!(
+        "at {scale} of the planned amplitude: {why}; nothing was moved"
+    ))
 }
 
 /// Runs the plans one after another. `finish` analyses and closes each run, and returns whether to continue.

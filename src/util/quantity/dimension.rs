@@ -110,7 +110,9 @@ impl Dimension {
 
     /// A value in SI units with its unit: `8 m`.
     pub fn display(self, si: f64) -> String {
-        format!("{si} {}", self.si_unit()).trim_end().to_string()
+        format!("{} {}", number_text(si), self.si_unit())
+            .trim_end()
+            .to_string()
     }
 
     /// Suggestions for a number without a unit that is out of range: the units with which it would be in range, as
@@ -165,5 +167,14 @@ impl Dimension {
             Dimension::Other(_) => "0.5",
             Dimension::Ratio => "10% or 0.1",
         }
+    }
+}
+
+/// A number, with an exponent if it has many zeros: `1e308`.
+fn number_text(number: f64) -> String {
+    let is_short = number == 0.0 || (1e-12..1e12).contains(&number.abs());
+    match is_short {
+        true => number.to_string(),
+        false => format!("{number:e}"),
     }
 }

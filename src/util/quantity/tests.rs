@@ -26,6 +26,18 @@ fn converts_units_to_si_and_takes_bare_numbers_as_si() {
 }
 
 #[test]
+fn displays_very_large_and_small_numbers_with_an_exponent() {
+    for (si, text) in [
+        (1e308, "1e308 m"),
+        (-2.5e-200, "-2.5e-200 m"),
+        (0.0, "0 m"),
+        (1e9, "1000000000 m"),
+    ] {
+        assert_eq!(Dimension::Length.display(si), text);
+    }
+}
+
+#[test]
 fn rejects_text_without_number_and_numbers_that_are_not_finite() {
     for text in ["", "mm", "A5", "NaN", "inf%", "-infm", "1e999", "--5s"] {
         let error = si(text, Dimension::Length).unwrap_err();
