@@ -2,6 +2,9 @@
 
 use std::path::PathBuf;
 
+/// Largest number of errors in a message. The place of each is searched in all layers.
+pub(super) const MAX_ERRORS: usize = 50;
+
 /// A configuration that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ConfigError {
@@ -52,6 +55,9 @@ fn refused(lines: &[String]) -> String {
     let text = lines.join("\n");
     match lines.len() {
         1 => format!("the configuration is refused:\n{text}"),
+        errors if errors >= MAX_ERRORS => {
+            format!("the configuration has {errors} errors or more; correct each of them:\n{text}")
+        }
         errors => format!("the configuration has {errors} errors; correct each of them:\n{text}"),
     }
 }

@@ -7,7 +7,7 @@ use toml::{Table, Value};
 
 use super::check;
 use super::cross_checks::cross_checks;
-use super::error::ConfigError;
+use super::error::{ConfigError, MAX_ERRORS};
 use super::layer::{Layer, overlay, same_kind};
 use super::overrides::{
     OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
@@ -16,6 +16,7 @@ use super::profiles::{self, EmbeddedFile};
 use super::purpose::Purpose;
 use super::{Config, renamed, schema};
 use crate::util::finding::Finding;
+use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
 
 /// A profile or file, and single settings that override it.
 ///
@@ -128,7 +129,7 @@ fn refuse(
             format!("  {place}: `{}` {}", finding.path, finding.what)
         })
     };
-    let mut lines: Vec<String> = findings.iter().map(line).collect();
+    let mut lines: Vec<String> = findings.iter().take(MAX_ERRORS).map(line).collect();
     // One option may set several settings.
     lines.dedup();
     refuse_lines(lines)
@@ -181,7 +182,7 @@ fn read(name: &str, known: &[EmbeddedFile], what: &'static str) -> Result<String
             known: profiles::names(known),
         });
     }
-    std::fs::read_to_string(path).map_err(|e| ConfigError::Unreadable {
+    input_file::read_text(path, MAX_SETTINGS_BYTES).map_err(|e| ConfigError::Unreadable {
         path: path.into(),
         why: e.to_string(),
     })

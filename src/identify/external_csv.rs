@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::Signals;
+use crate::util::input_file::{self, MAX_RECORD_BYTES};
 
 /// Largest deviation of a time step from the median step, as a ratio: that of times rounded to a few digits.
 const MAX_IRREGULARITY: f64 = 0.1;
@@ -110,8 +111,8 @@ struct Numbers {
 
 impl Table<'_> {
     fn open(path: &Path) -> Result<Table<'_>, ExternalCsvError> {
-        let text = std::fs::read(path)
-            .map_err(|source| ExternalCsvError::File(path.to_owned(), source))?;
+        let text = input_file::read(path, MAX_RECORD_BYTES);
+        let text = text.map_err(|source| ExternalCsvError::File(path.to_owned(), source))?;
         Ok(Table { path, text })
     }
 
@@ -217,10 +218,11 @@ impl Table<'_> {
     fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         number.ok_or_else(|| {
-            let what = format!(
-                "{text:?} in column `{column}` is not a finite number; repair the cell, or cut the file there"
-            );
-            self.invalid_line(line, &what)
+            let what = match text.contains(',') {
+                true => "has a comma in place of the decimal point; write the numbers as in 0.5",
+                false => "is not a finite number; repair the cell, or cut the file there",
+            };
+            self.invalid_line(line, &format!("{text:?} in column `{column}` {what}"))
         })
     }
 

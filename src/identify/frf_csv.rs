@@ -10,6 +10,7 @@ use nalgebra::Complex;
 use thiserror::Error;
 
 use super::Frf;
+use crate::util::input_file::{self, MAX_TABLE_BYTES};
 
 /// Name of the magnitude column of a response from current to displacement.
 pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";
@@ -74,7 +75,7 @@ fn row(frf: &Frf, k: usize) -> [String; COLUMNS] {
 /// # Errors
 /// When the file cannot be read, or is not such an FRF.
 pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
-    let text = std::fs::read_to_string(path)
+    let text = input_file::read_text(path, MAX_TABLE_BYTES)
         .map_err(|source| FrfCsvError::File(path.to_owned(), source))?;
     from_str(&text)
 }

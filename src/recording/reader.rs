@@ -17,6 +17,7 @@ use super::summary::Summary;
 use super::walk::{Stop, Walk};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
 use crate::rt::record::{Event, TickRecord};
+use crate::util::input_file;
 
 /// A file inside the recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -383,7 +384,7 @@ fn refuse_other_program(file: &File, path: &Path) -> Result<(), RecordingError> 
 }
 
 fn open(path: &Path) -> Result<File, RecordingError> {
-    File::open(path).map_err(|source| match source.kind() {
+    input_file::open(path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => RecordingError::Missing { path: path.into() },
         _ => RecordingError::Read {
             path: path.into(),

@@ -4,6 +4,7 @@ pub mod atomic_file;
 pub mod checkpoint;
 pub mod decimal;
 pub mod finding;
+pub mod input_file;
 pub mod nearest;
 pub mod numeric;
 pub mod progress;

@@ -37,6 +37,16 @@ fn with_line(number: usize, change: impl Fn(&str) -> String) -> String {
 }
 
 #[test]
+fn rejects_a_decimal_comma_with_the_remedy() {
+    let data = valid().replace(',', ";").replace('.', ",");
+    let answer = identify(data, "--time time_s");
+    assert_eq!(answer.code, 1, "{answer:?}");
+    for word in ["line 2", "a comma in place of the decimal point", "write"] {
+        assert!(answer.err.contains(word), "{word}: {}", answer.err);
+    }
+}
+
+#[test]
 fn rejects_options_that_do_not_match_the_file() {
     for (more, words) in [
         (
@@ -63,6 +73,25 @@ fn rejects_options_that_do_not_match_the_file() {
             &["--period 0.99995s", "1000 Hz"],
         ),
         ("--rate 1000 --band 5-200", &["--band 5-200", "11Hz:250Hz"]),
+        ("--rate 0", &["--rate is 0 Hz", "0.000001 to 1000000000 Hz"]),
+        ("--rate -5", &["--rate is -5 Hz", "0.000001"]),
+        ("--rate 1e308", &["--rate is 1e308 Hz", "1000000000 Hz"]),
+        (
+            "--rate 1000 --band 200:5",
+            &["--band 200:5", "lower < upper"],
+        ),
+        (
+            "--rate 1000 --band 5:900",
+            &["--band 5:900", "Nyquist frequency of 500 Hz"],
+        ),
+        (
+            "--rate 1000 --period 3",
+            &["--period 3: period is 3", "from 8"],
+        ),
+        (
+            "--rate 1000 --period 1000 --skip-periods 999",
+            &["--skip-periods 999", "too few periods"],
+        ),
     ] {
         identify(valid(), more).is_refused(words);
     }

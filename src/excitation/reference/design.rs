@@ -1,8 +1,12 @@
 //! Properties of a reference that follow from its settings alone.
 
+use std::path::Path;
+
 use crate::excitation::sweep::ChirpSettings;
 use crate::excitation::waveform::{Reference, ticks};
 use crate::util::finding::Finding;
+use crate::util::input_file::{self, MAX_TABLE_BYTES};
+use crate::util::quantity::Dimension;
 
 /// The properties of a run that a reference needs in addition to its own settings.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +51,15 @@ pub trait ReferenceDesign {
         Vec::new()
     }
 
+    /// Refuses a file with a value beyond the soft limit.
+    fn check_file(
+        &self,
+        _context: &ReferenceContext<'_>,
+        _soft_limit_m: f64,
+    ) -> Result<(), ReferenceError> {
+        Ok(())
+    }
+
     /// The step, of a kind that is one.
     fn step(&self) -> Option<StepOfReference> {
         None
@@ -77,7 +90,7 @@ pub trait ReferenceDesign {
         let Some(path) = self.path() else {
             return Ok(None);
         };
-        let text = std::fs::read_to_string(path);
+        let text = input_file::read_text(Path::new(path), MAX_TABLE_BYTES);
         text.map(Some).map_err(|e| ReferenceError::Unreadable {
             path: path.into(),
             why: e.to_string(),
@@ -116,7 +129,7 @@ pub enum ReferenceError {
     },
     /// A line is not two numbers, or time does not rise.
     #[error(
-        "{path} line {line}: {why}; write the header `time_s,reference_m` and rows of two numbers with rising times"
+        "{path} line {line}: {why}; write the header `time_s,reference_m` and rows of two numbers as in 0.5,1e-6 with rising times"
     )]
     Line {
         /// The file.
@@ -125,5 +138,20 @@ pub enum ReferenceError {
         line: usize,
         /// What is wrong.
         why: String,
+    },
+    /// A value beyond the soft limit.
+    #[error(
+        "{path} line {line}: the reference is {}, beyond the soft limit of {limit_m} m (interlock.soft_limit_m); write the values in metres, or lower them",
+        Dimension::Length.display(*.reference_m)
+    )]
+    Travel {
+        /// The file.
+        path: String,
+        /// The line, from 1.
+        line: usize,
+        /// The value.
+        reference_m: f64,
+        /// The soft limit.
+        limit_m: f64,
     },
 }
