@@ -206,7 +206,7 @@ impl ClosedLoop {
     }
 
     /// All poles of the sampled closed loop lie inside the unit circle.
-    fn is_stable(&self) -> bool {
+    pub fn is_stable(&self) -> bool {
         let poles = self.sampled_poles();
         poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
     }

@@ -22,7 +22,7 @@ pub enum ExcitationError {
     },
     /// Beyond the motor or the amplifier.
     #[error(
-        "the largest current of the excitation is {current_a:.3} A, above {what} of {limit_a:.3} A; lower {setting}"
+        "the largest current by the model is {current_a:.3} A, above {what} of {limit_a:.3} A; lower {setting}"
     )]
     Current {
         /// The largest current.
@@ -48,7 +48,7 @@ pub enum ExcitationError {
     },
     /// Beyond the thermal rating of the motor.
     #[error(
-        "the thermal current of the motor would be {thermal_a:.3} A, above the limit of {limit_a:.3} A; lower {setting}, or shorten the excitation"
+        "the thermal current of the motor would be {thermal_a:.3} A, above the limit of {limit_a:.3} A; lower {setting}, or shorten the run"
     )]
     Heat {
         /// Largest thermal current.

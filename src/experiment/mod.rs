@@ -27,6 +27,7 @@ mod plan;
 mod plan_error;
 mod prediction;
 mod recorded_rig;
+mod reference_check;
 mod replay;
 mod response_estimate;
 mod run;

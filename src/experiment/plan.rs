@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use super::plan_error::PlanError;
-use super::swept_reference;
+use super::{reference_check, swept_reference};
 use crate::config::{self, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
@@ -111,6 +111,7 @@ impl Plan {
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
         let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
+        let is_swept = config.control.reference.is_swept();
         let reference = config.control.reference.design().text()?;
         let plan = Plan {
             controller: Some(controller),
@@ -120,6 +121,9 @@ impl Plan {
         };
         // Refuses a reference or a controller that cannot be built before the plan is shown.
         plan.program()?;
+        if let Some(controller) = plan.controller.as_ref().filter(|_| !is_swept) {
+            reference_check::check(&plan.config, controller, plan.reference.as_deref())?;
+        }
         Ok(plan)
     }
 

@@ -29,7 +29,11 @@ pub(super) fn planned(
     }
 }
 
-fn closed_loop(config: &Config, controller: &ControllerText) -> Result<ClosedLoop, PlanError> {
+/// The loop with the model of the whole rig.
+pub(super) fn closed_loop(
+    config: &Config,
+    controller: &ControllerText,
+) -> Result<ClosedLoop, PlanError> {
     let modes = simulated::modes(&config.plant, &config.sim)?;
     let plant = LoopPlant::new(config, &modes);
     let force_constant_n_per_a = config.motor.force_constant_n_per_a;

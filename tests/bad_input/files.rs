@@ -31,12 +31,12 @@ fn rejects_a_sweep_of_an_unstable_loop() {
 
 #[test]
 fn memory_of_a_run_does_not_grow_with_its_duration() {
-    // The reference lasts eleven days, 5e9 ticks, and trips at its start. The memory limit of 2 GB (`ulimit -v` is in kB) is less than a
-    // tenth of 40 GB, one f64 per tick.
+    // The reference lasts eleven days, 5e9 ticks, and noise of 0.1 m trips at its start. The memory limit of 2 GB (`ulimit -v` is in kB)
+    // is less than a tenth of 40 GB, one f64 per tick.
     let bench = Bench::new();
-    bench.write("far.csv", "0,0\n0.1,0.01\n");
+    bench.write("long.csv", "0,0\n0.1,1e-6\n");
     let run = format!(
-        "ulimit -v 2000000; exec {} control --fast --reference far.csv --duration 1e6 --json",
+        "ulimit -v 2000000; exec {} control --fast --reference long.csv --duration 1e6 --set sim.probe_noise_rms_m=0.1 --json",
         env!("CARGO_BIN_EXE_bench")
     );
     let output = assert_cmd::Command::new("sh")
@@ -79,7 +79,39 @@ fn rejects_invalid_reference_file_with_its_line() {
 }
 
 #[test]
-fn reference_beyond_the_soft_limit_is_rejected_or_trips() {
+fn rejects_a_fifo_and_a_device_as_input() {
+    let bench = Bench::new();
+    let made = std::process::Command::new("mkfifo")
+        .arg(bench.path("fifo"))
+        .status();
+    assert!(made.expect("mkfifo").success());
+    for command in [
+        "config check --config",
+        "margins --controller",
+        "control --reference",
+        "chirp --shape",
+        "identify",
+        "identify --input x --output y --rate 1000",
+    ] {
+        for (file, what) in [("fifo", "a FIFO"), ("/dev/zero", "a device")] {
+            let answer = bench.run(&format!("{command} {file}"));
+            assert!(
+                [1, 2].contains(&answer.code) && answer.err.contains(what),
+                "{command} {file}: {answer:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn accepts_a_byte_order_mark_in_a_reference() {
+    let bench = Bench::new();
+    bench.write("bom.csv", "\u{feff}time_s,reference_m\n0,0\n0.1,1e-6\n");
+    bench.json("control --fast --duration 0.2 --reference bom.csv");
+}
+
+#[test]
+fn rejects_a_reference_beyond_the_soft_limit() {
     for options in [
         "--amplitude 0.91mm",
         "--amplitude -1m",
@@ -91,14 +123,31 @@ fn reference_beyond_the_soft_limit_is_rejected_or_trips() {
         assert_eq!(bench.files(), [""; 0], "{options}");
     }
     let bench = Bench::new();
-    bench.write("far.csv", "0,0\n0.1,1e300\n");
-    let answer = bench.run("control --fast --duration 1 --reference far.csv --json");
-    assert_eq!(
-        (answer.code, &answer.json()["outcome"]),
-        (1, &serde_json::json!("tripped")),
-        "{}",
-        answer.err
-    );
+    // 50 um meant, 50 m written.
+    bench.write("far.csv", "0,0\n1,50\n");
+    bench
+        .run("control --fast --reference far.csv")
+        .is_refused(&["far.csv line 2", "is 50 m", "0.0009 m", "in metres"]);
+    bench.write("far.csv", "time_s,reference_m\n0,0\n0.1,-1e300\n");
+    bench
+        .run("control --fast --reference far.csv")
+        .is_refused(&["far.csv line 3", "-1e300 m"]);
+    assert_eq!(bench.files(), ["far.csv"]);
+}
+
+#[test]
+fn rejects_a_reference_that_would_trip_by_the_closed_loop_model() {
+    // A step of 0.85 mm is within the soft limit of 0.9 mm, but the command of the fast controller is beyond the motor's
+    // peak current, and its overshoot beyond the soft limit. A ramp of 1 s reaches the same place.
+    let bench = Bench::new();
+    bench.write("step.csv", "0,0\n0.1,0\n0.1002,850e-6\n");
+    for reference in ["step.csv", "step --amplitude 0.85mm"] {
+        let refused = bench.run(&format!("control --fast --reference {reference}"));
+        refused.is_refused(&["by the model", "9.982 A", "lower the values"]);
+    }
+    assert_eq!(bench.files(), ["step.csv"]);
+    bench.write("step.csv", "0,0\n0.1,0\n1.1,100e-6\n2,100e-6\n");
+    bench.json("control --fast --duration 2 --reference step.csv");
 }
 
 #[test]

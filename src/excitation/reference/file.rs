@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError};
 use crate::excitation::waveform::Reference;
+use crate::util::numeric::is_within;
 
 /// A CSV file with the columns `time_s,reference_m`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -26,6 +27,25 @@ impl ReferenceDesign for FileReference {
     fn build(&self, context: &ReferenceContext<'_>) -> Result<Box<dyn Reference>, ReferenceError> {
         let text = context.file.unwrap_or_default();
         Ok(Box::new(Table::parse(&self.path, text, context.period_s)?))
+    }
+
+    fn check_file(
+        &self,
+        context: &ReferenceContext<'_>,
+        soft_limit_m: f64,
+    ) -> Result<(), ReferenceError> {
+        let text = context.file.unwrap_or_default();
+        let points = (1..).zip(text.lines().map(point));
+        let mut points = points.filter_map(|(line, point)| Some((line, point?.1)));
+        match points.find(|(_, value_m)| !is_within(value_m.abs(), soft_limit_m)) {
+            None => Ok(()),
+            Some((line, reference_m)) => Err(ReferenceError::Travel {
+                path: self.path.clone(),
+                line,
+                reference_m,
+                limit_m: soft_limit_m,
+            }),
+        }
     }
 
     fn can_identify(&self) -> bool {
