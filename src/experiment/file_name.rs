@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use crate::util::atomic_file::numbered_names;
+use crate::util::timestamp;
 
 /// `2026-11-21T16-21-09Z_chirp.mcap` in `folder`, with `-2`, `-3`, ... where that is taken.
 pub(super) fn recording(folder: &Path, what: &str, now: SystemTime) -> PathBuf {
-    let time = humantime::format_rfc3339_seconds(now).to_string();
+    let time = timestamp::seconds(now);
     let first = folder.join(format!("{}_{what}.mcap", time.replace(':', "-")));
     let free = numbered_names(&first).find(|path| !path.exists());
     free.unwrap_or(first)

@@ -22,6 +22,7 @@ use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
 use crate::rt::servo::{Connections, Request, Servo};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
+use crate::util::timestamp;
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
@@ -191,12 +192,11 @@ fn create_folder(folder: &Path) -> Result<(), RunError> {
 }
 
 fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String, String> {
-    let started = humantime::format_rfc3339_millis(SystemTime::now());
     let cpu = scheduling.cpu.map_or("any".into(), |cpu| cpu.to_string());
     let pairs = [
         (KIND, plan.kind.name().to_string()),
         ("program", format!("bench {}", env!("CARGO_PKG_VERSION"))),
-        ("started", started.to_string()),
+        ("started", timestamp::milliseconds(SystemTime::now())),
         ("host", kernel_parameter("hostname")),
         ("kernel", kernel_parameter("osrelease")),
         ("pace", pace.name().into()),

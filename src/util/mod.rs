@@ -12,4 +12,5 @@ pub mod quantity;
 pub mod remedy;
 pub mod running_stats;
 pub(crate) mod thread_priority;
+pub mod timestamp;
 pub mod units;

@@ -17,6 +17,7 @@ use crate::recording::Recording;
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
+use crate::util::timestamp;
 
 /// A calibration and its runs.
 #[derive(Clone, Debug)]
@@ -146,7 +147,7 @@ fn calibration(
     let gain = fit.probe_gain(config.calibrate.scale_by, model_m_per_a);
     let device = |key: &str| recording.metadata().get(key).cloned().unwrap_or_default();
     Ok(Calibration {
-        made: humantime::format_rfc3339_seconds(SystemTime::now()).to_string(),
+        made: timestamp::seconds(SystemTime::now()),
         recording: recording.path().display().to_string(),
         amplifier: amplifier_calibration(fit, device("amplifier")),
         probe: ProbeCalibration {

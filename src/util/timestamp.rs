@@ -1,0 +1,41 @@
+//! Times of day as text, in UTC.
+
+use std::time::{Duration, SystemTime};
+
+/// The last second of the year 9999.
+const LAST_S: u64 = 253_402_300_799;
+
+/// RFC 3339 with seconds: `2026-11-21T16:21:09Z`.
+///
+/// A time before 1970 or after 9999, as of a clock that is not set, is the nearest one between.
+pub fn seconds(time: SystemTime) -> String {
+    humantime::format_rfc3339_seconds(displayable(time)).to_string()
+}
+
+/// RFC 3339 with milliseconds, in the same range as [`seconds`].
+pub fn milliseconds(time: SystemTime) -> String {
+    humantime::format_rfc3339_millis(displayable(time)).to_string()
+}
+
+fn displayable(time: SystemTime) -> SystemTime {
+    let first = SystemTime::UNIX_EPOCH;
+    time.clamp(first, first + Duration::from_secs(LAST_S))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clock_before_1970_or_after_9999_has_a_text() {
+        let epoch = SystemTime::UNIX_EPOCH;
+        let second = Duration::from_secs(1);
+        assert_eq!(seconds(epoch - second), "1970-01-01T00:00:00Z");
+        assert_eq!(milliseconds(epoch - second), "1970-01-01T00:00:00.000Z");
+        let last = Duration::from_secs(LAST_S);
+        assert_eq!(seconds(epoch + last + second), "9999-12-31T23:59:59Z");
+        // 10,000 days after 1970 are 27 years of 365 days, 7 leap days and 138 days: 19 May 1997.
+        let days = Duration::from_secs(10_000 * 86_400);
+        assert_eq!(seconds(epoch + days), "1997-05-19T00:00:00Z");
+    }
+}
