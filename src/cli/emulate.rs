@@ -1,9 +1,10 @@
 //! `bench emulate`: emulated devices, for a rehearsal without hardware.
 
 use std::fs::File;
-use std::io::{BufRead, Write};
+use std::io::{BufRead, Read, Write};
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 use tokio::runtime::Runtime;
@@ -18,10 +19,16 @@ use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
-use crate::util::quantity::{OfFrequency, OfTime, si};
+use crate::util::quantity::{Dimension, OfFrequency, OfTime, si};
 
 /// Period at which commands and planned faults are handled.
 const PERIOD: Duration = Duration::from_millis(2);
+/// Largest number of commands that are handled at once.
+const COMMANDS_PER_STEP: usize = 16;
+/// A longer line of standard input is read as several.
+const MAX_LINE_BYTES: u64 = 4096;
+/// Measuring rates of a probe.
+const MEASURING_RATE_HZ: RangeInclusive<f64> = 0.1..=1e6;
 
 /// Which devices are emulated, and where
 #[derive(Clone, Debug, clap::Args)]
@@ -109,7 +116,7 @@ impl Args {
             let what = "--interface is valid only for the device `amplifier`; add `amplifier`, or leave it out";
             return Err(CliError::Usage(what.into()));
         }
-        require_positive("--measuring-rate", self.measuring_rate)?;
+        require_measuring_rate(self.measuring_rate)?;
         require_positive("--duration", self.duration)
     }
 
@@ -119,6 +126,20 @@ impl Args {
             None if self.emulates(EmulatedDevice::Amplifier) => Origin::Enable,
             None => Origin::Start,
         }
+    }
+}
+
+/// Refuses rates that `probe.rate_hz` does not allow either.
+fn require_measuring_rate(rate_hz: Option<f64>) -> Result<(), CliError> {
+    match rate_hz {
+        Some(rate_hz) if !MEASURING_RATE_HZ.contains(&rate_hz) => {
+            let rate = Dimension::Frequency.display(rate_hz);
+            let (min, max) = (MEASURING_RATE_HZ.start(), MEASURING_RATE_HZ.end());
+            Err(CliError::Usage(format!(
+                "--measuring-rate is {rate}; give a rate from {min} to {max} Hz"
+            )))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -199,7 +220,8 @@ impl<'a> Server<'a> {
                 self.emulator.inject(&step)?;
             }
         }
-        while let Ok(line) = self.input.try_recv() {
+        let lines: Vec<String> = self.input.try_iter().take(COMMANDS_PER_STEP).collect();
+        for line in lines {
             self.execute(line.trim());
         }
         let duration_s = self.args.duration.unwrap_or(f64::INFINITY);
@@ -259,17 +281,26 @@ fn watch_signals() -> std::io::Result<(Runtime, StopSignals)> {
     Ok((runtime, signals))
 }
 
-/// Lines of standard input, read by a thread that ends with the program. The end of the input is not a command.
+/// Lines of standard input, read by a thread that ends with the program. The end of the input is not a command. Bytes that
+/// are not UTF-8 make one unknown command.
 fn read_lines() -> Receiver<String> {
-    let (sender, receiver) = channel();
+    let (sender, receiver) = sync_channel(COMMANDS_PER_STEP);
     std::thread::spawn(move || {
-        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+        while let Some(line) = read_line() {
             if sender.send(line).is_err() {
                 return;
             }
         }
     });
     receiver
+}
+
+/// The next line of standard input, or the first part of a very long one; `None` at its end.
+fn read_line() -> Option<String> {
+    let mut line = Vec::new();
+    let mut input = std::io::stdin().lock().take(MAX_LINE_BYTES);
+    let bytes = input.read_until(b'\n', &mut line).ok()?;
+    (bytes > 0).then(|| String::from_utf8_lossy(&line).into_owned())
 }
 
 /// A file with one JSON object per line, each written at once.

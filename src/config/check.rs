@@ -219,6 +219,17 @@ impl Checker<'_> {
         if !words.is_empty() && !words.contains(&word) {
             self.add(path, not_one_of(&format!("{word:?}"), &words));
         }
+        self.length(keywords, word, path);
+    }
+
+    fn length(&mut self, keywords: &Keywords, word: &str, path: &str) {
+        let count = word.chars().count() as f64;
+        let min = keywords.number("minLength").unwrap_or(0.0);
+        let max = keywords.number("maxLength").unwrap_or(f64::INFINITY);
+        if !(min..=max).contains(&count) {
+            let what = format!("has {count} characters; give a text of {min} to {max} characters");
+            self.add(path, what);
+        }
     }
 }
 

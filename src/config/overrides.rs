@@ -11,6 +11,9 @@ use super::layer::{Layer, overlay};
 use crate::util::finding::Finding;
 use crate::util::quantity::{Dimension, Quantity};
 
+/// Largest number of parts of a key. The deepest key of a configuration has 5.
+const MAX_KEY_PARTS: usize = 32;
+
 /// A setting that a command-line option sets. Errors name the option as typed, not the setting.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OptionSetting {
@@ -114,6 +117,12 @@ fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
     let (key, text) = (key.trim(), text.trim());
     if key.split('.').any(str::is_empty) {
         return Err("the key has an empty part");
+    }
+    if key.split('.').count() > MAX_KEY_PARTS {
+        return Err("the key has more than 32 parts");
+    }
+    if text.contains(['\n', '\r']) {
+        return Err("the value has more than one line");
     }
     let table = format!("value = {text}").parse::<Table>().ok();
     let value = table.and_then(|mut table| table.remove("value"));

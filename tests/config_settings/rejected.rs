@@ -51,6 +51,51 @@ fn rejects_unknown_key_with_line_and_nearest_name() {
 }
 
 #[test]
+fn rejects_names_of_interface_and_port_that_linux_does_not_allow() {
+    let bench = Bench::new();
+    let check = |set: &str, words: &[&str]| {
+        let arguments = ["config", "check", "--config", "lab", "--set", set];
+        bench.run_with(arguments).is_refused(words);
+    };
+    let long = format!("amplifier.device.interface={}", "a".repeat(300));
+    let (few, many) = ("has 0 characters", "has 300 characters");
+    check("amplifier.device.interface=", &[few, "1 to 15 characters"]);
+    check(&long, &["`amplifier.device.interface`", many, "1 to 15"]);
+    check("probe.device.line.port=", &[few, "1 to 4095 characters"]);
+    bench.json("config check --config lab --set amplifier.device.interface=abcdefghijklmno");
+}
+
+#[test]
+fn rejects_a_second_line_and_too_many_parts_in_set() {
+    let bench = Bench::new();
+    let deep = format!("{}rate_hz=1", "loop.".repeat(16_000));
+    for (set, words) in [
+        (
+            "loop.rate_hz=2000\nloop.priority=3",
+            ["more than one line", "KEY=VALUE"],
+        ),
+        (&deep, ["more than 32 parts", "KEY=VALUE"]),
+    ] {
+        let arguments = ["config", "show", "--set", set];
+        bench.run_with(arguments).is_refused(&words);
+    }
+}
+
+#[test]
+fn rejects_a_file_with_a_hundred_thousand_unknown_keys() {
+    let bench = Bench::new();
+    let keys: String = (0..100_000).map(|k| format!("k{k}=1\n")).collect();
+    bench.write("keys.toml", keys);
+    bench
+        .run("config check --config keys.toml")
+        .is_refused(&["50 errors or more", "`k0`"]);
+    bench.write("large.toml", "#".repeat((1 << 20) + 1));
+    bench
+        .run("config check --config large.toml")
+        .is_refused(&["large.toml", "limit of 1048576 bytes"]);
+}
+
+#[test]
 fn rejects_measured_damping_ratios_without_positive_damping() {
     let second = "plant.damping.second.omega_rad_s";
     // Two ratios at the same frequency: the equations of the two Rayleigh coefficients have no solution.

@@ -180,8 +180,8 @@ fn successive_readers_read_the_position_of_the_stage() {
 
 #[test]
 fn serves_every_protocol_in_metres_of_the_stage() {
-    let optoncdt = "{ kind = \"optoncdt\", sensor_range_m = 0.002, mounting = { gain = -1.0, offset_m = 0.001 }, line = { port = \"\", baud = 921600 } }";
-    let ascii = "{ kind = \"ascii\", mounting = { gain = 1.0, offset_m = 0.0 }, pattern = \"{value:8.5}\", unit_m = 1e-3, lower_m = -1e-3, upper_m = 1e-3, line = { port = \"\", baud = 230400 } }";
+    let optoncdt = "{ kind = \"optoncdt\", sensor_range_m = 0.002, mounting = { gain = -1.0, offset_m = 0.001 }, line = { port = \"unused\", baud = 921600 } }";
+    let ascii = "{ kind = \"ascii\", mounting = { gain = 1.0, offset_m = 0.0 }, pattern = \"{value:8.5}\", unit_m = 1e-3, lower_m = -1e-3, upper_m = 1e-3, line = { port = \"unused\", baud = 230400 } }";
     for probe in [optoncdt, ascii] {
         let set = format!("probe.device={probe}");
         let device = Device::start(&["--set", &set]);
@@ -229,6 +229,18 @@ fn planned_and_typed_faults_take_effect_and_are_logged() {
             .windows(2)
             .all(|pair| pair[0]["time_s"].as_f64() <= pair[1]["time_s"].as_f64())
     );
+}
+
+#[test]
+fn bytes_that_are_not_utf_8_do_not_end_the_reading_of_commands() {
+    let mut device = Device::start(&[]);
+    let stdin = device.child().stdin.as_mut().expect("piped");
+    stdin.write_all(b"\xff\xfe\n").expect("it listens");
+    // A line without an end for longer than a command may be.
+    stdin.write_all(&[b'x'; 10_000]).expect("it listens");
+    device.send("");
+    device.send("quit");
+    assert_eq!(device.end()["faults"], 0);
 }
 
 #[test]
@@ -282,7 +294,11 @@ fn rejects_invalid_options_before_serving() {
         ("stage --config lab", "amplifier"),
         ("probe --config lab --port /dev/ttyNONE9", "no such port"),
         ("probe --config lab --interface vcan0", "amplifier"),
-        ("probe --config lab --measuring-rate 0", "above 0"),
+        (
+            "probe --config lab --measuring-rate 0",
+            "--measuring-rate is 0 Hz; give a rate from 0.1 to 1000000 Hz",
+        ),
+        ("probe --config lab --measuring-rate 1e12", "is 1e12 Hz"),
         ("probe --config lab --fault probe.stuck", "KIND@FROM..TO"),
         ("probe --config lab --fault probe.x@1", "there is no fault"),
         (

@@ -49,6 +49,7 @@ impl Parity {
 pub struct PortSettings {
     /// The device. A link in /dev/serial/by-id keeps its name when the adapters are connected in another order.
     #[serde(rename = "port")]
+    #[schemars(length(min = 1, max = 4095))]
     pub path: PathBuf,
     /// Baud rate in bit/s; any number that the port supports.
     #[schemars(range(min = 300, max = 12000000))]

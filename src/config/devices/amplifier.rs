@@ -31,7 +31,8 @@ pub struct SimulatedAmplifier {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CanopenSettings {
-    /// CAN interface, as `ip link` names it.
+    /// CAN interface, as `ip link` names it. Linux allows 15 characters.
+    #[schemars(length(min = 1, max = 15))]
     pub interface: String,
     /// Bit rate of the bus in bit/s.
     #[schemars(range(min = 10000, max = 1000000))]
@@ -188,7 +189,8 @@ impl Default for CanopenTimeouts {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VescSettings {
-    /// CAN interface, as `ip link` names it.
+    /// CAN interface, as `ip link` names it. Linux allows 15 characters.
+    #[schemars(length(min = 1, max = 15))]
     pub interface: String,
     /// Bit rate of the bus in bit/s.
     #[schemars(range(min = 10000, max = 1000000))]
