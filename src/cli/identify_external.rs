@@ -1,5 +1,6 @@
 //! `bench identify` of an external CSV: any input, any output, without a model.
 
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::Serialize;
@@ -9,18 +10,21 @@ use super::error::CliError;
 use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::experiment::analyse_external;
+use crate::experiment::{AnalysisError, analyse_external};
+use crate::identify::IdentifyError;
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::frf_csv;
 use crate::identify::periodic::Repetition;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, PageFiles, ResultFiles,
 };
-use crate::util::quantity::{Frequency, OfFrequency, Time, si};
+use crate::util::quantity::{Dimension, Frequency, OfFrequency, Time, si};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
 /// a thousand times larger.
 const WHOLE_SAMPLES: f64 = 1e-3;
+/// Allowed sampling rates.
+const RATE_HZ: RangeInclusive<f64> = 1e-6..=1e9;
 
 /// What the columns of a CSV mean.
 #[derive(Clone, Debug, clap::Args)]
@@ -117,7 +121,7 @@ impl ExternalOptions {
     fn sampling(&self, path: &Path) -> Result<Sampling, CliError> {
         match (&self.time, self.rate) {
             (Some(time), _) => Ok(Sampling::TimeColumn(time.clone())),
-            (None, Some(rate_hz)) => Ok(Sampling::RateHz(rate_hz)),
+            (None, Some(rate_hz)) => Ok(Sampling::RateHz(checked_rate_hz(rate_hz)?)),
             (None, None) => {
                 let names = names(path)?;
                 Err(CliError::Usage(format!(
@@ -142,6 +146,23 @@ impl ExternalOptions {
         })
     }
 
+    /// The error of an analysis: wrong usage, if an option is the cause.
+    fn refused(&self, error: AnalysisError) -> CliError {
+        let AnalysisError::Identify(why) = &error else {
+            return error.into();
+        };
+        let option = match why {
+            IdentifyError::Band(_) => self.band.as_ref().map(|band| format!("--band {band}")),
+            IdentifyError::Setting { .. } => self.period.as_ref().map(|n| format!("--period {n}")),
+            IdentifyError::Periods(_) => self.skip_periods.map(|n| format!("--skip-periods {n}")),
+            IdentifyError::Signals(_) | IdentifyError::NotExcited { .. } => None,
+        };
+        match option {
+            Some(option) => CliError::Usage(format!("{option}: {why}")),
+            None => error.into(),
+        }
+    }
+
     fn repetition(&self, rate_hz: f64) -> Result<Option<Repetition>, CliError> {
         let Some(text) = &self.period else {
             return Ok(None);
@@ -154,6 +175,18 @@ impl ExternalOptions {
         let skip = self.skip_periods.unwrap_or(0);
         Ok(Some(Repetition { period, skip }))
     }
+}
+
+/// Refuses a rate at which no signal is sampled.
+fn checked_rate_hz(rate_hz: f64) -> Result<f64, CliError> {
+    if RATE_HZ.contains(&rate_hz) {
+        return Ok(rate_hz);
+    }
+    let rate = Dimension::Frequency.display(rate_hz);
+    let (min, max) = (RATE_HZ.start(), RATE_HZ.end());
+    Err(CliError::Usage(format!(
+        "--rate is {rate}; give a rate from {min} to {max} Hz"
+    )))
 }
 
 /// The period in samples. A number without a unit is in samples; a time must be a multiple of the sampling period.
@@ -183,7 +216,9 @@ pub(super) fn run(
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz(signals.rate_hz)?;
-    let analysis = analyse_external(&signals, band_hz, options.repetition(signals.rate_hz)?)?;
+    let repetition = options.repetition(signals.rate_hz)?;
+    let analysis = analyse_external(&signals, band_hz, repetition);
+    let analysis = analysis.map_err(|error| options.refused(error))?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {
         analysis: &analysis,
