@@ -83,6 +83,14 @@ pub struct ChainCalibration {
 /// A value of a calibration with which no run is made. Its text ends with the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CalibrationDefect {
+    /// A gain of the probe with which no position could be measured.
+    #[error(
+        "probe.gain = {gain:e} is between -0.001 and 0.001, so all positions would be near 0; check scale and wiring of the probe and repeat `bench calibrate`"
+    )]
+    NoProbeGain {
+        /// Its value.
+        gain: f64,
+    },
     /// A gain of the amplifier so far from 1 that an error is more likely.
     #[error(
         "amplifier.current_gain = {gain:.4} is outside 0.75 to 1.25; check scale and wiring of the amplifier and repeat `bench calibrate`, or set calibration.accepted_by = \"NAME\" to confirm the value with your name"
@@ -287,6 +295,8 @@ fn other_device(calibration: &Calibration, devices: KnownDevices) -> Option<Stri
 
 /// Largest deviation of a gain from 1 (or -1 for a reversed probe) that needs no confirmation.
 const GAIN_TOLERANCE: f64 = 0.25;
+/// Smallest magnitude of the probe's gain, with or without a confirmation.
+const MIN_PROBE_GAIN: f64 = 0.001;
 
 impl Calibration {
     /// Refuses gains outside 1 +- 0.25 that nobody confirmed with a name, and an offset of the current beyond `current_error_a`,
@@ -296,6 +306,10 @@ impl Calibration {
         settings: &CalibrationSettings,
         current_error_a: f64,
     ) -> Result<(), CalibrationDefect> {
+        let gain = self.probe.gain;
+        if gain.abs() < MIN_PROBE_GAIN {
+            return Err(CalibrationDefect::NoProbeGain { gain });
+        }
         if settings.confirming_name().is_none() {
             self.check_gains()?;
         }
