@@ -1,5 +1,6 @@
 //! The `bench` program: log to standard error, run the command, exit with its code.
 
+use std::io::IsTerminal;
 use std::process::ExitCode;
 
 use bench::cli;
@@ -12,7 +13,7 @@ fn main() -> ExitCode {
     cli::main().into()
 }
 
-/// Log lines go to standard error. `BENCH_LOG` chooses the level: `info`, or `bench::rt=debug,warn`.
+/// Log lines go to standard error, with colours on a terminal only. `BENCH_LOG` chooses the level: `info`, or `bench::rt=debug,warn`.
 fn start_log() {
     let chosen = std::env::var("BENCH_LOG")
         .ok()
@@ -21,6 +22,7 @@ fn start_log() {
     // With internal errors logged, a full standard error would end the program in a panic.
     let lines = tracing_subscriber::fmt::layer()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .log_internal_errors(false);
     tracing_subscriber::registry()
         .with(lines)

@@ -10,6 +10,7 @@ use super::finding::{Finding, Subject};
 use crate::config::{InterlockSettings, ProbeSettings};
 use crate::rig::devices::first_reading;
 use crate::util::decimal::Decimal;
+use crate::util::numeric::is_within;
 
 /// Duration of the observation.
 const OBSERVED: Duration = Duration::from_secs(1);
@@ -162,7 +163,7 @@ pub fn findings(
         rate(readings.rate_hz, probe.rate_hz),
         Some(age(readings, probe, limits.probe_stale_s)),
         Some(position(readings, limits.soft_limit_m)),
-        Some(noise(readings.noise_rms_m)),
+        Some(noise(readings.noise_rms_m, limits.soft_limit_m)),
         Some(damage(readings)),
     ];
     findings.into_iter().flatten().collect()
@@ -271,14 +272,30 @@ fn position(readings: &Readings, soft_limit_m: f64) -> Finding {
     Subject::Readings.failure(what, remedy)
 }
 
-fn noise(rms_m: f64) -> Finding {
-    if rms_m > 0.0 {
-        let what = format!("noise {} RMS, if the stage is at rest", length(rms_m));
-        return Subject::Readings.ok(what);
+/// A standard deviation above this ratio of the soft limit is no noise of a displacement probe.
+const MAX_NOISE_RATIO: f64 = 0.01;
+/// With a larger ratio, a run would trip on travel within some ten thousand readings (4 standard deviations).
+const TRIPPING_NOISE_RATIO: f64 = 0.25;
+
+fn noise(rms_m: f64, soft_limit_m: f64) -> Finding {
+    let rms = length(rms_m);
+    let limit = length(soft_limit_m);
+    if rms_m == 0.0 {
+        let remedy = "push the stage gently: the readings of a working probe change";
+        Subject::Readings.note("all readings are equal", remedy)
+    } else if is_within(rms_m, MAX_NOISE_RATIO * soft_limit_m) {
+        Subject::Readings.ok(format!("noise {rms} RMS, if the stage is at rest"))
+    } else if is_within(rms_m, TRIPPING_NOISE_RATIO * soft_limit_m) {
+        let what = format!("noise {rms} RMS, above 1 % of the soft limit of {limit}");
+        Subject::Readings.warning(what, NOISE_REMEDY)
+    } else {
+        let what = format!("noise {rms} RMS, above 25 % of the soft limit of {limit}");
+        Subject::Readings.failure(what, NOISE_REMEDY)
     }
-    let remedy = "push the stage gently: the readings of a working probe change";
-    Subject::Readings.note("all readings are equal", remedy)
 }
+
+const NOISE_REMEDY: &str =
+    "keep the stage at rest, and check cable, ground and scale of the probe (probe.device)";
 
 fn length(metres: f64) -> String {
     match metres {
@@ -350,14 +367,14 @@ mod tests {
     fn healthy_readings_are_ok() {
         assert_eq!(not_ok(&healthy()), []);
         let expected = "noise 40.0 nm RMS, if the stage is at rest";
-        assert_eq!(noise(40e-9).what, expected);
+        assert_eq!(noise(40e-9, 900e-6).what, expected);
     }
 
     #[test]
     fn each_defect_of_readings_has_its_severity_and_text() {
         // lab: expected 0.3 + 1.4 + 0.77 = 2.47 ms in the mean, stale at 10 ms, soft limit 900 um, 650 Hz.
         type Change = fn(&mut Readings);
-        let cases: [(Change, Severity, &str); 13] = [
+        let cases: [(Change, Severity, &str); 16] = [
             (
                 |r| (r.came, r.bytes, r.timeouts) = (false, 0, 20),
                 Failure,
@@ -397,6 +414,17 @@ mod tests {
                 "farthest -950.0 um",
             ),
             (|r| r.noise_rms_m = 0.0, Note, "all readings are equal"),
+            (
+                |r| r.noise_rms_m = 9.1e-6,
+                Warning,
+                "noise 9.10 um RMS, above 1 % of the soft limit of 900.00 um",
+            ),
+            (
+                |r| r.noise_rms_m = 475e-6,
+                Failure,
+                "noise 475.00 um RMS, above 25 % of the soft limit",
+            ),
+            (|r| r.noise_rms_m = f64::NAN, Failure, "above 25 %"),
             (|r| r.gaps = 1, Warning, "1 missing readings"),
             (|r| r.damaged_bytes = 7, Warning, "7 damaged bytes"),
         ];
