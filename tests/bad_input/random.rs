@@ -1,4 +1,7 @@
-//! Random settings and random files: no command panics.
+//! Random settings, options and files: no command panics, ends by a signal or hangs, and every refusal has a message.
+//!
+//! `BENCH_RANDOM_CASES` sets the number of cases of each test, `BENCH_RANDOM_SEED` their seed; a failing case prints its
+//! arguments.
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -10,11 +13,20 @@ fn is_unstable(answer: &Answer) -> bool {
     answer.code == 1 && answer.json()["stable"] == false
 }
 
+/// The number in an environment variable.
+fn number(variable: &str) -> Option<u64> {
+    std::env::var(variable).ok()?.parse().ok()
+}
+
 /// A fixed seed, so that the cases are the same in every run. A call takes about 10 ms.
 fn cases(cases: u32) -> ProptestConfig {
+    let seed = number("BENCH_RANDOM_SEED").unwrap_or(20_061_009);
+    let chosen = number("BENCH_RANDOM_CASES").and_then(|cases| u32::try_from(cases).ok());
+    let cases = chosen.unwrap_or(cases);
+    eprintln!("{cases} cases with the seed {seed}");
     ProptestConfig {
         cases,
-        rng_seed: RngSeed::Fixed(20_061_009),
+        rng_seed: RngSeed::Fixed(seed),
         failure_persistence: None,
         ..ProptestConfig::default()
     }
@@ -63,6 +75,152 @@ fn value() -> impl Strategy<Value = String> {
     ]
 }
 
+/// Commands that end within a second, and options with a value. `TABLE` stands for a random CSV file.
+const COMMANDS: [(&str, &[&str]); 14] = [
+    (
+        "chirp --plan --set chirp.duration_s=1.0",
+        &[
+            "--start",
+            "--stop",
+            "--amplitude",
+            "--excitation",
+            "--shape",
+            "--sweep",
+            "--seed",
+        ],
+    ),
+    (
+        "control --duration 20ms --set control.settle_s=0.01 --set control.steady_after_s=0.0",
+        &[
+            "--reference",
+            "--amplitude",
+            "--frequency",
+            "--speed",
+            "--controller",
+            "--operating-point",
+            "--asymmetry",
+            "--seed",
+        ],
+    ),
+    (
+        "identify TABLE --input x --output y",
+        &["--rate", "--time", "--period", "--skip-periods", "--band"],
+    ),
+    ("identify TABLE --time t", &["--input", "--output"]),
+    (
+        "linearity --stop 4kHz",
+        &["--scales", "--amplitude", "--seed"],
+    ),
+    (
+        "margins",
+        &[
+            "--controller",
+            "--operating-point",
+            "--asymmetry",
+            "--config",
+        ],
+    ),
+    (
+        "model modes",
+        &["--operating-point", "--asymmetry", "--config"],
+    ),
+    ("model bounds", &["--alpha", "--peak", "--bandwidth"]),
+    ("model step", &["--duration", "--count"]),
+    (
+        "model critical-damping",
+        &["--ratio", "--omega-u", "--omega-v"],
+    ),
+    (
+        "model locus --vary plant.mass_asymmetry --count 3",
+        &["--from", "--to", "--vary"],
+    ),
+    (
+        "model placement --from 1% --to 2%",
+        &["--sensor", "--actuator", "--modes"],
+    ),
+    (
+        "emulate probe --config lab --duration 5ms",
+        &["--measuring-rate", "--fault", "--seed", "--port"],
+    ),
+    ("config show", &["--set", "--config", "--operating-point"]),
+];
+
+/// A command with up to three of its options, each with a random value.
+fn command_line() -> impl Strategy<Value = Vec<String>> {
+    let values = proptest::collection::vec((0usize..20, option_value()), 0..4);
+    (0..COMMANDS.len(), values).prop_map(|(command, values)| {
+        let (command, options) = COMMANDS[command];
+        let options = values
+            .into_iter()
+            .map(|(option, value)| format!("{}={value}", options[option % options.len()]));
+        command
+            .split(' ')
+            .map(str::to_string)
+            .chain(options)
+            .collect()
+    })
+}
+
+/// A number, a quantity, a word of the command line, or any text.
+fn option_value() -> impl Strategy<Value = String> {
+    let units = [
+        "", "Hz", "kHz", "um", "mm", "m", "A", "s", "ms", "%", "rad/s", "mm/s",
+    ];
+    let words = [
+        "step",
+        "hold",
+        "sine",
+        "prbs",
+        "fast",
+        "model",
+        "lab",
+        "x",
+        "y",
+        "t",
+        "0",
+        "-1",
+        "nan",
+        "1e999",
+        "1:2",
+        "5:200",
+        "1,2",
+        "0.5,1",
+        "x1",
+        "x1=1,y2=-1",
+        "probe.silence@0s",
+        "probe.out-of-range@1s..0s",
+        "/dev/null",
+        "TABLE",
+        "loop.rate_hz=1e3",
+    ];
+    prop_oneof![
+        4 => (value(), proptest::sample::select(units.to_vec())).prop_map(|(value, unit)| value + unit),
+        3 => proptest::sample::select(words.to_vec()).prop_map(str::to_string),
+        1 => ".{0,20}",
+    ]
+}
+
+/// A table of 100 samples of which one cell is random.
+fn table() -> impl Strategy<Value = String> {
+    (0usize..303, value()).prop_map(|(place, value)| {
+        let cell = |k: usize| match (k == place, k) {
+            (true, _) => value.clone(),
+            (false, 0..3) => ["t", "x", "y"][k].to_string(),
+            (false, _) if k.is_multiple_of(3) => format!("{:.3}", k as f64 / 3000.0),
+            (false, _) => format!("{:.6}", f64::sin(0.7 * (k * k) as f64)),
+        };
+        let rows = (0..101).map(|row| {
+            format!(
+                "{},{},{}\n",
+                cell(3 * row),
+                cell(3 * row + 1),
+                cell(3 * row + 2)
+            )
+        });
+        rows.collect()
+    })
+}
+
 /// A text with some of its bytes replaced, removed or inserted.
 fn damaged(text: &'static str) -> impl Strategy<Value = Vec<u8>> {
     let change = (
@@ -98,6 +256,18 @@ proptest! {
         }
         let short = ["--duration=0.02", "--set=control.settle_s=0.01", "--set=control.steady_after_s=0.0"].map(str::to_string);
         bench.run_with(["control".to_string()].into_iter().chain(sets).chain(short));
+    }
+
+    #[test]
+    fn no_option_causes_a_panic(arguments in command_line(), table in table()) {
+        let bench = Bench::new();
+        bench.write("TABLE", table);
+        let arguments: Vec<String> = arguments.iter().map(|text| text.replace('\0', " ")).collect();
+        let answer = bench.run_with(&arguments);
+        prop_assert!((0..=3).contains(&answer.code), "{arguments:?}: {answer:?}");
+        // A loop that is unstable and a run that trips are results, not errors.
+        let has_result = answer.code != 2 && !answer.out.is_empty();
+        prop_assert!(answer.code == 0 || has_result || !answer.err.trim().is_empty(), "{arguments:?}: {answer:?}");
     }
 
     #[test]
