@@ -29,4 +29,8 @@ pub struct InterlockSettings {
     /// Largest number of missed ticks within one second.
     #[schemars(range(min = 0, max = 1000000))]
     pub overruns_per_s: u32,
+    /// File that keeps the thermal state of the motor between runs on devices; absent for a file in the state folder of the user
+    /// ($XDG_STATE_HOME/bench or ~/.local/state/bench). Users who share a bench must use one file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heat_file: Option<String>,
 }

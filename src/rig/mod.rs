@@ -1,7 +1,8 @@
-//! Rigs: a simulated stage or real devices, optionally corrected by a calibration; and emulated devices for a
-//! rehearsal without hardware.
+//! Rigs: a simulated stage or real devices, optionally corrected by a calibration; emulated devices for a rehearsal without
+//! hardware; and the thermal state of the motor between runs.
 
 pub mod calibration;
 pub mod devices;
 pub mod emulator;
+pub mod motor;
 pub mod simulated;
