@@ -63,7 +63,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let progress = Progress::new("static steps");
     let line = ProgressLine::show(&progress);
-    let made = calibration::run(&Runner { setup, progress }, &config, !args.no_delay)?;
+    let made = calibration::run(
+        &Runner::with_progress(setup, progress),
+        &config,
+        !args.no_delay,
+    )?;
     drop(line);
     let report = report(args, made)?;
     print_result(args.bench.json, &report, |report| text(report, &config))?;

@@ -170,7 +170,7 @@ fn run_with_progress(
 ) -> Result<Run, ExperimentError> {
     let progress = Progress::new(phase);
     let _line = ProgressLine::show(&progress);
-    Runner { setup, progress }.run(plan, phase)
+    Runner::with_progress(setup, progress).run(plan, phase)
 }
 
 fn show(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<(), CliError> {

@@ -121,7 +121,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let expected = predicted_extremes(&config)?;
     if args.plan {
         warn(&check_calibration(&config, args.run.stage(&config))?);
-        let plan = ExcitationPlan::new(&config, expected);
+        let mut plan = ExcitationPlan::new(&config, expected);
+        plan.motor = args.run.motor_summary(&Plan::chirp(config))?;
         print_result(args.bench.json, &plan, plan_output::text)?;
         return Ok(Outcome::Done);
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::outcome::Outcome;
 use crate::experiment::campaign::CampaignError;
-use crate::experiment::{ExperimentError, PlanError};
+use crate::experiment::{ExperimentError, MotorError, PlanError};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
 use crate::model::study::StudyError;
@@ -139,6 +139,7 @@ fn is_failure(error: &ExperimentError) -> bool {
             | ExperimentError::Recording(_)
             | ExperimentError::Analysis(_)
             | ExperimentError::Failed(_)
+            | ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped)
     )
 }
 
@@ -146,7 +147,12 @@ fn experiment_kind(error: &ExperimentError) -> ErrorKind {
     match error {
         ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
         ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
-        ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
+        ExperimentError::Plan(_)
+        | ExperimentError::Excitation(_)
+        | ExperimentError::Motor(MotorError::Warm { .. } | MotorError::Never { .. }) => {
+            ErrorKind::Plan
+        }
+        ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped) => ErrorKind::Failed,
         ExperimentError::Margin(_) => ErrorKind::Margin,
         ExperimentError::Plant(_) => ErrorKind::Model,
         ExperimentError::Devices(_) => ErrorKind::Devices,

@@ -152,12 +152,16 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let progress = Progress::new("linearity");
     let _line = ProgressLine::show(&progress);
     let mut runs = Vec::new();
-    linearity::run(&Runner { setup, progress }, plans, &mut |plan, run| {
-        let finished = finish(plan, run)?;
-        let is_failed = finished.outcome() == Outcome::Failed;
-        runs.push(finished);
-        Ok::<bool, CliError>(!is_failed)
-    })?;
+    linearity::run(
+        &Runner::with_progress(setup, progress),
+        plans,
+        &mut |plan, run| {
+            let finished = finish(plan, run)?;
+            let is_failed = finished.outcome() == Outcome::Failed;
+            runs.push(finished);
+            Ok::<bool, CliError>(!is_failed)
+        },
+    )?;
     Ok(runs)
 }
 

@@ -1,14 +1,16 @@
 //! The plan of an excitation as text.
 
+use super::table::labelled;
 use crate::excitation::AmplitudePoint;
-use crate::experiment::ExcitationPlan;
+use crate::experiment::{ExcitationPlan, MotorSummary};
 
 /// Extremes with their limits, and the amplitude over frequency.
 pub(super) fn text(plan: &ExcitationPlan) -> String {
     let (expected, limits) = (&plan.expected, &plan.limits);
     let amplitude: String = plan.amplitude.iter().map(amplitude_line).collect();
+    let motor = plan.motor.as_ref().map_or(String::new(), motor_text);
     format!(
-        "{}; no motion\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n{amplitude}",
+        "{}; no motion\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n{motor}{amplitude}",
         plan.excitation,
         expected.duration_s,
         expected.travel_m * 1e6,
@@ -21,6 +23,25 @@ pub(super) fn text(plan: &ExcitationPlan) -> String {
         expected.slew_a_per_s,
         limits.slew_a_per_s,
     )
+}
+
+/// The heat of earlier runs, the thermal current that it leads to, and from when on the run is allowed.
+fn motor_text(motor: &MotorSummary) -> String {
+    let start = match (&motor.start_after, motor.wait_s) {
+        (_, Some(0.0)) => "the run may start now".to_string(),
+        (Some(start_after), Some(wait_s)) => {
+            format!("the run may start after {start_after}, in {wait_s:.0} s")
+        }
+        (None, Some(wait_s)) => {
+            format!("the run is refused unless it waits {wait_s:.0} s (--wait-for-motor)")
+        }
+        (_, None) => "the run is refused also with a cold motor".to_string(),
+    };
+    let text = format!(
+        "{}; the run would reach {:.3} A of {:.2} A; {start}",
+        motor.known_from, motor.thermal_peak_a, motor.thermal_limit_a
+    );
+    labelled("motor", &text)
 }
 
 fn amplitude_line(point: &AmplitudePoint) -> String {

@@ -12,8 +12,10 @@ use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
 use crate::config::Config;
 use crate::experiment::{
-    self, Plan, Run, RunSummary, Runner, Setup, Stage, TimingSummary, TripSummary,
+    self, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, Run, RunSummary, Runner,
+    Setup, Stage, TimingSummary, TripSummary,
 };
+use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
 
@@ -31,6 +33,13 @@ pub(super) struct RunOptions {
     /// Clear a latched fault of the amplifier; first remove its cause
     #[arg(long)]
     clear_fault: bool,
+    /// The motor is cold: it has had no current for several thermal time constants. Needed at most before the first run on a
+    /// device; later the program knows the state of the motor
+    #[arg(long)]
+    motor_cold: bool,
+    /// Wait until the motor is cool enough, where the run would be refused because of the heat of earlier runs
+    #[arg(long)]
+    wait_for_motor: bool,
     /// Folder for the recording and the files computed from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
@@ -71,16 +80,64 @@ impl RunOptions {
             pace: self.pace(config)?,
             simulate: self.simulate,
             clear_fault: self.clear_fault,
+            motor: self.motor(config)?,
+            now: Moment::now,
             folder: self.out.clone(),
         })
+    }
+
+    /// How the heat of the motor is treated. With `--motor-cold` this statement is stored first.
+    fn motor(&self, config: &Config) -> Result<MotorHandling, CliError> {
+        if self.is_simulated(config) {
+            self.refuse_motor_options()?;
+            return Ok(MotorHandling::Simulated);
+        }
+        if self.motor_cold {
+            let stated = motor_memory(config)?.state_cold(&Moment::now());
+            stated.map_err(MotorError::from)?;
+        }
+        Ok(match self.wait_for_motor {
+            true => MotorHandling::WaitUntilCool,
+            false => MotorHandling::Remembered,
+        })
+    }
+
+    fn refuse_motor_options(&self) -> Result<(), CliError> {
+        let options = [
+            (self.motor_cold, "--motor-cold"),
+            (self.wait_for_motor, "--wait-for-motor"),
+        ];
+        match options.iter().find(|(is_given, _)| *is_given) {
+            None => Ok(()),
+            Some((_, option)) => Err(CliError::Usage(format!(
+                "{option} is valid only on devices, because the simulated motor is cold at its first run and rests between runs; leave it out"
+            ))),
+        }
+    }
+
+    /// The motor of the configured devices before the run `plan`; `None` for a simulated motor.
+    pub fn motor_summary(&self, plan: &Plan) -> Result<Option<MotorSummary>, CliError> {
+        match self.motor(&plan.config)? {
+            MotorHandling::Simulated => Ok(None),
+            MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
+                let memory = motor_memory(&plan.config)?;
+                let forecast = MotorForecast::of(plan, &memory, None, Moment::now())?;
+                Ok(Some(forecast.summary()))
+            }
+        }
     }
 
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
     pub fn run(&self, plan: &Plan, phase: &'static str) -> Result<Run, CliError> {
         let (setup, progress) = (self.setup(&plan.config)?, Progress::new(phase));
         let _line = ProgressLine::show(&progress);
-        Ok(Runner { setup, progress }.run(plan, phase)?)
+        Ok(Runner::with_progress(setup, progress).run(plan, phase)?)
     }
+}
+
+fn motor_memory(config: &Config) -> Result<MotorMemory, CliError> {
+    let memory = MotorMemory::of(config);
+    Ok(memory.map_err(MotorError::from)?)
 }
 
 /// Adds the report of a run to its recording, closes the file, and prints the report in the requested form.

@@ -104,6 +104,8 @@ subjects! {
     SerialPort = "serial port",
     /// The readings of the probe.
     Readings = "readings",
+    /// The heat of the motor.
+    Motor = "motor",
     /// The folder of the recordings and its free space.
     Recordings = "recordings",
 }

@@ -6,6 +6,7 @@
 //!  scheduler      the privileges of that thread        |  facts, gathered without side effects
 //!  can_interface  can_nodes  drive  vesc               |      |
 //!  calibration    serial_port  readings                             |      v
+//!  motor          heat of earlier runs                 |
 //!  recordings     folder, space                        |  findings: a function of facts and settings
 //!  runs           whether the commands accept the     /
 //!                 configuration
@@ -24,6 +25,7 @@ pub mod can_interface;
 pub mod can_nodes;
 pub mod drive;
 mod finding;
+mod motor;
 pub mod readings;
 pub mod recordings;
 mod report;
@@ -60,6 +62,7 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
     amplifier::examine(&config.amplifier, &config.servo, &mut report);
     report.extend(calibration::findings(config, report.figures.drive.as_ref()));
     examine_probe(config, &mut report);
+    motor::examine(config, &mut report);
     let space = recordings::gather(out, runs::longest_ticks(config));
     report.extend([recordings::finding(&space)]);
     report.figures.recordings = Some(space.figures());

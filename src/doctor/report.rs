@@ -10,6 +10,7 @@ use super::readings::Readings;
 use super::recordings::Space;
 use super::trial::Lateness;
 use crate::control::Margins;
+use crate::experiment::MotorSummary;
 
 /// The result of an examination; the JSON object of `bench doctor`.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -38,6 +39,8 @@ pub struct Figures {
     pub drive: Option<DriveFigures>,
     /// The readings of the probe.
     pub probe: Option<Readings>,
+    /// The heat of the motor before and in a run of `bench chirp`.
+    pub motor: Option<MotorSummary>,
     /// Space for recordings.
     pub recordings: Option<Space>,
     /// The margins of the closed loop.

@@ -2,6 +2,7 @@
 
 use super::analysis_error::AnalysisError;
 use super::loop_check::MarginError;
+use super::motor_error::MotorError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
 use crate::config::ConfigError;
@@ -33,6 +34,9 @@ pub enum ExperimentError {
     /// The calibration cannot be used.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
+    /// The motor is too warm for the run, or its stored state cannot be used.
+    #[error(transparent)]
+    Motor(#[from] MotorError),
     /// The settings do not allow the experiment.
     #[error("{0}")]
     Refused(String),

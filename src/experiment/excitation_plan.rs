@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::motor_forecast::MotorSummary;
 use crate::config::Config;
 use crate::excitation::{AmplitudePoint, Extremes};
 
@@ -14,6 +15,8 @@ pub struct ExcitationPlan {
     pub expected: Extremes,
     /// The limits of these extremes.
     pub limits: PlanLimits,
+    /// The motor on devices, whose heat the run starts with; `None` on the simulated stage, whose motor is cold.
+    pub motor: Option<MotorSummary>,
     /// Amplitude over frequency; empty for an excitation with one amplitude.
     pub amplitude: Vec<AmplitudePoint>,
 }
@@ -43,6 +46,7 @@ impl ExcitationPlan {
             excitation: chosen.describe(),
             expected,
             limits: PlanLimits::of(config),
+            motor: None,
             amplitude,
         }
     }

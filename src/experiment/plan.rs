@@ -4,6 +4,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
 use super::{reference_check, swept_reference};
 use crate::config::{self, Config, PlantSettings, whole};
@@ -26,6 +27,10 @@ pub(super) const KIND: &str = "run";
 pub(super) const RAMP_TICKS: &str = "ramp_ticks";
 /// The longest ramp to zero current that is chosen from the model, in seconds.
 const LONGEST_RAMP_S: f64 = 2.0;
+/// Metadata key of the thermal state of the motor at the start, in A^2.
+pub(super) const MOTOR_THERMAL: &str = "motor_thermal_a2";
+/// Metadata key of how that state was known.
+pub(super) const MOTOR_KNOWN_FROM: &str = "motor_known_from";
 
 /// The kind of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +77,8 @@ pub struct Plan {
     pub calibration: Option<Calibration>,
     /// Descriptions of the devices, for the metadata of the recording.
     pub devices: Vec<(&'static str, String)>,
+    /// The thermal state of the motor with which the interlocks start.
+    pub motor: MotorStart,
     /// Extremes of a swept reference by the model.
     pub predicted_extremes: Option<Extremes>,
     /// Text of the file of the reference, if it has one.
@@ -101,6 +108,7 @@ impl Plan {
             controller: None,
             calibration: None,
             devices: Vec::new(),
+            motor: MotorStart::default(),
             predicted_extremes: None,
             reference: None,
         }
@@ -143,6 +151,7 @@ impl Plan {
             controller,
             calibration: calibration.transpose()?,
             reference: attached_text(recording, REFERENCE),
+            motor: motor_start(recording)?,
             ..Plan::excitation(kind(recording)?, config)
         })
     }
@@ -246,6 +255,24 @@ fn kind(recording: &Recording) -> Result<RunKind, PlanError> {
     let mut kind = RunKind::ALL.into_iter();
     let kind = kind.find(|kind| name.is_some_and(|name| name == kind.name()));
     kind.ok_or(PlanError::Missing("kind of run"))
+}
+
+/// The recorded thermal state of the motor; recordings of older versions began with a cold motor.
+fn motor_start(recording: &Recording) -> Result<MotorStart, PlanError> {
+    let metadata = recording.metadata();
+    let thermal_a2 = match metadata.get(MOTOR_THERMAL) {
+        None => 0.0,
+        Some(text) => thermal_a2(text).ok_or_else(|| PlanError::MotorThermal(text.clone()))?,
+    };
+    Ok(MotorStart {
+        thermal_a2,
+        known_from: metadata.get(MOTOR_KNOWN_FROM).cloned().unwrap_or_default(),
+    })
+}
+
+fn thermal_a2(text: &str) -> Option<f64> {
+    let value: f64 = text.parse().ok()?;
+    (value.is_finite() && value >= 0.0).then_some(value)
 }
 
 fn attached_text(recording: &Recording, name: &str) -> Option<String> {

@@ -33,6 +33,11 @@ pub enum PlanError {
         "the recording has no {0}: it was not made by `bench chirp` or `bench control`, or that part was damaged; choose another recording"
     )]
     Missing(&'static str),
+    /// The recorded thermal state of the motor is not a number.
+    #[error(
+        "the recording has the damaged thermal state of the motor `{0}`; choose another recording"
+    )]
+    MotorThermal(String),
     /// The configuration cannot be written as TOML.
     #[error("the configuration cannot be written as TOML: {0}; report this with the configuration")]
     Text(String),

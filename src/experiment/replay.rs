@@ -128,8 +128,7 @@ impl Replay {
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
         Ok(Replay {
-            servo: servo(&plan.config, Box::new(rig), connections, correction)
-                .with_ramps(ramp_ticks),
+            servo: servo(plan, Box::new(rig), connections, correction).with_ramps(ramp_ticks),
             outside,
             feed,
             program: Some(plan.program()?),

@@ -12,10 +12,10 @@ use rtrb::Producer;
 
 use super::connections::{OutsideEnds, connect};
 use super::file_name;
-use super::plan::{KIND, Plan, RAMP_TICKS};
+use super::motor_start::MotorStart;
+use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, Plan, RAMP_TICKS};
 use super::run_error::RunError;
 use super::signals::{StopSignals, runtime};
-use crate::config::Config;
 use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
@@ -27,7 +27,7 @@ use crate::util::timestamp;
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
 /// Seconds that are recorded after the motor was switched off.
-const TAIL_S: f64 = 0.1;
+pub(super) const TAIL_S: f64 = 0.1;
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
@@ -43,6 +43,8 @@ pub struct Run {
     pub scheduling: Scheduling,
     /// Whether the operator or the system stopped it.
     pub stopped: bool,
+    /// The thermal state of the motor at its start.
+    pub motor: MotorStart,
     recorder: Recorder,
 }
 
@@ -84,6 +86,7 @@ struct PreparedRun {
     outside: OutsideEnds,
     pace: Pace,
     total_ticks: u64,
+    motor: MotorStart,
 }
 
 fn prepare_run(
@@ -107,6 +110,7 @@ fn prepare_run(
         outside,
         pace,
         total_ticks,
+        motor: plan.motor.clone(),
     })
 }
 
@@ -118,19 +122,21 @@ fn queue_start(requests: &mut Producer<Request>, program: Box<dyn Program>) {
     }
 }
 
-/// The loop of a configuration, with its interlocks and the correction of the calibration.
+/// The loop of a plan, with its interlocks, the heat of the motor and the correction of the calibration.
 pub(super) fn servo(
-    config: &Config,
+    plan: &Plan,
     rig: Box<dyn Rig>,
     connections: Connections,
     correction: Option<Correction>,
 ) -> Servo {
+    let config = &plan.config;
     let interlocks = Interlocks::new(
         &config.interlock,
         &config.amplifier,
         &config.motor,
         &config.servo,
-    );
+    )
+    .with_thermal_state(plan.motor.thermal_a2);
     Servo::new(rig, interlocks, connections).with_correction(correction)
 }
 
@@ -142,7 +148,7 @@ fn prepare_loop(
     ramp_ticks: u64,
 ) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
-    let servo = servo(config, rig, connections, plan.correction()).with_ramps(ramp_ticks);
+    let servo = servo(plan, rig, connections, plan.correction()).with_ramps(ramp_ticks);
     let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
     prepare(servo, &config.servo, pace, tail_ticks)
         .map_err(RunError::system("start the thread of the loop"))
@@ -204,6 +210,8 @@ fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String
         ("memory_locked", scheduling.memory_locked.to_string()),
         ("cpu", cpu),
         ("refused", scheduling.refused.join("\n")),
+        (MOTOR_THERMAL, plan.motor.thermal_a2.to_string()),
+        (MOTOR_KNOWN_FROM, plan.motor.known_from.clone()),
     ];
     let pairs = pairs.into_iter().chain(plan.devices.iter().cloned());
     pairs.map(|(key, value)| (key.to_string(), value)).collect()
@@ -242,6 +250,7 @@ impl PreparedRun {
             pace: self.pace,
             scheduling,
             stopped: supervisor.stopping != Stopping::No,
+            motor: self.motor,
             recorder,
         })
     }

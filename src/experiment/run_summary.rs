@@ -25,8 +25,21 @@ pub struct RunSummary {
     pub recording: String,
     /// Equal for two runs whose loops had the same input and output, bit for bit.
     pub loop_digest: String,
+    /// The thermal current of the motor at start and end.
+    pub motor: MotorRun,
     /// Pace, scheduling and timing of the loop.
     pub timing: TimingSummary,
+}
+
+/// The thermal current of the motor at the start and at the end of a run.
+#[derive(Clone, Debug, Serialize)]
+pub struct MotorRun {
+    /// At the start, in amperes.
+    pub thermal_start_a: f64,
+    /// At the end, in amperes.
+    pub thermal_end_a: f64,
+    /// How the state at the start was known.
+    pub known_from: String,
 }
 
 /// A trip of the interlocks.
@@ -86,6 +99,11 @@ impl RunSummary {
             lost_records: totals.lost_records.max(run.ended.lost_records),
             recording: run.path.display().to_string(),
             loop_digest: format!("{:016x}", totals.loop_digest),
+            motor: MotorRun {
+                thermal_start_a: run.motor.thermal_a2.sqrt(),
+                thermal_end_a: run.ended.thermal_a2.sqrt(),
+                known_from: run.motor.known_from.clone(),
+            },
             timing: TimingSummary {
                 pace: run.pace,
                 scheduling: run.scheduling.clone(),

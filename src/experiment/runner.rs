@@ -1,17 +1,23 @@
 //! Runs plans on a bench: opens the rig, applies the calibration, runs the loop, and reports progress.
 
+use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
+use bench_hal::Rig;
 use serde::Serialize;
 
 use super::error::ExperimentError;
 use super::loop_check::{Stage, closed_loop_of, require_margins};
+use super::motor_error::MotorError;
 use super::plan::Plan;
+use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
 use super::run::{Run, run};
+use super::run_error::RunError;
 use crate::config::Config;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::devices::{self, OpenRig};
+use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
 
@@ -24,17 +30,23 @@ pub struct Setup {
     pub simulate: bool,
     /// Whether a stored fault of the amplifier is cleared first. The operator confirms that its cause was removed.
     pub clear_fault: bool,
+    /// How the thermal state of the motor is treated.
+    pub motor: MotorHandling,
+    /// The clock between runs.
+    pub now: fn() -> Moment,
     /// Folder for the recordings.
     pub folder: PathBuf,
 }
 
 impl Setup {
-    /// The configured devices at their own pace.
+    /// The configured devices at their own pace. A run waits until the motor is cool enough.
     pub fn on_devices(folder: PathBuf) -> Setup {
         Setup {
             pace: Pace::Realtime,
             simulate: false,
             clear_fault: false,
+            motor: MotorHandling::WaitUntilCool,
+            now: Moment::now,
             folder,
         }
     }
@@ -45,6 +57,8 @@ impl Setup {
             pace: Pace::Virtual,
             simulate: true,
             clear_fault: false,
+            motor: MotorHandling::Simulated,
+            now: Moment::now,
             folder,
         }
     }
@@ -80,14 +94,22 @@ pub struct Runner {
     pub setup: Setup,
     /// Receives the progress of each run.
     pub progress: Progress,
+    /// The thermal state of the motor after the last run, in A^2; `None` before the first.
+    motor_a2: Cell<Option<f64>>,
 }
 
 impl Runner {
     /// A runner whose progress is not shown.
     pub fn new(setup: Setup) -> Runner {
+        Runner::with_progress(setup, Progress::default())
+    }
+
+    /// A runner that reports to `progress`.
+    pub fn with_progress(setup: Setup, progress: Progress) -> Runner {
         Runner {
             setup,
-            progress: Progress::default(),
+            progress,
+            motor_a2: Cell::new(None),
         }
     }
 
@@ -106,10 +128,59 @@ impl Runner {
         require_stable_loop(plan, self.setup.stage(&plan.config))?;
         let opened = self.setup.open(&plan.config)?;
         let plan = calibrated(plan, &opened, calibration)?;
+        let run = match self.setup.motor {
+            MotorHandling::Simulated => self.run_simulated_motor(plan, opened, phase),
+            MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
+                self.run_remembered_motor(plan, opened, phase)
+            }
+        }?;
+        self.motor_a2.set(Some(run.ended.thermal_a2));
+        Ok(run)
+    }
+
+    fn run_simulated_motor(
+        &self,
+        mut plan: Plan,
+        opened: OpenRig,
+        phase: &'static str,
+    ) -> Result<Run, ExperimentError> {
+        plan.motor = rested(&plan, self.motor_a2.get().unwrap_or(0.0))?;
+        Ok(self.run_loop(&plan, opened.rig, phase)?)
+    }
+
+    /// A run whose motor is known by a file. The later runs of a runner wait in any case: a command that has begun is not refused
+    /// in its middle.
+    fn run_remembered_motor(
+        &self,
+        mut plan: Plan,
+        opened: OpenRig,
+        phase: &'static str,
+    ) -> Result<Run, ExperimentError> {
+        let memory = MotorMemory::of(&plan.config).map_err(MotorError::from)?;
+        let motor = RememberedMotor {
+            memory,
+            amplifier: &opened.amplifier,
+            now: self.setup.now,
+        };
+        let is_later = self.motor_a2.get().is_some();
+        let waits = is_later || self.setup.motor == MotorHandling::WaitUntilCool;
+        plan.motor = motor.ready(&plan, waits, &self.progress)?;
+        motor.begin(&plan)?;
+        let result = self.run_loop(&plan, opened.rig, phase);
+        motor.end(&plan, &result);
+        Ok(result?)
+    }
+
+    fn run_loop(
+        &self,
+        plan: &Plan,
+        rig: Box<dyn Rig>,
+        phase: &'static str,
+    ) -> Result<Run, RunError> {
         self.progress.begin(phase, 0);
         let mut update = |done, total| self.progress.set(done, total);
         let (pace, folder) = (self.setup.pace, &self.setup.folder);
-        Ok(run(&plan, opened.rig, pace, folder, &mut update)?)
+        run(plan, rig, pace, folder, &mut update)
     }
 }
 

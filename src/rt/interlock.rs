@@ -95,6 +95,17 @@ impl Interlocks {
         }
     }
 
+    /// The interlocks with a motor that is warm from earlier runs: `thermal_a2` is its thermal state in A^2.
+    pub fn with_thermal_state(mut self, thermal_a2: f64) -> Self {
+        self.thermal_a2 = thermal_a2;
+        self
+    }
+
+    /// The thermal state of the motor in A^2: the low-pass filtered square of the current.
+    pub fn thermal_a2(&self) -> f64 {
+        self.thermal_a2
+    }
+
     /// Checks a reading. Runs in the tick: must not allocate or block.
     pub fn check_reading(&mut self, reading: &Reading, now: Tick) -> Result<(), Trip> {
         self.fresh.update(reading, self.last_command_a, now);

@@ -421,6 +421,11 @@ impl Servo {
         self.completed
     }
 
+    /// The thermal state of the motor in A^2.
+    pub fn thermal_a2(&self) -> f64 {
+        self.interlocks.thermal_a2()
+    }
+
     /// The connection to the recorder.
     pub fn publisher(&self) -> &Publisher {
         &self.connections.publisher

@@ -55,6 +55,8 @@ pub struct LoopOutcome {
     pub completed: bool,
     /// Records that did not fit into the ring.
     pub lost_records: u64,
+    /// The thermal state of the motor at the end, in A^2.
+    pub thermal_a2: f64,
 }
 
 /// A loop on its own thread, scheduled but waiting for [`PreparedLoop::begin`].
@@ -142,6 +144,7 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
         trip: servo.last_trip(),
         completed: servo.completed(),
         lost_records: servo.publisher().lost(),
+        thermal_a2: servo.thermal_a2(),
     }
 }
 

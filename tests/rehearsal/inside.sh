@@ -6,6 +6,7 @@ set -u
 out=$2
 here=$(dirname "$0")
 mkdir -p /tmp/bench && cp "$1" /tmp/bench/bench && cp "$here"/*.toml /tmp/bench/ && cd /tmp/bench || exit 1
+export XDG_STATE_HOME=/tmp/bench/state
 ip link add vcan0 type vcan && ip link set vcan0 up || exit 1
 
 # run NAME ARGUMENT...: a run of the bench; report, messages and exit code are stored under this name.
