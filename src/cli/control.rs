@@ -1,5 +1,7 @@
 //! `bench control`: run the closed loop with a reference.
 
+use std::path::Path;
+
 use serde::Serialize;
 
 use super::analysis_output;
@@ -80,11 +82,7 @@ fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, Cl
     let summary = RunSummary::of(run)?;
     let is_swept = plan.config.control.reference.is_swept();
     let measured = match summary.is_completed() && !is_swept {
-        true => tracking_metrics(
-            &Recording::open(&run.path)?,
-            &plan.config.control,
-            &plan.config.servo,
-        )?,
+        true => tracking(&run.path, &plan.config)?,
         false => None,
     };
     let made = match is_swept {
@@ -98,6 +96,16 @@ fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, Cl
         expected: plan.predicted_extremes,
         made,
     })
+}
+
+/// The measured tracking of a recorded run.
+fn tracking(path: &Path, config: &Config) -> Result<Option<TrackingMetrics>, CliError> {
+    let recording = Recording::open(path)?;
+    Ok(tracking_metrics(
+        &recording,
+        &config.control,
+        &config.servo,
+    )?)
 }
 
 /// The step by the linear model, if the reference is a step within the run.

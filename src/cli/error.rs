@@ -88,7 +88,14 @@ impl From<CampaignError> for CliError {
 impl CliError {
     /// The outcome of the command: wrong usage and refused settings are distinguished from failures at run time.
     pub fn outcome(&self) -> Outcome {
-        let is_failure = match self {
+        match self.is_failure() {
+            true => Outcome::Failed,
+            false => Outcome::Usage,
+        }
+    }
+
+    fn is_failure(&self) -> bool {
+        match self {
             CliError::Experiment(error) => is_failure(error),
             CliError::Identify(_) | CliError::Failed(_) => true,
             CliError::Table(error) => !matches!(error, ExternalCsvError::Columns(_)),
@@ -100,10 +107,6 @@ impl CliError {
                 matches!(error, StudyError::File { .. } | StudyError::Shards(_))
             }
             CliError::Usage(_) => false,
-        };
-        match is_failure {
-            true => Outcome::Failed,
-            false => Outcome::Usage,
         }
     }
 
@@ -147,12 +150,8 @@ fn experiment_kind(error: &ExperimentError) -> ErrorKind {
     match error {
         ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
         ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
-        ExperimentError::Plan(_)
-        | ExperimentError::Excitation(_)
-        | ExperimentError::Motor(MotorError::Warm { .. } | MotorError::Never { .. }) => {
-            ErrorKind::Plan
-        }
-        ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped) => ErrorKind::Failed,
+        ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
+        ExperimentError::Motor(error) => motor_kind(error),
         ExperimentError::Margin(_) => ErrorKind::Margin,
         ExperimentError::Plant(_) => ErrorKind::Model,
         ExperimentError::Devices(_) => ErrorKind::Devices,
@@ -162,6 +161,13 @@ fn experiment_kind(error: &ExperimentError) -> ErrorKind {
         ExperimentError::Run(_) | ExperimentError::Analysis(_) | ExperimentError::Failed(_) => {
             ErrorKind::Failed
         }
+    }
+}
+
+fn motor_kind(error: &MotorError) -> ErrorKind {
+    match error {
+        MotorError::Warm { .. } | MotorError::Never { .. } => ErrorKind::Plan,
+        MotorError::Memory(_) | MotorError::Stopped => ErrorKind::Failed,
     }
 }
 

@@ -62,14 +62,12 @@ impl Args {
     fn scales(&self) -> Result<Vec<f64>, CliError> {
         let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
-        let is_allowed = scales.iter().all(|scale| SCALES.contains(scale));
-        let is_rising = scales.windows(2).all(|pair| pair[0] < pair[1]);
-        if is_allowed && is_rising && (2..=MAX_AMPLITUDES).contains(&scales.len()) {
-            return Ok(scales);
+        match are_amplitudes(&scales) {
+            true => Ok(scales),
+            false => Err(CliError::Usage(format!(
+                "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios from 0.000001 to 1000000, for example 0.5,1,2"
+            ))),
         }
-        Err(CliError::Usage(format!(
-            "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios from 0.000001 to 1000000, for example 0.5,1,2"
-        )))
     }
 
     /// The settings with the planned amplitude.
@@ -143,6 +141,13 @@ fn expected_text(scale: f64, extremes: &Extremes) -> String {
     )
 }
 
+/// Whether sorted ratios are different, allowed, and of an allowed number.
+fn are_amplitudes(scales: &[f64]) -> bool {
+    let are_allowed = scales.iter().all(|scale| SCALES.contains(scale));
+    let are_rising = scales.windows(2).all(|pair| pair[0] < pair[1]);
+    are_allowed && are_rising && (2..=MAX_AMPLITUDES).contains(&scales.len())
+}
+
 /// Runs and analyses each amplitude, until a run fails.
 fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, CliError> {
     let Some(first) = plans.first() else {
@@ -151,17 +156,14 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let setup = args.run.setup(&first.config)?;
     let progress = Progress::new("linearity");
     let _line = ProgressLine::show(&progress);
+    let runner = Runner::with_progress(setup, progress);
     let mut runs = Vec::new();
-    linearity::run(
-        &Runner::with_progress(setup, progress),
-        plans,
-        &mut |plan, run| {
-            let finished = finish(plan, run)?;
-            let is_failed = finished.outcome() == Outcome::Failed;
-            runs.push(finished);
-            Ok::<bool, CliError>(!is_failed)
-        },
-    )?;
+    linearity::run(&runner, plans, &mut |plan, run| {
+        let finished = finish(plan, run)?;
+        let is_failed = finished.outcome() == Outcome::Failed;
+        runs.push(finished);
+        Ok::<bool, CliError>(!is_failed)
+    })?;
     Ok(runs)
 }
 

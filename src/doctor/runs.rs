@@ -66,23 +66,32 @@ pub fn kinds(config: &Config) -> Finding {
 
 /// Evaluates the checks; `min_modulus_margin` is the configured limit.
 pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
-    let chirp = match &checks.chirp {
+    [
+        chirp_finding(checks),
+        control_finding(checks, min_modulus_margin),
+    ]
+}
+
+fn chirp_finding(checks: &RunChecks) -> Finding {
+    match &checks.chirp {
         Ok(travel_m) => Subject::Chirp.ok(format!("predicted travel {:.0} um", travel_m * 1e6)),
         Err(why) => refused(
             Subject::Chirp,
             why,
             "correct the settings of [chirp], or give options to `bench chirp`",
         ),
-    };
-    let control = match &checks.control {
+    }
+}
+
+fn control_finding(checks: &RunChecks, min_modulus_margin: f64) -> Finding {
+    match &checks.control {
         Ok(margins) => accepted_loop(margins, min_modulus_margin),
         Err(why) => refused(
             Subject::Control,
             why,
             "correct the settings of [control], or give options to `bench control`",
         ),
-    };
-    [chirp, control]
+    }
 }
 
 /// The finding for a loop that `bench control` accepts.

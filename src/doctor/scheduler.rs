@@ -105,12 +105,16 @@ fn processor(facts: &SchedulerFacts) -> Option<Finding> {
         let what = format!("the loop can be bound to processor {cpu}");
         return Some(Subject::Processor.ok(what));
     }
-    let allowed: Vec<String> = facts.allowed.iter().map(usize::to_string).collect();
-    let allowed = allowed.join(", ");
+    let allowed = listed(&facts.allowed);
     Some(Subject::Processor.warning(
         format!("loop.cpu is {cpu}, this process may use {allowed}"),
         "choose one of these in loop.cpu, or extend the affinity of the process (taskset, CPUAffinity= of the service)",
     ))
+}
+
+fn listed(processors: &[usize]) -> String {
+    let numbers: Vec<String> = processors.iter().map(usize::to_string).collect();
+    numbers.join(", ")
 }
 
 fn yes_or_no(value: bool) -> &'static str {

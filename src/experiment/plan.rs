@@ -7,7 +7,7 @@ use std::path::Path;
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
 use super::{reference_check, swept_reference};
-use crate::config::{self, Config, PlantSettings, whole};
+use crate::config::{self, CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
 use crate::model::plant::{self, ModalModel};
@@ -179,10 +179,7 @@ impl Plan {
             RunKind::Calibrate => {
                 Box::new(Excite(Staircase::new(&config.calibrate.steps(), period_s)))
             }
-            RunKind::Quiet => {
-                let (settle_s, average_s) = (config.campaign.settle_s, config.campaign.average_s);
-                Box::new(Excite(ZeroCurrent::new(settle_s, average_s, period_s)))
-            }
+            RunKind::Quiet => Box::new(Excite(zero_current(&config.campaign, period_s))),
         })
     }
 
@@ -240,6 +237,10 @@ impl Plan {
         let present = present.filter_map(|(name, media, text)| Some((name, media, text?)));
         Ok(present.collect())
     }
+}
+
+fn zero_current(campaign: &CampaignSettings, period_s: f64) -> ZeroCurrent {
+    ZeroCurrent::new(campaign.settle_s, campaign.average_s, period_s)
 }
 
 /// Three periods of the first mode of the model in seconds, at most [`LONGEST_RAMP_S`]. A free body is not a mode.

@@ -5,8 +5,8 @@
 use super::plan_error::PlanError;
 use super::swept_reference::closed_loop;
 use crate::config::Config;
-use crate::control::ControllerText;
-use crate::excitation::{Extremes, Limits, ReferenceContext};
+use crate::control::{ClosedLoop, ControllerText};
+use crate::excitation::{Extremes, Limits, Reference, ReferenceContext};
 
 /// Largest number of predicted ticks: 400 s at 5 kHz. Beyond it only the interlocks check the current.
 const PREDICTED_TICKS: u64 = 2_000_000;
@@ -29,8 +29,17 @@ pub(super) fn check(
     if !closed_loop.is_stable() {
         return Ok(());
     }
-    let reference = design.build(&context)?;
     let ticks = context.ticks(config.control.duration_s);
+    check_loop(config, &closed_loop, &*design.build(&context)?, ticks)
+}
+
+/// Refuses a reference with which the loop would trip an interlock within `ticks`.
+fn check_loop(
+    config: &Config,
+    closed_loop: &ClosedLoop,
+    reference: &dyn Reference,
+    ticks: u64,
+) -> Result<(), PlanError> {
     let ticks = ticks.min(PREDICTED_TICKS) as usize;
     let signals = closed_loop.signals(ticks, |tick| reference.at_m(tick as u64));
     let limits = without_slew(config.excitation_limits());

@@ -198,7 +198,6 @@ fn create_folder(folder: &Path) -> Result<(), RunError> {
 }
 
 fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String, String> {
-    let cpu = scheduling.cpu.map_or("any".into(), |cpu| cpu.to_string());
     let pairs = [
         (KIND, plan.kind.name().to_string()),
         ("program", format!("bench {}", env!("CARGO_PKG_VERSION"))),
@@ -206,15 +205,23 @@ fn metadata(plan: &Plan, pace: Pace, scheduling: &Scheduling) -> BTreeMap<String
         ("host", kernel_parameter("hostname")),
         ("kernel", kernel_parameter("osrelease")),
         ("pace", pace.name().into()),
+        (MOTOR_THERMAL, plan.motor.thermal_a2.to_string()),
+        (MOTOR_KNOWN_FROM, plan.motor.known_from.clone()),
+    ];
+    let devices = plan.devices.iter().cloned();
+    let pairs = pairs.into_iter().chain(of_scheduling(scheduling));
+    let pairs = pairs.chain(devices);
+    pairs.map(|(key, value)| (key.to_string(), value)).collect()
+}
+
+fn of_scheduling(scheduling: &Scheduling) -> [(&'static str, String); 4] {
+    let cpu = scheduling.cpu.map_or("any".into(), |cpu| cpu.to_string());
+    [
         ("policy", scheduling.policy.clone()),
         ("memory_locked", scheduling.memory_locked.to_string()),
         ("cpu", cpu),
         ("refused", scheduling.refused.join("\n")),
-        (MOTOR_THERMAL, plan.motor.thermal_a2.to_string()),
-        (MOTOR_KNOWN_FROM, plan.motor.known_from.clone()),
-    ];
-    let pairs = pairs.into_iter().chain(plan.devices.iter().cloned());
-    pairs.map(|(key, value)| (key.to_string(), value)).collect()
+    ]
 }
 
 fn kernel_parameter(name: &str) -> String {

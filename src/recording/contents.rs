@@ -6,9 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use mcap::parse_record;
 use mcap::records::{Channel, Metadata, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{McapError, parse_record};
 
 use super::{METADATA_RECORD, Topic, error};
 
@@ -315,14 +315,8 @@ fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
     if !attachment_is_framed(data) {
         return Err("an attachment shorter than its own header".into());
     }
-    let failed = |error| {
-        format!(
-            "attachment {}: {}",
-            attachment_name(data),
-            error::why(&error)
-        )
-    };
-    match parse_record(op::ATTACHMENT, data).map_err(failed)? {
+    let record = parse_record(op::ATTACHMENT, data);
+    match record.map_err(|error| attachment_text(data, &error))? {
         Record::Attachment { crc: 0, .. } => Err("an attachment without a CRC".into()),
         Record::Attachment { header, data, .. } => take(Part::Attachment {
             name: header.name,
@@ -331,6 +325,14 @@ fn attachment(data: &[u8], take: &mut Take) -> Result<(), String> {
         }),
         _ => Ok(()),
     }
+}
+
+fn attachment_text(data: &[u8], error: &McapError) -> String {
+    format!(
+        "attachment {}: {}",
+        attachment_name(data),
+        error::why(error)
+    )
 }
 
 /// An attachment consists of two times (u64), name and media type (each with its length u32), the length of the content (u64),

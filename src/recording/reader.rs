@@ -74,13 +74,7 @@ impl Recording {
         refuse_other_program(&file, path)?;
         let mut walk = Walk::new(file);
         let mut found = RecordingContents::default();
-        let stop = loop {
-            match walk.step(&mut |part| found.take(part)) {
-                Ok(true) => {}
-                Ok(false) => break None,
-                Err(stop) => break Some(stop),
-            }
-        };
+        let stop = read_to_end(&mut walk, &mut found).err();
         let cut = stop.map(|stop| judge(path, stop, walk.offset, &found));
         let cut = cut.transpose()?;
         let emptiness = match cut {
@@ -112,6 +106,15 @@ impl Recording {
         if found.account().ticks() == 0 && !scanner.has_magic {
             return Err(RecordingError::NotMcap { path: path.into() });
         }
+        Recording::salvaged(path, scanner, found)
+    }
+
+    /// The recording of a scanned file.
+    fn salvaged(
+        path: &Path,
+        scanner: Scanner,
+        found: RecordingContents,
+    ) -> Result<Recording, RecordingError> {
         let emptiness = match (&scanner.cut, scanner.damage.as_slice()) {
             (Some(_), []) => Emptiness::CutOff,
             (None, []) => Emptiness::Complete,
@@ -391,6 +394,12 @@ fn open(path: &Path) -> Result<File, RecordingError> {
             source,
         },
     })
+}
+
+/// Walks to the end of the file, or to where it cannot be read.
+fn read_to_end(walk: &mut Walk, found: &mut RecordingContents) -> Result<(), Stop> {
+    while walk.step(&mut |part| found.take(part))? {}
+    Ok(())
 }
 
 /// The cut at which a walk ended early, or why the file cannot be used.

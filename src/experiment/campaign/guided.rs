@@ -283,16 +283,20 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
 
     fn store(&mut self, point: GridPoint, result: PointResult) -> Result<PointEnd, CampaignError> {
         self.rig.store(point, &result)?;
-        let check = result.load_check.as_ref();
-        let load = match check.map(|check| (check.finding(), check.confirmed_by_hand)) {
-            Some((_, true)) => "load confirmed by hand",
-            Some((Finding::Holds, _)) => "load verified",
-            _ => "all checks agree with the load, but none of them can distinguish it from no load",
-        };
-        let cnmp = result.cnmp.name();
+        let (cnmp, load) = (result.cnmp.name(), load_text(&result));
         self.operator
             .report(&format!("stored: CNMP zeros {cnmp}; {load}"));
         Ok(PointEnd::Kept)
+    }
+}
+
+/// How the load of a stored point is known.
+fn load_text(result: &PointResult) -> &'static str {
+    let check = result.load_check.as_ref();
+    match check.map(|check| (check.finding(), check.confirmed_by_hand)) {
+        Some((_, true)) => "load confirmed by hand",
+        Some((Finding::Holds, _)) => "load verified",
+        _ => "all checks agree with the load, but none of them can distinguish it from no load",
     }
 }
 

@@ -210,19 +210,23 @@ fn check_header(path: &Path, folder: &Path, stored: &str, ours: &str) -> Result<
         path: path.display().to_string(),
         why,
     })?;
-    let mut differences = differences(stored, ours);
-    if differences.is_empty() {
-        return Ok(());
+    match differences(stored, ours) {
+        differences if differences.is_empty() => Ok(()),
+        differences => Err(CampaignError::OtherSettings {
+            folder: folder.display().to_string(),
+            differences: shortened(differences),
+        }),
     }
+}
+
+/// The first [`MAX_DIFFERENCES`] lines, and the number of the others.
+fn shortened(mut differences: Vec<String>) -> Vec<String> {
     let more = differences.len().saturating_sub(MAX_DIFFERENCES);
     differences.truncate(MAX_DIFFERENCES);
     if more > 0 {
         differences.push(format!("  and {more} more"));
     }
-    Err(CampaignError::OtherSettings {
-        folder: folder.display().to_string(),
-        differences,
-    })
+    differences
 }
 
 fn check_format(stored: &str) -> Result<(), String> {

@@ -193,36 +193,44 @@ pub fn load_calibration(
     let Some(file) = &settings.file else {
         return Ok(None);
     };
-    let calibration = read(file, settings, config.interlock.current_error_a)?;
+    let calibration = read(file, config)?;
+    let expired = expired(file, &calibration, settings.valid_days, now)?;
+    let other_device = other_device(&calibration, devices);
+    Ok(Some(LoadedCalibration {
+        warnings: warnings(file, settings, expired, other_device)?,
+        file: file.clone(),
+        calibration,
+    }))
+}
+
+/// The warnings for the defects of a calibration that the configuration accepts.
+fn warnings(
+    file: &str,
+    settings: &CalibrationSettings,
+    expired: Option<String>,
+    other_device: Option<String>,
+) -> Result<Vec<String>, CalibrationError> {
     let expired = Check {
         file,
         setting: "calibration.when_expired",
         reaction: settings.when_expired,
-        defect: expired(file, &calibration, settings.valid_days, now)?,
+        defect: expired,
     };
     let other_device = Check {
         file,
         setting: "calibration.when_other_devices",
         reaction: settings.when_other_devices,
-        defect: other_device(&calibration, devices),
+        defect: other_device,
     };
     let warnings = [expired.warning()?, other_device.warning()?];
-    Ok(Some(LoadedCalibration {
-        file: file.clone(),
-        calibration,
-        warnings: warnings.into_iter().flatten().collect(),
-    }))
+    Ok(warnings.into_iter().flatten().collect())
 }
 
 /// The calibration in a file, if its values allow a run.
-fn read(
-    file: &str,
-    settings: &CalibrationSettings,
-    current_error_a: f64,
-) -> Result<Calibration, CalibrationError> {
+fn read(file: &str, config: &Config) -> Result<Calibration, CalibrationError> {
     let text = config::text_of_file(file, "calibration")?;
     let calibration: Calibration = config::typed(file, &text)?;
-    match calibration.check(settings, current_error_a) {
+    match calibration.check(&config.calibration, config.interlock.current_error_a) {
         Ok(()) => Ok(calibration),
         Err(defect) => Err(CalibrationError::Defect {
             file: file.into(),
