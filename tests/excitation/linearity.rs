@@ -286,8 +286,8 @@ fn rejects_invalid_scales_and_amplitudes_beyond_an_interlock_before_any_motion()
         ),
         ("--scales 1", &["--scales", "two to 10 different"]),
         ("--scales 1,1", &["--scales", "0.5,1,2"]),
-        ("--scales 0,1", &["--scales", "above 0"]),
-        ("--scales -1,1", &["--scales", "above 0"]),
+        ("--scales 0,1", &["--scales", "from 0.000001 to 1000000"]),
+        ("--scales -1,1", &["--scales", "from 0.000001 to 1000000"]),
         ("--scales 1,NaN", &["--scales", "not a number"]),
         ("--scales one", &["--scales", "not a number"]),
     ] {
