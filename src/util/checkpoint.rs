@@ -10,10 +10,12 @@
 
 use std::fmt;
 use std::fs::{File, TryLockError};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
 use serde_json::Value;
+
+use super::input_file::{self, MAX_RECORD_BYTES};
 
 /// The step that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,13 +157,10 @@ pub struct RecordFile {
 impl RecordFile {
     /// Opens or creates a file, locks it, and returns its content as it is.
     pub fn open(path: &Path, header: String) -> Result<(RecordFile, Vec<u8>), FileError> {
-        let mut options = File::options();
-        options.read(true).write(true).create(true).truncate(false);
-        let mut file = options
-            .open(path)
+        let file = input_file::open_or_create(path)
             .map_err(|e| FileError::new(FileAction::Open, path, &e))?;
         lock(&file, path)?;
-        let content = read(&mut file, path)?;
+        let content = read(&file, path)?;
         let path = path.display().to_string();
         Ok((RecordFile { file, path, header }, content))
     }
@@ -213,16 +212,14 @@ impl RecordFile {
 
 /// The content of a file of records that another process may be reading as well.
 pub fn read_records(path: &Path) -> Result<Vec<u8>, FileError> {
-    let mut file = File::open(path).map_err(|e| FileError::new(FileAction::Open, path, &e))?;
+    let file = input_file::open(path).map_err(|e| FileError::new(FileAction::Open, path, &e))?;
     lock_for_reading(&file, path)?;
-    read(&mut file, path)
+    read(&file, path)
 }
 
-fn read(file: &mut File, path: &Path) -> Result<Vec<u8>, FileError> {
-    let mut content = Vec::new();
-    file.read_to_end(&mut content)
-        .map_err(|e| FileError::new(FileAction::Read, path, &e))?;
-    Ok(content)
+fn read(file: &File, path: &Path) -> Result<Vec<u8>, FileError> {
+    input_file::read_open(file, MAX_RECORD_BYTES)
+        .map_err(|e| FileError::new(FileAction::Read, path, &e))
 }
 
 /// The lines of a file of records.

@@ -2,7 +2,7 @@
 //!
 //! A FIFO would block the program until somebody writes to it, and a device such as `/dev/zero` never ends.
 
-use std::fs::{File, FileType};
+use std::fs::{File, FileType, OpenOptions};
 use std::io::{Error, ErrorKind, Read};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::Path;
@@ -19,10 +19,22 @@ pub const MAX_RECORD_BYTES: u64 = 1 << 30;
 /// # Errors
 /// Those of the file system; if the file is a folder, a FIFO, a socket or a device.
 pub fn open(path: &Path) -> std::io::Result<File> {
-    // Without this flag a FIFO without a writer would block here.
+    regular(File::options().read(true), path)
+}
+
+/// Opens a regular file for reading and writing, and creates it if it does not exist.
+///
+/// # Errors
+/// Those of [`open`].
+pub fn open_or_create(path: &Path) -> std::io::Result<File> {
     let mut options = File::options();
-    let file = options.read(true).custom_flags(libc::O_NONBLOCK);
-    let file = file.open(path)?;
+    options.read(true).write(true).create(true).truncate(false);
+    regular(&mut options, path)
+}
+
+fn regular(options: &mut OpenOptions, path: &Path) -> std::io::Result<File> {
+    // Without this flag a FIFO without a writer would block here.
+    let file = options.custom_flags(libc::O_NONBLOCK).open(path)?;
     let kind = file.metadata()?.file_type();
     match kind.is_file() {
         true => Ok(file),
@@ -35,9 +47,17 @@ pub fn open(path: &Path) -> std::io::Result<File> {
 /// # Errors
 /// Those of [`open`]; if the file is larger.
 pub fn read(path: &Path, max_bytes: u64) -> std::io::Result<Vec<u8>> {
+    read_open(&open(path)?, max_bytes)
+}
+
+/// The rest of an open file, at most `max_bytes`.
+///
+/// # Errors
+/// Those of the file system; if there are more bytes.
+pub fn read_open(file: &File, max_bytes: u64) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // One byte more shows that the file is too large, even if it grows meanwhile.
-    open(path)?.take(max_bytes + 1).read_to_end(&mut bytes)?;
+    file.take(max_bytes + 1).read_to_end(&mut bytes)?;
     match bytes.len() as u64 > max_bytes {
         true => Err(refused(format!(
             "it is larger than the limit of {max_bytes} bytes for such a file"

@@ -18,6 +18,7 @@ use super::point::PointResult;
 use crate::config::Config;
 use crate::util::atomic_file::write_durable;
 use crate::util::checkpoint::{FileAction, checksum, differences, lock};
+use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
 
 const FORMAT: &str = "bench campaign 1";
 /// Largest number of differences that are listed.
@@ -169,7 +170,7 @@ impl Store {
 
     /// The result of a point, if it exists; or why its file is ignored.
     fn read(&self, point: GridPoint) -> Result<Option<StoredPoint>, String> {
-        let text = match std::fs::read_to_string(self.path(point)) {
+        let text = match input_file::read_text(&self.path(point), MAX_SETTINGS_BYTES) {
             Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
             text => text.map_err(|e| format!("cannot be read ({e})"))?,
         };
@@ -197,7 +198,7 @@ fn write(path: &Path, text: &str) -> Result<(), CampaignError> {
 
 fn check_or_write_header(folder: &Path, header: &str) -> Result<(), CampaignError> {
     let path = folder.join("campaign.json");
-    match std::fs::read_to_string(&path) {
+    match input_file::read_text(&path, MAX_SETTINGS_BYTES) {
         Ok(stored) => check_header(&path, folder, &stored, header),
         Err(e) if e.kind() == ErrorKind::NotFound => write(&path, header),
         Err(e) => Err(file_error(FileAction::Read, &path, &e)),
