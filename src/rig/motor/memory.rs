@@ -8,6 +8,8 @@ use super::moment::Moment;
 use super::thermal::ThermalModel;
 use crate::config::{AmplifierSettings, Config, MotorSettings};
 use crate::util::atomic_file::write_durable;
+use crate::util::checkpoint::checksum;
+use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
 
 /// A file of the motor that cannot be used. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
@@ -57,6 +59,40 @@ struct Entry {
     amplifier: Option<String>,
     force_constant_n_per_a: f64,
     thermal_time_constant_s: f64,
+    /// CRC-32 of the entry with this text empty.
+    #[serde(default)]
+    checksum: String,
+}
+
+impl Entry {
+    /// The text of the file.
+    fn text_with_checksum(&self) -> serde_json::Result<String> {
+        let complete = Entry {
+            checksum: self.content_checksum()?,
+            ..self.clone()
+        };
+        complete.text()
+    }
+
+    fn text(&self) -> serde_json::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// CRC-32 of the text without the checksum itself.
+    fn content_checksum(&self) -> serde_json::Result<String> {
+        let content = Entry {
+            checksum: String::new(),
+            ..self.clone()
+        };
+        Ok(checksum(&[&content.text()?]))
+    }
+
+    /// The entry in a text, if its checksum is right.
+    fn verified(text: &str) -> Option<Entry> {
+        let entry: Entry = serde_json::from_str(text).ok()?;
+        let expected = entry.content_checksum().ok()?;
+        (entry.checksum == expected).then_some(entry)
+    }
 }
 
 /// The thermal state of the motor at a moment.
@@ -160,6 +196,7 @@ impl MotorMemory {
             amplifier: None,
             force_constant_n_per_a: self.motor.force_constant_n_per_a,
             thermal_time_constant_s: self.motor.thermal_time_constant_s,
+            checksum: String::new(),
         }
     }
 
@@ -168,21 +205,24 @@ impl MotorMemory {
             path: self.path.display().to_string(),
             why,
         };
-        let text = serde_json::to_string_pretty(entry).map_err(|e| refused(e.to_string()))?;
+        let text = entry
+            .text_with_checksum()
+            .map_err(|e| refused(e.to_string()))?;
         if let Some(folder) = self.path.parent() {
             std::fs::create_dir_all(folder).map_err(|e| refused(e.to_string()))?;
         }
-        write_durable(&self.path, &(text + "\n")).map_err(|e| refused(e.to_string()))
+        write_durable(&self.path, &text).map_err(|e| refused(e.to_string()))
     }
 
     /// The stored entry of this motor and amplifier, or why there is none.
     fn entry(&self, amplifier: Option<&str>) -> Result<Entry, String> {
         let path = self.path.display();
-        let text = std::fs::read_to_string(&self.path).map_err(|error| match error.kind() {
+        let text = input_file::read_text(&self.path, MAX_SETTINGS_BYTES);
+        let text = text.map_err(|error| match error.kind() {
             std::io::ErrorKind::NotFound => format!("no earlier run is stored in {path}"),
             _ => format!("{path} cannot be read: {error}"),
         })?;
-        let entry: Entry = serde_json::from_str(&text).map_err(|_| format!("{path} is damaged"))?;
+        let entry = Entry::verified(&text).ok_or_else(|| format!("{path} is damaged"))?;
         self.check(&entry, amplifier)?;
         Ok(entry)
     }
@@ -307,6 +347,7 @@ mod tests {
             String::new(),
             good[..good.len() / 2].into(),
             good.replace("3.0", "-3.0"),
+            good.replace("3.0", "2.0"),
             good.replace("3.0", "null"),
             good.replace("3.0", "1e999"),
             good.replace("thermal_a2", "thermal_a3"),
