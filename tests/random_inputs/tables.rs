@@ -1,0 +1,72 @@
+//! CSV files: frequency responses, external records, references.
+
+use std::path::Path;
+
+use bench::identify::external_csv::{self, Columns, Sampling};
+use bench::identify::frf_csv;
+
+use crate::damage::{check_damaged, check_damaged_text};
+
+const FRF: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz\n\
+1.0,1e-4,-10.0,0.99,1e-7,0.1,0.5\n2.0,2e-4,-20.0,0.98,1e-7,0.1,0.5\n3.5,1e-3,-90.0,0.97,1e-7,0.1,0.5\n";
+
+#[test]
+fn damaged_frequency_response_is_refused_or_finite_with_rising_frequencies() {
+    let valid = FRF.replacen(FRF.lines().next().unwrap_or_default(), frf_csv::HEADER, 1);
+    check_damaged_text("frequency response", &[&valid], |text| {
+        let Ok(frf) = frf_csv::from_str(text) else {
+            return false;
+        };
+        assert!(frf.frequency_hz.is_sorted_by(|a, b| a < b));
+        assert!(frf.frequency_hz.iter().all(|x| x.is_finite()));
+        assert!(
+            frf.response
+                .iter()
+                .all(|x| x.re.is_finite() && x.im.is_finite())
+        );
+        assert!(frf.coherence.iter().all(|x| x.is_finite()));
+        assert!(frf.len() < text.lines().count());
+        true
+    });
+}
+
+/// The rows of a table as another reader sees them: numbers separated by commas.
+fn naive_rows(text: &str) -> usize {
+    text.lines()
+        .skip(1)
+        .filter(|line| !line.trim().is_empty())
+        .count()
+}
+
+fn external(path: &Path, bytes: &[u8], columns: &Columns) -> bool {
+    std::fs::write(path, bytes).expect("a file");
+    let Ok(signals) = external_csv::read(path, columns) else {
+        return false;
+    };
+    assert!(signals.rate_hz > 0.0 && signals.rate_hz.is_finite());
+    assert_eq!(signals.input_a.len(), signals.output_m.len());
+    let values = signals.input_a.iter().chain(&signals.output_m);
+    assert!(values.clone().all(|x| x.is_finite()));
+    assert!(
+        signals.input_a.len() <= naive_rows(&String::from_utf8_lossy(bytes).replace('\r', "\n"))
+    );
+    true
+}
+
+#[test]
+fn damaged_external_record_is_refused_or_finite() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.csv");
+    let valid = "t,x,y\n0.0,1.0,2.0\n0.001,1.5,2.5\n0.002,-1.0,1e-3\n0.003,0.25,-4\n";
+    let columns = |sampling| Columns {
+        input: "x".into(),
+        output: "y".into(),
+        sampling,
+    };
+    let timed = columns(Sampling::TimeColumn("t".into()));
+    let at_rate = columns(Sampling::RateHz(1000.0));
+    check_damaged("external record", &[valid.as_bytes()], |bytes| {
+        let is_timed = external(&path, bytes, &timed);
+        external(&path, bytes, &at_rate) || is_timed
+    });
+}
