@@ -1,0 +1,75 @@
+"""Compares the lateness of the loop with that of cyclictest, in one go.
+
+    python3 benches/lateness_cyclictest.py [SECONDS] [BENCH]
+
+For 1, 2 and 5 kHz, the loop of `bench control` on the simulated stage and cyclictest (Debian package rt-tests) run in
+turns, ROUNDS of each, with SCHED_FIFO 80, locked memory and SECONDS (default 300) in total each. Lateness is the time from the
+scheduled to the actual wake-up. The rounds of the loop are joined by their largest quantile, those of cyclictest by their
+common histogram. Prints p50, p99 and maximum in microseconds, and the ratios.
+"""
+
+import json
+import re
+import subprocess
+import sys
+import tempfile
+
+RATES_HZ = (1000, 2000, 5000)
+ROUNDS = 3
+SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 300.0
+BENCH = sys.argv[2] if len(sys.argv) > 2 else "target/release/bench"
+PRIORITY = 80
+
+
+def bench_round(rate_hz, seconds, folder):
+    """p50, p99 and maximum of the loop in microseconds, and how it was scheduled."""
+    command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", f"{seconds}s", "--json", "--out", folder]
+    command += ["--set", f"loop.rate_hz={rate_hz}", "--set", f"loop.priority={PRIORITY}"]
+    answer = subprocess.run(command, capture_output=True, text=True)
+    if answer.returncode not in (0, 3):  # 3: ticks were missed
+        sys.exit(f"{' '.join(command)}\n{answer.stdout}{answer.stderr}")
+    result = json.loads(answer.stdout)
+    lateness = result["timing"]["lateness_ns"]
+    return [lateness[name] / 1e3 for name in ("p50", "p99", "max")], result["timing"]["scheduling"]
+
+
+def cyclictest_round(rate_hz, seconds):
+    """Histogram {microseconds: count} and maximum of cyclictest."""
+    period_us = round(1e6 / rate_hz)
+    command = ["cyclictest", "--mlockall", f"--priority={PRIORITY}", "--threads=1", f"--interval={period_us}"]
+    command += [f"--loops={round(seconds * rate_hz)}", "--quiet", "--histogram=20000"]
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    counts = {int(us): int(n) for us, n in re.findall(r"^(\d+)\s+(\d+)$", output, re.MULTILINE) if int(n)}
+    maximum = int(re.search(r"Max Latencies:\s*(\d+)", output).group(1))
+    return counts, maximum
+
+
+def quantile(counts, share):
+    """The value below which a share of the counts lies, in the middle of its bin of one microsecond."""
+    wanted, seen = share * sum(counts.values()), 0
+    for value in sorted(counts):
+        seen += counts[value]
+        if seen >= wanted:
+            return value + 0.5
+    raise ValueError("no counts")
+
+
+def compare(rate_hz, folder):
+    ours, counts, maximum = [], {}, 0
+    for _ in range(ROUNDS):
+        figures, scheduling = bench_round(rate_hz, SECONDS / ROUNDS, folder)
+        ours.append(figures)
+        histogram, largest = cyclictest_round(rate_hz, SECONDS / ROUNDS)
+        maximum = max(maximum, largest)
+        for value, count in histogram.items():
+            counts[value] = counts.get(value, 0) + count
+    ours = [max(column) for column in zip(*ours)]
+    theirs = [quantile(counts, 0.5), quantile(counts, 0.99), maximum]
+    for name, a, b in zip(("p50", "p99", "max"), ours, theirs):
+        print(f"{rate_hz:5d} Hz  {name:4s} loop {a:9.1f} us   cyclictest {b:9.1f} us   ratio {a / b:.2f}", flush=True)
+    return scheduling
+
+
+with tempfile.TemporaryDirectory() as folder:
+    for rate_hz in RATES_HZ:
+        print(f"        scheduling of the loop: {compare(rate_hz, folder)}", flush=True)
