@@ -8,7 +8,7 @@ use bench::excitation::Reference;
 use bench::model::plant::{ModalModel, build};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program, ProgramInput};
-use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 
 /// Position and velocity of the first driven mode are observed; the error is integrated.
 struct StateFeedback {
@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let mut program = Control::new(Box::new(law), Box::new(Step), 2500, 10_000);
     let mut rig = SimulatedRig::new(&config)?;
-    rig.enable()?;
+    blocking::enable(&mut rig, std::thread::sleep)?;
     let (mut now, mut input, mut error_m) = (Tick::default(), ProgramInput::default(), f64::NAN);
     for tick in 0..program.ticks() {
         (now.number, now.scheduled_ns) = (tick, (tick as f64 * period_s * 1e9) as u64);

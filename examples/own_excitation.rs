@@ -8,7 +8,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Excite, Program, ProgramInput};
-use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 
 /// Pulses of alternating sign, each 1 ms long, their size halved from pulse to pulse.
 struct Pulses {
@@ -66,7 +66,7 @@ fn run(config: &Config) -> Result<(Vec<f64>, Vec<f64>), Box<dyn std::error::Erro
     let (mut now, mut input) = (Tick::default(), ProgramInput::default());
     let refused = |trip: Trip| trip.to_string();
     let (mut positions_m, mut commands_a) = (Vec::new(), Vec::new());
-    rig.enable()?;
+    blocking::enable(&mut rig, std::thread::sleep)?;
     for number in 0..program.ticks() {
         (now.number, now.scheduled_ns) = (number, number * period_ns);
         let reading = rig.latest(now);

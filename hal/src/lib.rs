@@ -11,15 +11,17 @@
 //! | [`explain`](CurrentAmplifier::explain) | every tick in which `status` is a fault | no | no |
 //! | [`command`](CurrentAmplifier::command) | every tick while armed, after the interlocks and the control law | no | no |
 //! | [`disable`](CurrentAmplifier::disable) | in the tick at a stop or a trip, and when the loop ends | no | no |
-//! | [`enable`](CurrentAmplifier::enable) | in the tick that takes the request to arm | yes | yes |
-//! | [`reset_fault`](CurrentAmplifier::reset_fault) | in the tick that takes the request to clear a trip | yes | yes |
+//! | [`begin_enable`](CurrentAmplifier::begin_enable) | once, after the request to arm | no | no |
+//! | [`poll_enable`](CurrentAmplifier::poll_enable) | every tick from then on, until the result | no | no |
+//! | [`begin_reset`](CurrentAmplifier::begin_reset) | once, after the request to clear a trip | no | no |
+//! | [`poll_reset`](CurrentAmplifier::poll_reset) | every tick from then on, until the result | no | no |
 //!
 //! "May block: no" excludes locks, sleeping, printing, and waiting for a device. A system call that returns at once, such as a
 //! write to a non-blocking socket, is permitted. A slow device is read by its own thread; `latest` returns the newest
 //! value with its age.
 //!
-//! `enable` and `reset_fault` may block until the time limit of the driver. The amplifier gives no current meanwhile, no tick
-//! is executed, and the loop restarts its schedule afterwards, so that the delay does not count as missed ticks.
+//! Nothing in the loop waits for a device: enabling and resetting begin in one tick and end in a later one, within the time
+//! limit of the driver. The amplifier gives no current meanwhile. Callers outside the loop use [`blocking`].
 //!
 //! # Rules for a driver
 //!
@@ -32,10 +34,12 @@
 #![warn(missing_docs)]
 #![deny(unsafe_code)]
 
+pub mod blocking;
 pub mod can;
 pub mod serial;
 
 use std::fmt;
+use std::task::Poll;
 
 /// The scheduled time of a tick. The loop gets the time only in this form, so that simulation, hardware and replay run the
 /// same code.
@@ -121,11 +125,21 @@ impl std::error::Error for DeviceError {}
 
 /// A current amplifier.
 pub trait CurrentAmplifier: Send {
-    /// Prepares the amplifier to follow commands; the current stays zero.
+    /// Begins to prepare the amplifier to follow commands; the current stays zero.
     ///
-    /// Called in the thread of the loop when it is armed. May allocate, and may block until the time limit of the driver: for a
-    /// CANopen drive `state_timeout` (2 s by default), for a VESC `status_timeout`.
-    fn enable(&mut self) -> Result<(), DeviceError>;
+    /// Called in the tick. Must not allocate or block.
+    ///
+    /// # Errors
+    ///
+    /// The amplifier has a fault, or cannot be enabled now.
+    fn begin_enable(&mut self) -> Result<(), DeviceError>;
+
+    /// Whether the amplifier follows commands; the current stays zero until the first command.
+    ///
+    /// Called in every tick after [`begin_enable`](Self::begin_enable) until it is ready. Must not allocate or block. The driver
+    /// limits the time: a CANopen drive to `state_timeout` (2 s by default), a VESC to `status_timeout`. After an error, and
+    /// after a [`disable`](Self::disable), the amplifier is disabled and the result is an error.
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>>;
 
     /// Commands a current in amperes and returns the current that the amplifier will give after quantisation and limits.
     ///
@@ -148,12 +162,23 @@ pub trait CurrentAmplifier: Send {
         None
     }
 
-    /// Acknowledges a fault. The amplifier stays disabled.
+    /// Begins to acknowledge a fault. The amplifier is disabled and stays so.
     ///
-    /// Called in the thread of the loop, only on a command of the operator. May allocate, and may block until the time limits of
-    /// the driver: a CANopen drive that has restarted is configured again, which may take several times `state_timeout`.
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+    /// Called in the tick, only on a command of the operator. Must not allocate or block.
+    ///
+    /// # Errors
+    ///
+    /// The driver cannot begin.
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
         Ok(())
+    }
+
+    /// Whether the fault is acknowledged.
+    ///
+    /// Called in every tick after [`begin_reset`](Self::begin_reset) until it is ready. Must not allocate or block. The driver
+    /// limits the time: a CANopen drive that has restarted is configured again, which may take several times `state_timeout`.
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        Poll::Ready(Ok(()))
     }
 
     /// Meaning and remedy of a code of [`AmplifierStatus::Fault`].
@@ -172,8 +197,11 @@ pub trait DisplacementProbe: Send {
 }
 
 impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        (**self).enable()
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        (**self).begin_enable()
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        (**self).poll_enable()
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         (**self).command(current_a)
@@ -187,8 +215,11 @@ impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
     fn actual_current_a(&self) -> Option<f64> {
         (**self).actual_current_a()
     }
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
-        (**self).reset_fault()
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
+        (**self).begin_reset()
+    }
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        (**self).poll_reset()
     }
     fn explain(&self, code: u32) -> Option<FaultText> {
         (**self).explain(code)
@@ -209,8 +240,11 @@ pub struct Devices<A, P> {
 }
 
 impl<A: CurrentAmplifier, P: Send> CurrentAmplifier for Devices<A, P> {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        self.amplifier.enable()
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        self.amplifier.begin_enable()
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.amplifier.poll_enable()
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.amplifier.command(current_a)
@@ -224,8 +258,11 @@ impl<A: CurrentAmplifier, P: Send> CurrentAmplifier for Devices<A, P> {
     fn actual_current_a(&self) -> Option<f64> {
         self.amplifier.actual_current_a()
     }
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
-        self.amplifier.reset_fault()
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
+        self.amplifier.begin_reset()
+    }
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.amplifier.poll_reset()
     }
     fn explain(&self, code: u32) -> Option<FaultText> {
         self.amplifier.explain(code)

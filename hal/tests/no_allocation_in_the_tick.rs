@@ -68,6 +68,7 @@ impl CanBus for DiscardingEndpoint {
 fn tick(drive: &mut CanopenDrive, discard: &AtomicBool) {
     discard.store(true, Ordering::Release);
     assert_no_alloc(|| {
+        let _ = (drive.begin_enable(), drive.poll_enable());
         let _ = (drive.command(0.5), drive.command(f64::NAN));
         let _ = (drive.status(), drive.actual_current_a());
         if let AmplifierStatus::Fault(code) = drive.status() {
@@ -98,7 +99,7 @@ fn command_status_and_disable_do_not_allocate() {
         };
         let mut drive = CanopenDrive::open(settings, Box::new(host)).unwrap();
         tick(&mut drive, &discard); // off
-        drive.enable().unwrap();
+        bench_hal::blocking::enable(&mut drive, |time| simulated.sleep(time)).unwrap();
         tick(&mut drive, &discard); // on
         device.lock().unwrap().inject(DeviceFault::Drive(0x2310));
         simulated.sleep(Duration::from_millis(10));

@@ -1,5 +1,7 @@
 //! Rig and clock of a recording.
 
+use std::task::Poll;
+
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use rtrb::{Consumer, Producer, RingBuffer};
 
@@ -70,12 +72,16 @@ impl RecordedRig {
 }
 
 impl CurrentAmplifier for RecordedRig {
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         if self.enables.pop() == Ok(false) {
             return Err(REFUSED);
         }
         self.status = AmplifierStatus::Enabled;
         Ok(())
+    }
+
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        Poll::Ready(Ok(()))
     }
 
     /// Returns the recorded command for the recorded request. Another request is returned unchanged; the comparison
@@ -102,7 +108,7 @@ impl CurrentAmplifier for RecordedRig {
         self.now.record.actual_a
     }
 
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
         self.clears.pop().map_err(|_| REFUSED)
     }
 

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-use bench_hal::Rig;
+use bench_hal::{Rig, blocking};
 use serde::Serialize;
 
 use super::error::ExperimentError;
@@ -80,7 +80,7 @@ impl Setup {
             tracing::warn!("{note}");
         }
         if self.clear_fault {
-            opened.rig.reset_fault().map_err(|error| {
+            blocking::reset_fault(&mut opened.rig, std::thread::sleep).map_err(|error| {
                 ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
             })?;
         }

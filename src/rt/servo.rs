@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Validity};
+use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Validity, blocking};
 use rtrb::{Consumer, Producer};
 
 use super::arming::{State, Transition, Trip};
@@ -329,7 +329,7 @@ impl Servo {
         }
         self.took_slow_request = true;
         self.change(Transition::Arm, tick);
-        if let Err(error) = self.rig.enable() {
+        if let Err(error) = blocking::enable(&mut self.rig, std::thread::sleep) {
             self.trip(Trip::from(error), tick);
         }
     }
@@ -340,7 +340,7 @@ impl Servo {
             return;
         }
         self.took_slow_request = true;
-        if self.rig.reset_fault().is_ok() {
+        if blocking::reset_fault(&mut self.rig, std::thread::sleep).is_ok() {
             self.change(Transition::Clear, tick);
         }
     }

@@ -1,6 +1,7 @@
 //! A simulated stage with systematic errors of amplifier and probe.
 use bench::rig::simulated::SimulatedRig;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use std::task::Poll;
 
 /// Errors of the devices: current = gain (command) + offset; reading = gain (position) + offset.
 #[derive(Clone, Copy, Debug)]
@@ -58,8 +59,11 @@ impl SkewedRig {
 }
 
 impl CurrentAmplifier for SkewedRig {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        self.inner.enable()
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        self.inner.begin_enable()
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.inner.poll_enable()
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.actual_a = self.skew.current_gain * current_a + self.skew.current_offset_a;

@@ -3,6 +3,7 @@
 //! which interlock trips, not when.
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use bench::config::{Config, Source, load};
@@ -95,9 +96,12 @@ impl IdealAmplifier {
 }
 
 impl CurrentAmplifier for IdealAmplifier {
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         self.is_on = true;
         Ok(())
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        Poll::Ready(Ok(()))
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         assert!(

@@ -82,7 +82,7 @@ fn healthy_drive_is_ok_and_examined_by_uploads_only() {
 fn running_drive_is_not_changed() {
     let (host, device, _running) = rig(EmulatedDriveSettings::default());
     let mut drive = CanopenDrive::open(DriveSettings::default(), Box::new(host.clone())).unwrap();
-    bench_hal::CurrentAmplifier::enable(&mut drive).unwrap();
+    bench_hal::blocking::enable(&mut drive, |time| host.sleep(time)).unwrap();
     bench_hal::CurrentAmplifier::command(&mut drive, 0.0).unwrap();
     let mut report = Report::default();
     // A bus in memory has no claims, so this drive looks like one of another program without a claim.

@@ -1,5 +1,6 @@
 //! Late ticks: missed ticks are counted, flagged and skipped in the numbering, and never caught up.
 use std::sync::{Arc, Mutex};
+use std::task::Poll;
 use std::time::Duration;
 
 use bench::rig::simulated::SimulatedRig;
@@ -169,8 +170,11 @@ fn program_continues_after_missed_ticks_without_catching_up() {
 struct BlockingRig(StillRig, u64);
 
 impl CurrentAmplifier for BlockingRig {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        self.0.enable()
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        self.0.begin_enable()
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.0.poll_enable()
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.0.command(current_a)
@@ -274,7 +278,7 @@ fn simulated_amplifier_holds_the_delayed_command_during_missed_ticks() {
         let rigs = [(); 2].map(|()| SimulatedRig::new(&config).expect("a rig"));
         let [mut missing, mut serving] = rigs;
         for rig in [&mut missing, &mut serving] {
-            rig.enable().expect("enabled");
+            bench_hal::blocking::enable(rig, std::thread::sleep).expect("enabled");
         }
         // `missing` misses four of ten ticks; `serving` repeats its last command in them, like a zero-order hold.
         for number in 0..1000u64 {

@@ -11,6 +11,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
+use std::task::Poll;
 use std::time::Duration;
 
 use super::bus::{BusError, BusEvent, CanBus, Claim, Condition, Host, Task, TaskHandle};
@@ -109,6 +110,8 @@ fn error(code: u32) -> DeviceError {
 struct Shared {
     fault: AtomicU32,
     is_heard: AtomicBool,
+    /// Number of STATUS frames.
+    status_count: AtomicU32,
     current_tenths: AtomicI32,
 }
 
@@ -120,6 +123,14 @@ impl Shared {
     }
 }
 
+/// A change of state that has begun.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    /// Number of STATUS frames at its beginning.
+    status_count: u32,
+    deadline_ns: u64,
+}
+
 /// A VESC in current control.
 pub struct Vesc {
     _watch: TaskHandle,
@@ -128,6 +139,7 @@ pub struct Vesc {
     shared: Arc<Shared>,
     settings: VescSettings,
     is_on: bool,
+    change: Option<Change>,
     _claim: Claim,
 }
 
@@ -154,8 +166,18 @@ impl Vesc {
             shared,
             settings,
             is_on: false,
+            change: None,
             _claim: claim,
         })
+    }
+
+    /// A change of state that begins now, with the time limit `status_timeout`.
+    fn change(&self) -> Change {
+        let limit_ns = self.settings.status_timeout.as_nanos() as u64;
+        Change {
+            status_count: self.shared.status_count.load(Ordering::Acquire),
+            deadline_ns: self.host.now_ns().saturating_add(limit_ns),
+        }
     }
 
     fn no_fault(&self) -> Result<(), DeviceError> {
@@ -167,15 +189,27 @@ impl Vesc {
 }
 
 impl CurrentAmplifier for Vesc {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        self.host.sleep(self.settings.status_timeout);
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         self.no_fault()?;
-        self.is_on = self.shared.is_heard.load(Ordering::Acquire);
-        if self.is_on {
-            Ok(())
-        } else {
-            Err(error(SILENT))
-        }
+        self.change = Some(self.change());
+        Ok(())
+    }
+
+    /// A VESC needs no preparation. It is ready with the first STATUS after the beginning.
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        let Some(change) = self.change else {
+            return Poll::Ready(Err(error(NOT_ARMED)));
+        };
+        self.is_on = self.shared.status_count.load(Ordering::Acquire) != change.status_count;
+        let result = match self.no_fault() {
+            Ok(()) if self.is_on => Ok(()),
+            Ok(()) if self.host.now_ns() < change.deadline_ns => return Poll::Pending,
+            Ok(()) => Err(error(SILENT)),
+            Err(fault) => Err(fault),
+        };
+        self.is_on = result.is_ok();
+        self.change = None;
+        Poll::Ready(result)
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
@@ -195,7 +229,7 @@ impl CurrentAmplifier for Vesc {
     }
 
     fn disable(&mut self) {
-        self.is_on = false;
+        (self.is_on, self.change) = (false, None);
         let _ = self.bus.send(&set_current(self.settings.node, 0)); // if it is lost, 0.5 s without command have the same effect
     }
 
@@ -212,11 +246,22 @@ impl CurrentAmplifier for Vesc {
         is_heard.then(|| f64::from(self.shared.current_tenths.load(Ordering::Acquire)) * 0.1)
     }
 
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
         self.disable();
         self.shared.fault.store(0, Ordering::Release);
-        self.host.sleep(self.settings.status_timeout);
-        self.no_fault()
+        self.change = Some(self.change());
+        Ok(())
+    }
+
+    /// A cause that persists shows within `status_timeout`.
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        match self.change {
+            Some(change) if self.host.now_ns() < change.deadline_ns => Poll::Pending,
+            Some(_) | None => {
+                self.change = None;
+                Poll::Ready(self.no_fault())
+            }
+        }
     }
 
     fn explain(&self, code: u32) -> Option<FaultText> {
@@ -254,6 +299,7 @@ impl Watch {
                     .current_tenths
                     .store(i32::from(tenths), Ordering::Release);
                 self.shared.is_heard.store(true, Ordering::Release);
+                self.shared.status_count.fetch_add(1, Ordering::Release);
             }
         }
     }

@@ -2,10 +2,12 @@
 
 use std::time::Duration;
 
+use bench_hal::blocking;
 use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, Condition, Interface, Port, SocketPort, SystemHost};
 use bench_hal::can::drive::{fault_text, faults};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
+use std::thread::sleep;
 
 use crate::support::adapter::Adapter;
 use crate::support::{BIT_RATE, Rig, host, settings, wait_for};
@@ -57,7 +59,7 @@ fn bus_off_is_a_fault_that_can_be_cleared_after_an_interface_restart() {
         "{refused}"
     );
     assert!(
-        rig.drive.reset_fault().is_err(),
+        blocking::reset_fault(&mut rig.drive, sleep).is_err(),
         "the controller is still in bus-off"
     );
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_OFF));

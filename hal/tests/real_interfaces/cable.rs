@@ -1,7 +1,9 @@
 //! The interface goes down or is removed while current flows.
 
 use bench_hal::CurrentAmplifier;
+use bench_hal::blocking;
 use bench_hal::can::drive::{fault_text, faults};
+use std::thread::sleep;
 
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, host, open, settings};
@@ -21,7 +23,7 @@ fn interface_down_stops_the_drive_and_can_be_cleared() {
         )
     );
     assert!(
-        rig.drive.reset_fault().is_err(),
+        blocking::reset_fault(&mut rig.drive, sleep).is_err(),
         "the interface is still down"
     );
     vcan.set_up(true);

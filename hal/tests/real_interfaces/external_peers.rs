@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
+use bench_hal::blocking;
 use bench_hal::can::budget::Exchange;
 use bench_hal::can::drive::{
     CanopenDrive, DriveSettings, ExpectedIdentity, fault_text, faults, inspect,
 };
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
+use std::thread::sleep;
 
 use crate::support::python::{PythonDrive, script};
 use crate::support::vcan::Vcan;
@@ -23,7 +25,7 @@ fn command_until(drive: &mut CanopenDrive, current_a: f64, peer: &mut PythonDriv
 
 /// Enables the drive, commands both directions of current, and compares the reported current.
 fn assert_runs(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
-    drive.enable().unwrap();
+    blocking::enable(drive, sleep).unwrap();
     assert_eq!(peer.state(), "27 0 OPERATIONAL");
     for (current_a, expected) in [(1.0, "27 250 OPERATIONAL"), (-2.0, "27 -500 OPERATIONAL")] {
         command_until(drive, current_a, peer, expected);
@@ -42,9 +44,12 @@ fn assert_fault_is_cleared(drive: &mut CanopenDrive, peer: &mut PythonDrive) {
     let fault = AmplifierStatus::Fault(faults::EMERGENCY + 0x4210);
     wait_for("the fault", || drive.status() == fault);
     assert_eq!(fault_text(faults::EMERGENCY + 0x4210).what, "drive too hot");
-    assert!(drive.enable().is_err(), "enabling must not clear a fault");
+    assert!(
+        blocking::enable(drive, sleep).is_err(),
+        "enabling must not clear a fault"
+    );
     assert_eq!(peer.state(), "08 0 OPERATIONAL");
-    drive.reset_fault().unwrap();
+    blocking::reset_fault(drive, sleep).unwrap();
     assert_eq!(
         (drive.status(), peer.state().as_str()),
         (AmplifierStatus::Disabled, "40 0 OPERATIONAL")

@@ -3,8 +3,10 @@
 use std::time::Duration;
 
 use bench_hal::CurrentAmplifier;
+use bench_hal::blocking;
 use bench_hal::can::drive::{fault_text, faults};
 use bench_hal::can::emulator::{DeviceFault, EmulatedAmplifier};
+use std::thread::sleep;
 
 use crate::support::vcan::Vcan;
 use crate::support::{Rig, open, settings, wait_for};
@@ -115,6 +117,9 @@ fn switches_off_when_the_loop_sends_no_commands() {
     wait_for("the driver detects the stopped loop", || {
         rig.far_end.current_a() == 0.0
     });
-    assert_eq!(rig.drive.enable().unwrap_err().code, code);
+    assert_eq!(
+        blocking::enable(&mut rig.drive, sleep).unwrap_err().code,
+        code
+    );
     rig.assert_recovers();
 }

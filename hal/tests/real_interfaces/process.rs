@@ -4,9 +4,11 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use bench_hal::CurrentAmplifier;
+use bench_hal::blocking;
 use bench_hal::can::bus::{BusEvent, CanBus, Port};
 use bench_hal::can::cia402::State;
 use bench_hal::can::emcy;
+use std::thread::sleep;
 
 use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, open, refusal, settings, wait_for};
@@ -69,7 +71,7 @@ fn command_until_killed(interface: &str) -> ! {
     // SAFETY: the arguments are integers.
     unsafe { libc::prctl(libc::PR_SET_PDEATHSIG, libc::SIGKILL) };
     let mut drive = open(interface, settings()).unwrap();
-    drive.enable().unwrap();
+    blocking::enable(&mut drive, sleep).unwrap();
     loop {
         drive.command(1.0).unwrap();
         std::thread::sleep(Duration::from_millis(2));

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bench_hal::blocking;
 use bench_hal::can::budget::Exchange;
 use bench_hal::can::bus::{BusEvent, Port};
 use bench_hal::can::cia402::State;
@@ -9,6 +10,7 @@ use bench_hal::can::drive::{DriveSettings, ExpectedIdentity, inspect};
 use bench_hal::can::sdo::Address;
 use bench_hal::can::{CanFrame, Id, nmt};
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
+use std::thread::sleep;
 
 use crate::support::vcan::Vcan;
 use crate::support::{FarEnd, Rig, host, refusal, settings, wait_for};
@@ -25,7 +27,7 @@ fn drive_follows_quantised_set_points_and_is_disabled() {
             ..settings()
         });
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
-        rig.drive.enable().unwrap();
+        blocking::enable(&mut rig.drive, sleep).unwrap();
         assert_eq!(
             (rig.drive.status(), rig.far_end.current_a()),
             (AmplifierStatus::Enabled, 0.0)

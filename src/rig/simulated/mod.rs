@@ -17,6 +17,7 @@ mod stage;
 mod trajectory;
 
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use std::task::Poll;
 
 use crate::config::Config;
 use crate::model::plant::PlantError;
@@ -115,9 +116,13 @@ const DISABLED: DeviceError = DeviceError {
 };
 
 impl CurrentAmplifier for SimulatedRig {
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         self.status = AmplifierStatus::Enabled;
         Ok(())
+    }
+
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        Poll::Ready(Ok(()))
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {

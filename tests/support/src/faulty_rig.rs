@@ -1,5 +1,6 @@
 //! A rig with injected faults.
 use std::ops::Range;
+use std::task::Poll;
 
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
@@ -81,7 +82,7 @@ fn refusal(code: i64) -> DeviceError {
 
 impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     /// The loop processes requests before it reads the probe, so the tick is the one after the last reading.
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         match self.find(tick, |fault| {
             if let Fault::RefusedEnable(code) = fault {
@@ -91,8 +92,12 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
             }
         }) {
             Some(code) => Err(refusal(code)),
-            None => self.inner.enable(),
+            None => self.inner.begin_enable(),
         }
+    }
+
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.inner.poll_enable()
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
@@ -133,7 +138,7 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
             .map(|offset_a| self.commanded_a + offset_a)
     }
 
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         let refused = self.find(tick, |fault| {
             (*fault == Fault::RefusedClear).then_some(refusal(5))

@@ -2,6 +2,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
+use std::task::Poll;
 
 use bench::config::{Config, Source, load};
 use bench::recording::{Header, Recorder, Recording};
@@ -34,9 +35,12 @@ pub struct StillRig {
 }
 
 impl CurrentAmplifier for StillRig {
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
         self.enabled = true;
         Ok(())
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        Poll::Ready(Ok(()))
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         let disabled = DeviceError {
@@ -115,12 +119,15 @@ impl<R> LoggedRig<R> {
 }
 
 impl<R: Rig> CurrentAmplifier for LoggedRig<R> {
-    fn enable(&mut self) -> Result<(), DeviceError> {
-        let answer = self.inner.enable();
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        let answer = self.inner.begin_enable();
         self.note(AmplifierCall::Enable {
             refused: answer.is_err(),
         });
         answer
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.inner.poll_enable()
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         let answer = self.inner.command(current_a);
@@ -140,8 +147,11 @@ impl<R: Rig> CurrentAmplifier for LoggedRig<R> {
     fn actual_current_a(&self) -> Option<f64> {
         self.inner.actual_current_a()
     }
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
-        self.inner.reset_fault()
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
+        self.inner.begin_reset()
+    }
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.inner.poll_reset()
     }
     fn explain(&self, code: u32) -> Option<FaultText> {
         self.inner.explain(code)

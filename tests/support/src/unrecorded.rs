@@ -9,7 +9,7 @@ use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 pub fn chirp(config: &Config) -> Signals {
     let chirp = Chirp::new(&config.chirp, config.servo.period_s());
     let mut rig = SimulatedRig::new(config).expect("a rig");
-    rig.enable().expect("an amplifier");
+    bench_hal::blocking::enable(&mut rig, std::thread::sleep).expect("an amplifier");
     let (mut input_a, mut output_m) = (Vec::new(), Vec::new());
     for number in 0..chirp.ticks() {
         let scheduled_ns = (number as f64 * config.servo.period_s() * 1e9).round() as u64;

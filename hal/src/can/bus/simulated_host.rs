@@ -14,8 +14,8 @@ use super::{
 
 const STEP_NS: u64 = 100_000;
 
-/// Each task with its stop flag.
-type Tasks = Vec<(Arc<AtomicBool>, Box<dyn Task>)>;
+/// Each task with its stop flag. A task that is running, or has ended, is not in its slot.
+type Tasks = Vec<(Arc<AtomicBool>, Option<Box<dyn Task>>)>;
 
 /// A host with a simulated clock; clones share bus and clock.
 #[derive(Clone, Default)]
@@ -36,22 +36,35 @@ impl SimulatedHost {
         &self.shared.bus
     }
 
-    /// Advances the time by one step, then each task. The tasks are removed from the list meanwhile, so that a task may sleep.
+    /// Advances the time by one step, then each task. A task may sleep: the other tasks advance meanwhile.
     fn advance(&self, deadline_ns: u64) {
         let now_ns = self.now_ns();
         let next_ns = deadline_ns.min(now_ns + STEP_NS).max(now_ns);
         self.shared.now_ns.store(next_ns, Ordering::Release);
-        let mut tasks = std::mem::take(&mut *self.tasks());
-        tasks.retain_mut(|(stop, task)| {
-            let continues = !stop.load(Ordering::Acquire);
-            if continues {
-                let _ = task.step(&|| self.now_ns(), Duration::ZERO); // a pause after an error is needed in real time only
-            }
-            continues
-        });
-        let mut started = self.tasks(); // by the tasks themselves
-        tasks.append(&mut started);
-        *started = tasks;
+        let count = self.tasks().len();
+        for index in 0..count {
+            let Some(mut task) = self.take_task(index) else {
+                continue;
+            };
+            let _ = task.step(&|| self.now_ns(), Duration::ZERO); // a pause after an error is needed in real time only
+            self.put_back(index, task);
+        }
+    }
+
+    /// The task in a slot, unless it is running. A task that was stopped is dropped, after the list is unlocked.
+    fn take_task(&self, index: usize) -> Option<Box<dyn Task>> {
+        let (is_stopped, task) = {
+            let mut tasks = self.tasks();
+            let (stop, task) = tasks.get_mut(index)?;
+            (stop.load(Ordering::Acquire), task.take())
+        };
+        task.filter(|_| !is_stopped)
+    }
+
+    fn put_back(&self, index: usize, task: Box<dyn Task>) {
+        if let Some((_, slot)) = self.tasks().get_mut(index) {
+            *slot = Some(task);
+        }
     }
 
     fn tasks(&self) -> std::sync::MutexGuard<'_, Tasks> {
@@ -89,7 +102,7 @@ impl Host for SimulatedHost {
 
     fn start(&self, _name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
         let running = TaskHandle::default();
-        self.tasks().push((Arc::clone(&running.stop), task));
+        self.tasks().push((Arc::clone(&running.stop), Some(task)));
         Ok(running)
     }
 }

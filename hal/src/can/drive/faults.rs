@@ -60,9 +60,11 @@ pub const STILL_ENABLED: u32 = 0x0005_0002;
 pub const NOT_ARMED: u32 = 0x0005_0003;
 /// A command that is not finite.
 pub const NOT_FINITE: u32 = 0x0005_0004;
+/// The drive cannot be enabled during a reset.
+pub const RESETTING: u32 = 0x0005_0005;
 
 /// Code, meaning and remedy of every fault except emergency messages.
-const FAULTS: [(u32, &str, &str); 23] = [
+const FAULTS: [(u32, &str, &str); 24] = [
     // Communication with the drive.
     (
         HEARTBEAT_LOST,
@@ -178,6 +180,11 @@ const FAULTS: [(u32, &str, &str); 23] = [
         "the commanded current is not a finite number",
         "report this fault of the program",
     ),
+    (
+        RESETTING,
+        "the fault of the drive is still being reset",
+        "arm again after the reset",
+    ),
 ];
 
 /// Meaning and remedy of a code.
@@ -242,7 +249,7 @@ mod tests {
     use super::*;
 
     /// The constants above by their names, so that one without a row in [`FAULTS`] is found.
-    const CODES: [u32; 23] = [
+    const CODES: [u32; 24] = [
         HEARTBEAT_LOST,
         RESTARTED,
         NOT_OPERATIONAL,
@@ -266,6 +273,7 @@ mod tests {
         STILL_ENABLED,
         NOT_ARMED,
         NOT_FINITE,
+        RESETTING,
     ];
 
     #[test]

@@ -1,11 +1,12 @@
 //! A CANopen drive as a current amplifier.
 //!
 //! ```text
-//!   loop's thread   enable  command  disable  status        service thread
-//!        |            |        |        |       ^             |  (monitor)
-//!        |  SDO   set-points, NMT       |       |  atomics    |  status, EMCY, heartbeat, error frames
-//!        v            v        v        v       +-------------+  heartbeat, `disable voltage`
-//!   ==================================== bus ==================================
+//!   loop's thread   enable  command  disable  status        service thread            reset thread
+//!                     |        |        |       ^             |  (monitor)               |  SDO, NMT
+//!                 set-points   |        |       |  atomics    |  status, EMCY,           |  fault reset
+//!                     v        v        v       +-------------+  heartbeat, errors,      |
+//!                                                             |  `disable voltage`       |
+//!   =========================================== bus ============================================
 //! ```
 //!
 //! Each thread has its own connection to the bus, with its own filters. The state of the drive is judged by received frames,
@@ -16,13 +17,16 @@ mod errors;
 pub mod faults;
 mod inspect;
 mod monitor;
+mod reset;
 mod service;
 mod settings;
 mod setup;
 mod shared;
 mod transitions;
 
-use std::sync::Arc;
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::Poll;
 use std::time::Duration;
 
 pub use errors::OpenError;
@@ -31,12 +35,14 @@ pub use inspect::{ABORT_CONNECTION, Inspection, REQUIRED_OBJECTS, inspect};
 pub use settings::{DriveSettings, DriveTimes, ExpectedIdentity, TorqueMode};
 
 use self::monitor::{Monitor, received_ids, set_point};
+use self::reset::{ResetOutcome, ResetTask};
 use self::service::Service;
 use self::setup::{Configured, Setup};
 use self::shared::{Intent, Shared};
+use self::transitions::Enabling;
 use super::budget::Exchange;
 use super::bus::{CanBus, Claim, Host, TaskHandle};
-use super::cia402::{CYCLIC_TORQUE, DISABLE_VOLTAGE, ENABLE_OPERATION};
+use super::cia402::{DISABLE_VOLTAGE, ENABLE_OPERATION};
 use super::objects::HEARTBEAT_CONSUMER;
 use super::sdo::{Channel, answer_id};
 use super::{nmt, sync};
@@ -48,12 +54,16 @@ const STATE_POLL: Duration = Duration::from_millis(2);
 /// A CANopen drive in torque mode. The module documentation describes how it is monitored.
 pub struct CanopenDrive {
     service: TaskHandle, // first, so that it ends before the claim does
+    reset: TaskHandle,
     bus: Box<dyn CanBus>,
-    host: Box<dyn Host>,
+    host: Arc<dyn Host>,
     shared: Arc<Shared>,
     settings: DriveSettings,
     configured: Configured,
-    last_error: Option<OpenError>,
+    enabling: Enabling,
+    is_resetting: bool,
+    outcomes: Receiver<ResetOutcome>,
+    last_error: Arc<Mutex<Option<OpenError>>>,
     _claim: Claim,
 }
 
@@ -61,31 +71,43 @@ impl CanopenDrive {
     /// Claims the node, configures the drive and verifies the configuration. Afterwards the drive is operational and off.
     pub fn open(settings: DriveSettings, host: Box<dyn Host>) -> Result<CanopenDrive, OpenError> {
         settings.check()?;
-        let node = settings.node;
-        let claim = host.claim(node)?;
-        let mut bus = host.endpoint(&[answer_id(node)])?;
-        let watched = host.endpoint(&received_ids(node))?;
+        let host: Arc<dyn Host> = Arc::from(host);
+        let claim = host.claim(settings.node)?;
+        let answers = [answer_id(settings.node)];
+        let mut bus = host.endpoint(&answers)?;
+        let watched = host.endpoint(&received_ids(settings.node))?;
         let configured = configure(&settings, bus.as_mut(), host.as_ref())?;
         let shared = Arc::new(Shared::default());
-        let monitor = Monitor::new(&settings, Arc::clone(&shared), host.now_ns());
-        let service = Service {
-            bus: watched,
-            monitor,
+        let service = start_service(&settings, watched, &shared, host.as_ref())?;
+        shared.set_restarted(false);
+        let (sender, outcomes) = sync_channel(1);
+        let last_error = Arc::default();
+        let mut reset = ResetTask {
+            bus: host.endpoint(&answers)?,
+            host: Arc::clone(&host),
+            shared: Arc::clone(&shared),
+            settings: settings.clone(),
+            configured,
+            last_error: Arc::clone(&last_error),
+            outcomes: sender,
+            done: 0,
         };
-        let service = host.start("can-service", Box::new(service));
-        let mut drive = CanopenDrive {
-            service: service.map_err(OpenError::Thread)?,
+        reset.start()?;
+        let reset = host.start("can-reset", Box::new(reset));
+        Ok(CanopenDrive {
+            service,
+            reset: reset.map_err(OpenError::Thread)?,
             bus,
             host,
             shared,
             settings,
             configured,
-            last_error: None,
+            enabling: Enabling::default(),
+            is_resetting: false,
+            outcomes,
+            last_error,
             _claim: claim,
-        };
-        drive.shared.set_restarted(false);
-        drive.start()?;
-        Ok(drive)
+        })
     }
 
     /// The active mode of operation: 10 is cyclic synchronous torque, 4 is profile torque.
@@ -104,64 +126,24 @@ impl CanopenDrive {
     }
 
     /// Why the drive did not accept its configuration again. It complements [`DeviceError`], which has static text only.
-    pub fn last_error(&self) -> Option<&OpenError> {
-        self.last_error.as_ref()
-    }
-
-    /// Sends NMT start and waits until the heartbeat of the drive reports operational.
-    fn start(&mut self) -> Result<(), OpenError> {
-        self.shared
-            .set_must_follow(self.configured.mode == CYCLIC_TORQUE);
-        self.bus
-            .send(&nmt::Command::Start.frame(self.settings.node))?;
-        let timeout = self.settings.times.state_timeout;
-        if self.wait_for(timeout, Shared::is_operational) {
-            return Ok(());
-        }
-        Err(OpenError::NotOperational {
-            node: self.settings.node,
-            timeout_ms: timeout.as_millis(),
-        })
-    }
-
-    /// Restores the configuration after a restart of the drive or the intervention of another master.
-    fn configure_again(&mut self) -> Result<(), OpenError> {
-        self.shared.set_restarted(false);
-        self.shared.clear_nmt();
-        let configured = configure(&self.settings, self.bus.as_mut(), self.host.as_ref())?;
-        self.configured = Configured {
-            identity: self.configured.identity,
-            ..configured
-        };
-        self.start()
-    }
-
-    /// Waits until `condition` holds; `false` if it does not within `limit`.
-    fn wait_for(&self, limit: Duration, condition: impl Fn(&Shared) -> bool) -> bool {
-        let deadline_ns = self.host.now_ns().saturating_add(limit.as_nanos() as u64);
-        while !condition(&self.shared) {
-            if self.host.now_ns() >= deadline_ns {
-                return false;
-            }
-            self.host.sleep(STATE_POLL);
-        }
-        true
-    }
-
-    fn deadline_ns(&self) -> u64 {
-        self.host
-            .now_ns()
-            .saturating_add(self.settings.times.state_timeout.as_nanos() as u64)
+    /// Not for the tick: it locks and allocates.
+    pub fn last_error(&self) -> Option<String> {
+        let last = self.last_error.lock();
+        let last = last.unwrap_or_else(PoisonError::into_inner);
+        last.as_ref().map(OpenError::to_string)
     }
 
     /// Sends a set-point, and SYNC if the exchange is synchronous. Called in the tick: must not allocate or block.
     fn exchange(&mut self, controlword: u16, target: i16) -> Result<(), DeviceError> {
-        let frame = set_point(self.settings.node, controlword, target);
-        let mut sent = self.bus.send(&frame);
-        if sent.is_ok() && matches!(self.settings.exchange, Exchange::Synchronous { .. }) {
-            sent = self.bus.send(&sync::FRAME);
-        }
-        sent.map_err(|error| faults::device_error(faults::of_bus_error(error)))
+        exchange(self.bus.as_mut(), &self.settings, controlword, target)
+    }
+
+    /// The outcome of the reset, if it has ended.
+    fn take_outcome(&mut self) -> Option<u32> {
+        let ResetOutcome { code, configured } = self.outcomes.try_recv().ok()?;
+        self.is_resetting = false;
+        self.configured = configured;
+        Some(code)
     }
 
     fn no_fault(&self) -> Result<(), DeviceError> {
@@ -174,7 +156,8 @@ impl CanopenDrive {
     /// Switches the drive off, ends its monitoring of the heartbeat, and enters pre-operational.
     fn shut_down(&mut self) {
         self.disable();
-        let is_off = self.wait_for(self.settings.times.state_timeout, Shared::has_settled);
+        let limit = self.settings.times.state_timeout;
+        let is_off = wait_for(self.host.as_ref(), &self.shared, limit, Shared::has_settled);
         if is_off && self.shared.fault() == 0 {
             let mut channel = channel(&self.settings, self.bus.as_mut(), self.host.as_ref());
             let _ = channel.write(HEARTBEAT_CONSUMER, &[0; 4]); // if it fails, the drive only reports a lost heartbeat
@@ -182,6 +165,50 @@ impl CanopenDrive {
             let _ = self.bus.send(&stop); // the drive is off already
         }
     }
+}
+
+fn start_service(
+    settings: &DriveSettings,
+    bus: Box<dyn CanBus>,
+    shared: &Arc<Shared>,
+    host: &dyn Host,
+) -> Result<TaskHandle, OpenError> {
+    let monitor = Monitor::new(settings, Arc::clone(shared), host.now_ns());
+    let service = Service { bus, monitor };
+    host.start("can-service", Box::new(service))
+        .map_err(OpenError::Thread)
+}
+
+/// Sends a set-point, and SYNC if the exchange is synchronous. Called in the tick: must not allocate or block.
+fn exchange(
+    bus: &mut dyn CanBus,
+    settings: &DriveSettings,
+    controlword: u16,
+    target: i16,
+) -> Result<(), DeviceError> {
+    let frame = set_point(settings.node, controlword, target);
+    let mut sent = bus.send(&frame);
+    if sent.is_ok() && matches!(settings.exchange, Exchange::Synchronous { .. }) {
+        sent = bus.send(&sync::FRAME);
+    }
+    sent.map_err(|error| faults::device_error(faults::of_bus_error(error)))
+}
+
+/// Waits until `condition` holds; `false` if it does not within `limit`.
+fn wait_for(
+    host: &dyn Host,
+    shared: &Shared,
+    limit: Duration,
+    condition: impl Fn(&Shared) -> bool,
+) -> bool {
+    let deadline_ns = host.now_ns().saturating_add(limit.as_nanos() as u64);
+    while !condition(shared) {
+        if host.now_ns() >= deadline_ns {
+            return false;
+        }
+        host.sleep(STATE_POLL);
+    }
+    true
 }
 
 fn channel<'a>(
@@ -210,18 +237,27 @@ fn configure(
 }
 
 impl CurrentAmplifier for CanopenDrive {
-    fn enable(&mut self) -> Result<(), DeviceError> {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        self.take_outcome();
+        if self.is_resetting {
+            return Err(faults::device_error(faults::RESETTING));
+        }
         self.no_fault()?;
         if !self.shared.is_operational() {
             return Err(faults::device_error(faults::NOT_OPERATIONAL));
         }
-        self.shared.set_intent(Intent::Enabling);
-        let reached = self.enable_stepwise();
-        match reached {
-            Ok(()) => self.shared.set_intent(Intent::On),
-            Err(_) => self.disable(),
+        self.begin_transition();
+        Ok(())
+    }
+
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        let progress = self.step_towards_enabled();
+        match progress {
+            Poll::Pending => {}
+            Poll::Ready(Ok(())) => self.shared.set_intent(Intent::On),
+            Poll::Ready(Err(_)) => self.disable(),
         }
-        reached
+        progress
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
@@ -256,22 +292,23 @@ impl CurrentAmplifier for CanopenDrive {
         Some(self.configured.scale.amperes(counts))
     }
 
-    fn reset_fault(&mut self) -> Result<(), DeviceError> {
-        let before = self.shared.fault();
-        self.disable();
-        self.shared.set_intent(Intent::Resetting);
-        let acknowledged = self.acknowledge();
-        if acknowledged.is_ok() {
-            self.shared.clear_fault();
-            self.shared.set_emergency(0);
+    fn begin_reset(&mut self) -> Result<(), DeviceError> {
+        self.take_outcome();
+        if !self.is_resetting {
+            self.is_resetting = true;
+            self.disable();
+            self.shared.request_reset();
         }
-        self.shared.set_intent(Intent::Off);
-        acknowledged.map_err(|code| {
-            self.shared.latch(if before == 0 { code } else { before });
-            faults::device_error(code)
-        })?;
-        self.host.sleep(self.settings.times.heartbeat_timeout); // a cause that persists shows within this time
-        self.no_fault()
+        Ok(())
+    }
+
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        match self.take_outcome() {
+            Some(0) => Poll::Ready(Ok(())),
+            Some(code) => Poll::Ready(Err(faults::device_error(code))),
+            None if self.is_resetting => Poll::Pending,
+            None => Poll::Ready(self.no_fault()),
+        }
     }
 
     fn explain(&self, code: u32) -> Option<FaultText> {
@@ -281,6 +318,7 @@ impl CurrentAmplifier for CanopenDrive {
 
 impl Drop for CanopenDrive {
     fn drop(&mut self) {
+        self.reset = TaskHandle::default(); // ends within the time limits of a reset
         self.shut_down();
         self.service = TaskHandle::default();
     }

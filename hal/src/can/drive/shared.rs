@@ -32,13 +32,15 @@ const UNKNOWN: u32 = u32::MAX;
 /// Each field has one writer, unless stated otherwise. The caller is the thread of the loop.
 #[derive(Debug)]
 pub(super) struct Shared {
-    /// Written by the caller.
+    /// Written by the caller, and by the reset thread at the end of a reset.
     intent: AtomicU8,
+    /// Number of requests to reset a fault. Written by the caller.
+    resets: AtomicU32,
     /// How often the drive was enabled, so that the service also notices a short use. Written by the caller.
     uses: AtomicU32,
     /// Number of commands sent. Written by the caller.
     commands: AtomicU32,
-    /// The first fault since the last reset, 0 if there is none. Written by both, cleared by the caller.
+    /// The first fault since the last reset, 0 if there is none. Written by both, cleared by the reset thread.
     fault: AtomicU32,
     /// The statusword, or `UNKNOWN`. Written by the service.
     status: AtomicU32,
@@ -48,9 +50,9 @@ pub(super) struct Shared {
     actual: AtomicI32,
     /// State in the last heartbeat; `u8::MAX` if unknown.
     nmt: AtomicU8,
-    /// Whether the drive restarted since it was configured. Set by the service, cleared by the caller.
+    /// Whether the drive restarted since it was configured. Set by the service, cleared by the reset thread.
     restarted: AtomicBool,
-    /// Whether bit 12 of the statusword must be set while enabled. Written by the caller when the mode is chosen.
+    /// Whether bit 12 of the statusword must be set while enabled. Written by the reset thread when the mode is chosen.
     must_follow: AtomicBool,
     /// Code of the last emergency message, 0 if its cause is removed.
     emergency: AtomicU32,
@@ -60,6 +62,7 @@ impl Default for Shared {
     fn default() -> Self {
         Shared {
             intent: AtomicU8::new(Intent::Off as u8),
+            resets: AtomicU32::new(0),
             uses: AtomicU32::new(0),
             commands: AtomicU32::new(0),
             fault: AtomicU32::new(0),
@@ -89,6 +92,24 @@ impl Shared {
         if intent.is_in_use() {
             self.uses.fetch_add(1, Ordering::Release);
         }
+    }
+
+    /// Asks the reset thread to reset the fault.
+    pub(super) fn request_reset(&self) {
+        self.set_intent(Intent::Resetting);
+        self.resets.fetch_add(1, Ordering::Release);
+    }
+
+    pub(super) fn resets(&self) -> u32 {
+        self.resets.load(Ordering::Acquire)
+    }
+
+    /// Ends the intent to reset, unless the caller has already replaced it.
+    pub(super) fn end_reset(&self) {
+        let (from, to) = (Intent::Resetting as u8, Intent::Off as u8);
+        let _ = self
+            .intent
+            .compare_exchange(from, to, Ordering::AcqRel, Ordering::Acquire);
     }
 
     pub(super) fn uses(&self) -> u32 {

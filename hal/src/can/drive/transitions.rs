@@ -1,26 +1,54 @@
-//! Transitions of the drive: to Operation Enabled, and out of Fault.
+//! The transition of the drive to Operation Enabled, one step at a call.
 
-use super::super::cia402::{DISABLE_VOLTAGE, FAULT_RESET, REMOTE, State};
+use std::task::Poll;
+
+use super::super::cia402::{DISABLE_VOLTAGE, REMOTE, State};
+use super::shared::Intent;
 use super::{CanopenDrive, STATE_POLL, faults};
 use crate::DeviceError;
 
+/// Times of a transition to Operation Enabled, on the clock of the host.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Enabling {
+    deadline_ns: u64,
+    /// When the next controlword is due.
+    step_ns: u64,
+}
+
 impl CanopenDrive {
-    /// Enables the drive step by step; the target is zero.
-    pub(super) fn enable_stepwise(&mut self) -> Result<(), DeviceError> {
-        let deadline_ns = self.deadline_ns();
-        loop {
-            self.no_fault()?;
-            let state = self.shared.state();
-            if state == Some(State::OperationEnabled) && self.shared.follows() {
-                return Ok(());
-            }
-            if self.host.now_ns() >= deadline_ns {
-                return Err(faults::device_error(self.why_not_enabled()));
-            }
-            if let Some(controlword) = state.map_or(Some(DISABLE_VOLTAGE), State::towards_enabled) {
-                self.exchange(controlword, 0)?;
-            }
-            self.host.sleep(STATE_POLL);
+    /// Begins the transition. A controlword is sent in [`CanopenDrive::step_towards_enabled`].
+    pub(super) fn begin_transition(&mut self) {
+        let (now_ns, limit) = (self.host.now_ns(), self.settings.times.state_timeout);
+        self.enabling = Enabling {
+            deadline_ns: now_ns.saturating_add(limit.as_nanos() as u64),
+            step_ns: now_ns,
+        };
+        self.shared.set_intent(Intent::Enabling);
+    }
+
+    /// Sends the next controlword if it is due; the target is zero. Called in the tick: must not allocate or block.
+    pub(super) fn step_towards_enabled(&mut self) -> Poll<Result<(), DeviceError>> {
+        if self.shared.intent() != Intent::Enabling {
+            return Poll::Ready(Err(faults::device_error(faults::NOT_ARMED)));
+        }
+        let (state, now_ns) = (self.shared.state(), self.host.now_ns());
+        if let Err(error) = self.no_fault() {
+            return Poll::Ready(Err(error));
+        }
+        if state == Some(State::OperationEnabled) && self.shared.follows() {
+            return Poll::Ready(Ok(()));
+        }
+        if now_ns >= self.enabling.deadline_ns {
+            return Poll::Ready(Err(faults::device_error(self.why_not_enabled())));
+        }
+        if now_ns < self.enabling.step_ns {
+            return Poll::Pending;
+        }
+        self.enabling.step_ns = now_ns.saturating_add(STATE_POLL.as_nanos() as u64);
+        let controlword = state.map_or(Some(DISABLE_VOLTAGE), State::towards_enabled);
+        match controlword.map_or(Ok(()), |controlword| self.exchange(controlword, 0)) {
+            Ok(()) => Poll::Pending,
+            Err(error) => Poll::Ready(Err(error)),
         }
     }
 
@@ -31,56 +59,5 @@ impl CanopenDrive {
             (_, None) => faults::STATUS_LOST,
             _ => faults::NOT_ENABLED,
         }
-    }
-
-    /// Prepares the drive to be enabled again: it is configured, sends its status, and has left Fault. The error is a fault code.
-    pub(super) fn acknowledge(&mut self) -> Result<(), u32> {
-        self.wait_for_fresh_heartbeat();
-        if self.shared.restarted() || !self.shared.is_operational() {
-            self.configure_again().map_err(|error| {
-                self.last_error = Some(error);
-                faults::NOT_CONFIGURED
-            })?;
-        }
-        self.wait_for_fresh_status()?;
-        self.leave_fault()
-    }
-
-    /// Waits for a heartbeat that is newer than this call. The last one may be outdated, if the drive lost the heartbeat of this
-    /// program or was stopped meanwhile. The caller checks whether one arrived.
-    fn wait_for_fresh_heartbeat(&self) {
-        self.shared.clear_nmt();
-        self.wait_for(self.settings.times.heartbeat_timeout, |shared| {
-            shared.nmt().is_some()
-        });
-    }
-
-    /// Waits for a status frame that is newer than this call. It shows that drive and bus work.
-    fn wait_for_fresh_status(&mut self) -> Result<(), u32> {
-        let (deadline_ns, before) = (self.deadline_ns(), self.shared.status_count());
-        while self.shared.status_count() == before || self.shared.state().is_none() {
-            if self.host.now_ns() >= deadline_ns {
-                return Err(faults::STATUS_LOST);
-            }
-            let _ = self.exchange(DISABLE_VOLTAGE, 0); // only the status frame matters
-            self.host.sleep(STATE_POLL);
-        }
-        Ok(())
-    }
-
-    /// Sends rising edges of the reset bit until the drive has left Fault.
-    fn leave_fault(&mut self) -> Result<(), u32> {
-        let deadline_ns = self.deadline_ns();
-        let pause = STATE_POLL.max(2 * self.settings.status_period());
-        while self.shared.state().is_none_or(State::is_fault) {
-            if self.host.now_ns() >= deadline_ns {
-                return Err(faults::FAULT_REMAINS);
-            }
-            for controlword in [DISABLE_VOLTAGE, FAULT_RESET, FAULT_RESET, DISABLE_VOLTAGE] {
-                let _ = self.exchange(controlword, 0); // sent twice: with SYNC a command applies at one SYNC and is answered at the next
-                self.host.sleep(pause);
-            }
-        }
-        Ok(())
     }
 }

@@ -20,6 +20,14 @@ struct Rig {
 }
 
 impl Rig {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        crate::blocking::enable(&mut self.vesc, |time| self.world.sleep(time))
+    }
+
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        crate::blocking::reset_fault(&mut self.vesc, |time| self.world.sleep(time))
+    }
+
     fn current_a(&self) -> f64 {
         self.device.lock().unwrap().current_a()
     }
@@ -63,7 +71,7 @@ fn a_vesc_follows_commands_and_reports_its_current() {
         rig.vesc.command(1.0).unwrap_err().code,
         i64::from(NOT_ARMED)
     );
-    rig.vesc.enable().unwrap();
+    rig.enable().unwrap();
     assert_eq!(rig.vesc.status(), AmplifierStatus::Enabled);
     assert_eq!(
         rig.vesc.command(-1.2345),
@@ -87,6 +95,19 @@ fn a_vesc_follows_commands_and_reports_its_current() {
 }
 
 #[test]
+fn disable_wins_over_enabling() {
+    let mut rig = rig();
+    let begun_ns = rig.world.now_ns();
+    rig.vesc.begin_enable().unwrap();
+    assert!(rig.vesc.poll_enable().is_pending());
+    assert_eq!(rig.world.now_ns(), begun_ns);
+    rig.vesc.disable();
+    rig.world.sleep(Duration::from_millis(200));
+    assert_eq!(rig.vesc.poll_enable(), Poll::Ready(Err(error(NOT_ARMED))));
+    assert_eq!(rig.vesc.status(), AmplifierStatus::Disabled);
+}
+
+#[test]
 fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
     type FaultCase = (u32, fn(&Rig));
     let cases: [FaultCase; 4] = [
@@ -99,7 +120,7 @@ fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
     ];
     for (code, fail) in cases {
         let mut rig = rig();
-        rig.vesc.enable().unwrap();
+        rig.enable().unwrap();
         rig.vesc.command(1.0).unwrap();
         fail(&rig);
         rig.world.sleep(Duration::from_millis(130));
@@ -109,20 +130,20 @@ fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
         assert_eq!(rig.current_a(), 0.0);
         rig.inject(DeviceFault::None);
         rig.world.sleep(Duration::from_millis(240));
-        rig.vesc.reset_fault().unwrap();
+        rig.reset_fault().unwrap();
         assert_eq!(
             rig.vesc.status(),
             AmplifierStatus::Disabled,
             "cleared is not enabled"
         );
-        rig.vesc.enable().unwrap();
+        rig.enable().unwrap();
     }
 }
 
 #[test]
 fn vesc_releases_the_motor_after_loss_of_commands() {
     let mut rig = rig();
-    rig.vesc.enable().unwrap();
+    rig.enable().unwrap();
     rig.vesc.command(1.0).unwrap();
     rig.world.sleep(Duration::from_millis(1));
     rig.inject(DeviceFault::Unplugged);
@@ -138,7 +159,7 @@ fn vesc_releases_the_motor_after_loss_of_commands() {
 #[test]
 fn current_is_zero_after_the_command_timeout() {
     let mut rig = rig();
-    rig.vesc.enable().unwrap();
+    rig.enable().unwrap();
     rig.vesc.command(2.0).unwrap();
     rig.world.sleep(Duration::from_millis(490));
     assert_eq!(rig.current_a(), 2.0);

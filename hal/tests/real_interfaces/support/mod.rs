@@ -7,6 +7,7 @@ pub mod vcan;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
+use bench_hal::blocking;
 use bench_hal::can::bus::{Host, Port, SocketPort, SystemHost, TaskHandle};
 use bench_hal::can::cia402::State;
 use bench_hal::can::drive::{CanopenDrive, DriveSettings, DriveTimes, OpenError};
@@ -15,6 +16,7 @@ use bench_hal::can::emulator::{
 };
 use bench_hal::can::heartbeat;
 use bench_hal::{AmplifierStatus, CurrentAmplifier};
+use std::thread::sleep;
 
 pub const BIT_RATE: u32 = 1_000_000;
 
@@ -150,7 +152,7 @@ impl Rig {
     }
 
     pub fn enabled(mut self) -> Rig {
-        self.drive.enable().unwrap();
+        blocking::enable(&mut self.drive, sleep).unwrap();
         self.assert_current(1.0, 1.0);
         self
     }
@@ -169,7 +171,7 @@ impl Rig {
             "commands must be refused after a fault"
         );
         assert!(
-            self.drive.enable().is_err(),
+            blocking::enable(&mut self.drive, sleep).is_err(),
             "enabling must not clear a fault"
         );
         code
@@ -178,14 +180,13 @@ impl Rig {
     /// Removes the cause and clears the fault. The drive is then off, and is enabled only on request.
     pub fn assert_recovers(&mut self) {
         self.far_end.device().inject(DeviceFault::None);
-        self.drive
-            .reset_fault()
+        blocking::reset_fault(&mut self.drive, sleep)
             .unwrap_or_else(|error| panic!("{error}: {:?}", self.drive.last_error()));
         assert_eq!(
             (self.drive.status(), self.far_end.current_a()),
             (AmplifierStatus::Disabled, 0.0)
         );
-        self.drive.enable().unwrap();
+        blocking::enable(&mut self.drive, sleep).unwrap();
         assert_eq!(
             self.far_end.current_a(),
             0.0,

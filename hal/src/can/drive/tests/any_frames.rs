@@ -85,7 +85,7 @@ proptest! {
     #[test]
     fn driver_and_drive_survive_a_babbling_node(frames in proptest::collection::vec(any_frame(), 1..60)) {
         let mut rig = rig(ASYNCHRONOUS);
-        let _ = rig.drive.enable();
+        let _ = rig.enable();
         let mut babbler = rig.world.endpoint(&[]).unwrap();
         for frame in frames {
             babbler.send(&frame).unwrap();
@@ -93,7 +93,7 @@ proptest! {
             rig.sleep_ms(1);
         }
         drop(babbler);
-        let _ = rig.drive.reset_fault();
+        let _ = rig.reset_fault();
         rig.device().inject(DeviceFault::Unplugged);
         rig.sleep_ms(200);
         prop_assert!(matches!(rig.drive.status(), AmplifierStatus::Fault(_)));

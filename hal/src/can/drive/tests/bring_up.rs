@@ -1,6 +1,6 @@
 //! Tests: from power-on to current and back, and the drives and settings that are rejected.
 
-use super::super::super::cia402::PROFILE_TORQUE;
+use super::super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
 use super::super::super::scale::Reference;
 use super::*;
 
@@ -10,7 +10,7 @@ fn enables_follows_quantised_currents_and_disables() {
         let mut rig = rig(exchange);
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
         assert_eq!(rig.drive.mode(), CYCLIC_TORQUE);
-        rig.drive.enable().unwrap();
+        rig.enable().unwrap();
         assert_eq!(rig.drive.status(), AmplifierStatus::Enabled);
         assert_eq!(rig.device_current_a(), 0.0, "enabled means zero current");
 
@@ -40,12 +40,53 @@ fn enables_follows_quantised_currents_and_disables() {
         );
         assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
         rig.drive.disable();
-        rig.drive.enable().unwrap();
+        rig.enable().unwrap();
         assert_eq!(
             rig.device_current_a(),
             0.0,
             "an old set-point does not come back"
         );
+    }
+}
+
+#[test]
+fn enabling_and_resetting_do_not_wait_in_the_calls_of_the_loop() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = rig(exchange);
+        let begun_ns = rig.world.now_ns();
+        rig.drive.begin_enable().unwrap();
+        assert!(rig.drive.poll_enable().is_pending());
+        rig.drive.begin_reset().unwrap();
+        assert!(rig.drive.poll_reset().is_pending());
+        assert_eq!(
+            rig.drive.begin_enable().unwrap_err().code,
+            i64::from(faults::RESETTING)
+        );
+        assert_eq!(rig.world.now_ns(), begun_ns);
+        rig.sleep_ms(1); // the simulated thread of the reset runs to its end
+        assert_eq!(rig.drive.poll_reset(), Poll::Ready(Ok(())));
+        rig.enable().unwrap();
+    }
+}
+
+#[test]
+fn disable_wins_over_enabling() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = rig(exchange);
+        rig.drive.begin_enable().unwrap();
+        while rig.device().power_state() != State::OperationEnabled {
+            assert_eq!(rig.drive.poll_enable(), Poll::Pending);
+            rig.sleep_ms(1);
+        }
+        rig.drive.disable();
+        let not_enabled = faults::device_error(faults::NOT_ARMED);
+        for _ in 0..20 {
+            assert_eq!(rig.drive.poll_enable(), Poll::Ready(Err(not_enabled)));
+            assert_eq!(rig.drive.command(1.0), Err(not_enabled));
+            rig.sleep_ms(1);
+        }
+        assert_eq!(rig.device().power_state(), State::SwitchOnDisabled);
+        assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
     }
 }
 
@@ -92,7 +133,7 @@ fn uses_profile_torque_without_cyclic_torque() {
         u32::MAX,
         "the slope is the largest"
     );
-    rig.drive.enable().unwrap();
+    rig.enable().unwrap();
     rig.run_ms(1.0, 5);
     assert_eq!(rig.device_current_a(), 1.0);
     let refused = refusal(
@@ -117,7 +158,7 @@ fn scales_a_target_in_per_mille_of_the_maximum() {
         ..EmulatedDriveSettings::default()
     };
     let mut rig = open(settings, device).unwrap();
-    rig.drive.enable().unwrap();
+    rig.enable().unwrap();
     let given_a = rig.drive.command(1.0).unwrap();
     rig.sleep_ms(1);
     assert!(
@@ -305,7 +346,7 @@ fn closing_leaves_the_drive_off_and_without_heartbeat_monitoring() {
         device,
         _running,
     } = rig(ASYNCHRONOUS);
-    drive.enable().unwrap();
+    crate::blocking::enable(&mut drive, |time| world.sleep(time)).unwrap();
     drive.command(1.0).unwrap();
     drop(drive);
     world.sleep(Duration::from_millis(500));

@@ -7,7 +7,7 @@ use super::*;
 /// A rig that is enabled and has commanded 1 A for 50 ms.
 fn running(exchange: Exchange) -> Rig {
     let mut rig = rig(exchange);
-    rig.drive.enable().unwrap();
+    rig.enable().unwrap();
     assert_eq!(rig.run_ms(1.0, 50), 50, "{:x?}", rig.drive.status());
     assert_eq!(rig.device_current_a(), 1.0);
     rig
@@ -44,7 +44,7 @@ fn assert_detected(rig: &mut Rig, code: u32, most_ms: u32) {
         "the first cause stays until a person clears it"
     );
     assert_eq!(
-        rig.drive.enable().unwrap_err().code,
+        rig.enable().unwrap_err().code,
         i64::from(code),
         "a fault is not left by enabling"
     );
@@ -56,12 +56,11 @@ fn assert_detected(rig: &mut Rig, code: u32, most_ms: u32) {
 fn assert_recovers(rig: &mut Rig) {
     rig.device().inject(DeviceFault::None);
     rig.sleep_ms(50);
-    rig.drive
-        .reset_fault()
+    rig.reset_fault()
         .unwrap_or_else(|error| panic!("{error}: {:?}", rig.drive.last_error()));
     assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
     assert_eq!(rig.device_current_a(), 0.0);
-    rig.drive.enable().unwrap();
+    rig.enable().unwrap();
     assert_eq!(rig.run_ms(0.5, 50), 50);
     assert_eq!(rig.device_current_a(), 0.5);
 }
@@ -149,7 +148,7 @@ fn clears_fault_after_reconnection_although_the_last_heartbeat_is_outdated() {
         ..DriveSettings::default()
     };
     let mut rig = open(settings, EmulatedDriveSettings::default()).unwrap();
-    rig.drive.enable().unwrap();
+    rig.enable().unwrap();
     rig.run_ms(1.0, 50);
     rig.device().inject(DeviceFault::Unplugged);
     rig.sleep_ms(42);
@@ -160,9 +159,7 @@ fn clears_fault_after_reconnection_although_the_last_heartbeat_is_outdated() {
         "according to its last heartbeat"
     );
     rig.device().inject(DeviceFault::None);
-    rig.drive
-        .reset_fault()
-        .unwrap_or_else(|error| panic!("{error}"));
+    rig.reset_fault().unwrap_or_else(|error| panic!("{error}"));
     assert_recovers(&mut rig);
 }
 
@@ -201,7 +198,7 @@ fn an_interface_that_goes_down_is_a_fault_and_the_drive_stops_by_itself() {
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
     rig.sleep_ms(72);
     assert_eq!(rig.device_current_a(), 0.0);
-    assert!(rig.drive.reset_fault().is_err(), "still down");
+    assert!(rig.reset_fault().is_err(), "still down");
     assert_eq!(rig.drive.status(), AmplifierStatus::Fault(faults::BUS_DOWN));
     rig.world.bus().set_down(false);
     assert_recovers(&mut rig);
@@ -245,8 +242,8 @@ fn the_drive_stops_after_the_process_is_killed() {
         _running,
     } = rig;
     std::mem::forget(drive);
-    let mut next = CanopenDrive::open(DriveSettings::default(), Box::new(world)).unwrap();
-    next.enable().unwrap(); // the next run starts cleanly
+    let mut next = CanopenDrive::open(DriveSettings::default(), Box::new(world.clone())).unwrap();
+    crate::blocking::enable(&mut next, |time| world.sleep(time)).unwrap(); // the next run starts cleanly
     assert_eq!(
         device.lock().unwrap().power_state(),
         State::OperationEnabled
@@ -363,7 +360,7 @@ fn a_fault_that_persists_is_not_cleared() {
     rig.sleep_ms(5);
     rig.device().inject(DeviceFault::SetPointsIgnored); // the drive does not receive the reset
     assert_eq!(
-        rig.drive.reset_fault().unwrap_err().code,
+        rig.reset_fault().unwrap_err().code,
         i64::from(faults::FAULT_REMAINS)
     );
     assert_eq!(
@@ -397,7 +394,7 @@ fn a_drive_in_fault_at_opening_is_opened_but_not_reset() {
         AmplifierStatus::Fault(faults::DRIVE_FAULT),
         "the emergency message was before our time"
     );
-    assert!(rig.drive.enable().is_err());
+    assert!(rig.enable().is_err());
     assert_eq!(rig.device().power_state(), State::Fault);
     assert_recovers(&mut rig);
 }

@@ -59,6 +59,14 @@ fn refusal(settings: DriveSettings, device: EmulatedDriveSettings) -> String {
 }
 
 impl Rig {
+    fn enable(&mut self) -> Result<(), DeviceError> {
+        crate::blocking::enable(&mut self.drive, |time| self.world.sleep(time))
+    }
+
+    fn reset_fault(&mut self) -> Result<(), DeviceError> {
+        crate::blocking::reset_fault(&mut self.drive, |time| self.world.sleep(time))
+    }
+
     fn device(&self) -> MutexGuard<'_, EmulatedDrive> {
         self.device.lock().unwrap()
     }
