@@ -16,6 +16,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
 use bench::rt::publisher::Publisher;
+use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::run;
 use bench_hal::{Reading, Tick, Validity};
@@ -100,7 +101,7 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let recorder =
         Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
     let (producer, consumer) = RingBuffer::new(1 << 16);
-    let (mut requests, taken) = RingBuffer::new(4);
+    let (mut requests, taken) = RequestSender::ring(4);
     let (retired, _kept) = RingBuffer::new(4);
     let progress = Arc::new(Progress::default());
     let connections = Connections {
@@ -118,7 +119,7 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     );
     let servo = Servo::new(rig, interlocks, connections);
     for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
-        assert!(requests.push(order).is_ok());
+        assert!(requests.send(order).is_ok());
     }
     let recorder = recording::spawn(recorder, consumer).expect("a thread");
     let start = Instant::now();

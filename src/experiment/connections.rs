@@ -2,17 +2,18 @@
 
 use std::sync::Arc;
 
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 
 use crate::rt::program::Program;
 use crate::rt::publisher::Publisher;
 use crate::rt::record::{LoopMessage, REQUESTS_PER_TICK};
-use crate::rt::servo::{Connections, Progress, Request};
+use crate::rt::request::RequestSender;
+use crate::rt::servo::{Connections, Progress};
 
 /// The ends of a loop's [`Connections`] that stay outside the loop.
 pub(super) struct OutsideEnds {
     /// Requests to the loop.
-    pub(super) requests: Producer<Request>,
+    pub(super) requests: RequestSender,
     /// The messages of the loop.
     pub(super) records: Consumer<LoopMessage>,
     /// Programs that ended, to be freed.
@@ -24,7 +25,7 @@ pub(super) struct OutsideEnds {
 /// Both ends of new connections, with room for `record_slots` published records.
 pub(super) fn connect(record_slots: usize) -> (Connections, OutsideEnds) {
     let (published, records) = RingBuffer::new(record_slots);
-    let (requests, taken) = RingBuffer::new(REQUESTS_PER_TICK);
+    let (requests, taken) = RequestSender::ring(REQUESTS_PER_TICK);
     let (ended, retired) = RingBuffer::new(REQUESTS_PER_TICK);
     let progress = Arc::new(Progress::default());
     let connections = Connections {

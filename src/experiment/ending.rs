@@ -39,7 +39,7 @@ impl Ending {
     pub fn of(recording: &Recording) -> Ending {
         let mut events = recording.events().iter();
         let completed = events.clone().any(|e| e.kind == EventKind::Completed);
-        let was_ordered = |e: &Event| e.kind == EventKind::Request(RequestKind::Stop);
+        let was_ordered = |e: &Event| matches!(e.kind, EventKind::Request(request) if request.kind == RequestKind::Stop);
         let is_cut =
             recording.truncated() || recording.was_damaged() && !events.clone().any(was_ordered);
         let trip = events.find_map(|event| match event.kind {

@@ -145,7 +145,7 @@ impl Replay {
         let mut tripped = false;
         while let Some(event) = events.next_if(|event| event.tick <= tick) {
             match event.kind {
-                EventKind::Request(kind) => self.request(kind),
+                EventKind::Request(request) => self.request(request.kind),
                 ARMING => {
                     let same_tick = |next: &&Event| next.tick == event.tick;
                     let refused = events.next_if(|next| same_tick(next) && is_amplifier_trip(next));
@@ -167,7 +167,8 @@ impl Replay {
             RequestKind::Clear => Some(Request::Clear),
         };
         if let Some(request) = request {
-            push(&mut self.outside.requests, request);
+            // The loop empties the ring in every tick.
+            let _ = self.outside.requests.send(request);
         }
     }
 

@@ -8,7 +8,6 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
-use rtrb::Producer;
 
 use super::connections::{OutsideEnds, connect};
 use super::file_name;
@@ -20,7 +19,8 @@ use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
 use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
-use crate::rt::servo::{Connections, Request, Servo};
+use crate::rt::request::{Request, RequestSender};
+use crate::rt::servo::{Connections, Servo};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 use crate::util::timestamp;
 
@@ -115,10 +115,10 @@ fn prepare_run(
 }
 
 /// Requests to arm and to start, queued before the loop begins: they take effect at tick 0.
-fn queue_start(requests: &mut Producer<Request>, program: Box<dyn Program>) {
+fn queue_start(requests: &mut RequestSender, program: Box<dyn Program>) {
     for request in [Request::Arm, Request::Start(program)] {
         // The ring is empty and holds more than two requests.
-        let _ = requests.push(request);
+        let _ = requests.send(request);
     }
 }
 
@@ -265,7 +265,7 @@ impl PreparedRun {
 
 /// Watches the loop from outside: signals, progress, and the state of the recorder.
 struct Supervisor {
-    requests: Producer<Request>,
+    requests: RequestSender,
     health: Arc<Health>,
     stopping: Stopping,
 }
@@ -327,7 +327,7 @@ impl Supervisor {
 
     /// Sends a request. If there is no room for it, the next signal sends it again.
     fn request(&mut self, request: Request, stopping: Stopping) {
-        if self.requests.push(request).is_ok() {
+        if self.requests.send(request).is_ok() {
             self.stopping = stopping;
         }
     }

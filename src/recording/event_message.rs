@@ -3,12 +3,12 @@
 
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
-use crate::rt::record::{Event, EventKind, RequestKind};
+use crate::rt::record::{Event, EventKind, Refusal, RequestEvent, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
         let message = match event.kind {
-            EventKind::Request(kind) => of_request(kind),
+            EventKind::Request(request) => of_request(request),
             EventKind::State { from, to } => of_state(from, to),
             EventKind::Trip(trip) => of_trip(trip),
             EventKind::Completed => message("completed", "the program came to its end".into()),
@@ -29,11 +29,13 @@ fn message(kind: &str, text: String) -> Message {
     }
 }
 
-fn of_request(kind: RequestKind) -> Message {
-    let found = REQUESTS.into_iter().find(|(other, _)| *other == kind);
+fn of_request(request: RequestEvent) -> Message {
+    let found = REQUESTS.into_iter().find(|(kind, _)| *kind == request.kind);
     let name = found.map_or("", |(_, name)| name);
     Message {
         order: name.into(),
+        id: request.id,
+        refusal: request.refusal.map_or("", Refusal::name).into(),
         ..message("order", format!("order: {name}"))
     }
 }
@@ -84,7 +86,7 @@ impl TryFrom<&Message> for Event {
 
     fn try_from(message: &Message) -> Result<Event, UnknownValue> {
         let kind = match message.kind.as_str() {
-            "order" => EventKind::Request(request(&message.order)?),
+            "order" => EventKind::Request(request(message)?),
             "state" => EventKind::State {
                 from: state("from", &message.from)?,
                 to: state("to", &message.to)?,
@@ -103,10 +105,24 @@ impl TryFrom<&Message> for Event {
     }
 }
 
-fn request(name: &str) -> Result<RequestKind, UnknownValue> {
+fn request(message: &Message) -> Result<RequestEvent, UnknownValue> {
+    let name = message.order.as_str();
     let found = REQUESTS.into_iter().find(|(_, other)| *other == name);
     let kind = found.map(|(kind, _)| kind);
-    kind.ok_or_else(|| unknown("order", name))
+    Ok(RequestEvent {
+        id: message.id,
+        kind: kind.ok_or_else(|| unknown("order", name))?,
+        refusal: refusal(&message.refusal)?,
+    })
+}
+
+/// The refusal of a name; an empty name belongs to an accepted request.
+fn refusal(name: &str) -> Result<Option<Refusal>, UnknownValue> {
+    if name.is_empty() {
+        return Ok(None);
+    }
+    let found = Refusal::ALL.into_iter().find(|other| other.name() == name);
+    found.map(Some).ok_or_else(|| unknown("refusal", name))
 }
 
 fn state(field: &'static str, name: &str) -> Result<State, UnknownValue> {

@@ -119,7 +119,7 @@ messages! {
         field "2" (string) kind,
         /// Readable text, for every kind.
         field "3" (string) text,
-        /// Of an order: `arm`, `start`, `stop` or `clear`.
+        /// Of an order: `arm`, `start`, `finish`, `stop` or `clear`.
         field "4" (string) order,
         /// Of a state: the state before.
         field "5" (string) from,
@@ -137,6 +137,10 @@ messages! {
         field "11" (uint64) records,
         /// Of a trip: what the operator can do about it.
         field "12" (string) remedy,
+        /// Of an order: its number, from 1.
+        field "13" (uint64) id,
+        /// Of an order that was refused: the short reason.
+        field "14" (string) refusal,
     }
     /// A summary of up to one second of scheduled time, on channel `/timing`.
     Timing {

@@ -46,10 +46,11 @@ mod tests {
     #[test]
     fn schema_changes_only_on_purpose() {
         // Length and CRC-32 of the descriptor in recordings: a change needs a reason and new numbers. Version 0.1.0: 1001,
-        // 0xab158d29. Since then: fields 16 and 17 of `Loop`, readings and set-points before a calibration; state 4, settling.
+        // 0xab158d29. Since then: fields 16 and 17 of `Loop`, readings and set-points before a calibration; state 4, settling;
+        // fields 13 and 14 of `Event`, number and refusal of a request.
         let schema = descriptor_set();
-        assert_eq!(schema.len(), 1109);
-        assert_eq!(crc32fast::hash(&schema), 0x5a25_13bd);
+        assert_eq!(schema.len(), 1138);
+        assert_eq!(crc32fast::hash(&schema), 0x8a09_5b77);
     }
 
     /// A message with every field set, by its field numbers on the wire: (number, wire type), with an independent reader.
@@ -120,6 +121,8 @@ mod tests {
             code: 1,
             records: 1,
             remedy: s(),
+            id: 1,
+            refusal: s(),
         };
         let timing = Timing {
             first_tick: 1,

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`settling`] the end of a run, [`clock`] its two paces, [`program`] what it
-//! runs, [`record`] what it publishes.
+//! runs, [`record`] what it publishes, [`request`] what it is asked to do.
 
 pub mod arming;
 pub mod clock;
@@ -17,6 +17,7 @@ pub mod interlock;
 pub mod program;
 pub mod publisher;
 pub mod record;
+pub mod request;
 pub mod servo;
 pub mod settling;
 pub mod thread;

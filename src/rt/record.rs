@@ -72,8 +72,8 @@ pub struct Event {
 /// Kind of an [`Event`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EventKind {
-    /// A request of the supervisor was taken.
-    Request(RequestKind),
+    /// A request was taken, and accepted or refused.
+    Request(RequestEvent),
     /// The arming machine went from one state to another.
     State {
         /// State before.
@@ -108,6 +108,54 @@ pub enum RequestKind {
     Stop,
     /// The operator clears a trip.
     Clear,
+}
+
+/// The answer of the loop to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RequestEvent {
+    /// Number of the request, from 1; 0 in recordings of older versions.
+    pub id: u64,
+    /// What was requested.
+    pub kind: RequestKind,
+    /// Why it was refused; `None` if it was accepted, and in recordings of older versions.
+    pub refusal: Option<Refusal>,
+}
+
+/// Why the loop refused a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refusal {
+    /// Only a disarmed loop can be armed.
+    NotDisarmed,
+    /// Only an armed loop can start a program.
+    NotArmed,
+    /// There is no run that could end.
+    NoRun,
+    /// There is no trip that could be cleared.
+    NoTrip,
+    /// The loop has tripped; the trip must be cleared first.
+    Tripped,
+}
+
+impl Refusal {
+    /// All refusals.
+    pub const ALL: [Refusal; 5] = [
+        Refusal::NotDisarmed,
+        Refusal::NotArmed,
+        Refusal::NoRun,
+        Refusal::NoTrip,
+        Refusal::Tripped,
+    ];
+
+    /// The name used in recordings.
+    pub fn name(self) -> &'static str {
+        match self {
+            Refusal::NotDisarmed => "not_disarmed",
+            Refusal::NotArmed => "not_armed",
+            Refusal::NoRun => "no_run",
+            Refusal::NoTrip => "no_trip",
+            Refusal::Tripped => "tripped",
+        }
+    }
 }
 
 /// A message from the loop to the recorder, through the ring.

@@ -11,7 +11,9 @@ use super::clock::{Clock, TickTiming};
 use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
-use super::record::{EventKind, REQUESTS_PER_TICK, RequestKind, TickRecord, flag};
+use super::record::{EventKind, REQUESTS_PER_TICK, RequestEvent, TickRecord, flag};
+use super::request::NumberedRequest;
+pub use super::request::Request;
 use super::settling::{Settling, SettlingStep};
 use crate::rig::calibration::Correction;
 
@@ -21,32 +23,6 @@ const NOT_FINITE: DeviceError = DeviceError {
     remedy: "this is a fault of the driver; please report it",
     code: 0,
 };
-
-/// A request to the loop, taken at the start of a tick. Its content is complete and immutable.
-pub enum Request {
-    /// Enable the amplifier.
-    Arm,
-    /// Run a program from the next tick on.
-    Start(Box<dyn Program>),
-    /// End the run: current to zero along a ramp, disarm.
-    Finish,
-    /// Zero current at once, disarm.
-    Stop,
-    /// The operator clears a trip.
-    Clear,
-}
-
-impl Request {
-    fn kind(&self) -> RequestKind {
-        match self {
-            Request::Arm => RequestKind::Arm,
-            Request::Start(_) => RequestKind::Start,
-            Request::Finish => RequestKind::Finish,
-            Request::Stop => RequestKind::Stop,
-            Request::Clear => RequestKind::Clear,
-        }
-    }
-}
 
 /// Progress of a running loop, for other threads.
 #[derive(Debug, Default)]
@@ -81,7 +57,7 @@ pub struct Servo {
 /// The loop's ends of the rings.
 pub struct Connections {
     /// Requests of the supervisor.
-    pub requests: Consumer<Request>,
+    pub requests: Consumer<NumberedRequest>,
     /// Programs that ended, to be freed outside the loop.
     pub retired: Producer<Box<dyn Program>>,
     /// Publishes records and events to the recorder.
@@ -307,17 +283,23 @@ impl Servo {
 
     fn take_requests(&mut self, tick: u64) {
         for _ in 0..REQUESTS_PER_TICK {
-            let Ok(request) = self.connections.requests.pop() else {
+            let Ok(NumberedRequest { id, request }) = self.connections.requests.pop() else {
                 return;
             };
-            self.event(tick, EventKind::Request(request.kind()));
-            match request {
-                Request::Arm => self.arm(tick),
-                Request::Start(program) => self.start(program, tick),
-                Request::Finish => self.finish(tick),
-                Request::Stop => self.switch_off(Transition::Stop, tick),
-                Request::Clear => self.clear(tick),
-            }
+            let kind = request.kind();
+            let refusal = kind.refusal(self.state);
+            self.event(tick, EventKind::Request(RequestEvent { id, kind, refusal }));
+            self.take(request, tick);
+        }
+    }
+
+    fn take(&mut self, request: Request, tick: u64) {
+        match request {
+            Request::Arm => self.arm(tick),
+            Request::Start(program) => self.start(program, tick),
+            Request::Finish => self.finish(tick),
+            Request::Stop => self.switch_off(Transition::Stop, tick),
+            Request::Clear => self.clear(tick),
         }
     }
 

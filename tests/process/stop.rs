@@ -4,7 +4,7 @@ use std::process::{Command, Stdio};
 
 use bench::recording::Recording;
 use bench::rt::arming::State;
-use bench::rt::record::{EventKind, RequestKind, TickRecord};
+use bench::rt::record::{Event, EventKind, RequestKind, TickRecord};
 
 use crate::common::{LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks};
 
@@ -27,6 +27,17 @@ fn tick_of(recording: &Recording, kind: EventKind) -> u64 {
     let mut events = recording.events().iter();
     let event = events.find(|event| event.kind == kind);
     event.unwrap_or_else(|| panic!("{kind:?} is recorded")).tick
+}
+
+/// The tick at which the loop took the first request of a kind.
+fn tick_of_request(recording: &Recording, kind: RequestKind) -> u64 {
+    let mut events = recording.events().iter();
+    let event = events.find(|event| is_request(event, kind));
+    event.unwrap_or_else(|| panic!("{kind:?} is recorded")).tick
+}
+
+fn is_request(event: &Event, kind: RequestKind) -> bool {
+    matches!(event.kind, EventKind::Request(request) if request.kind == kind)
 }
 
 /// A run stopped by a signal ends at zero current, with a complete recording and report.
@@ -59,7 +70,7 @@ fn stopped_by(signal: i32, run: LongRun) {
     );
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
-    let stop = tick_of(&recording, EventKind::Request(RequestKind::Finish));
+    let stop = tick_of_request(&recording, RequestKind::Finish);
     let settling = EventKind::State {
         from: State::Running,
         to: State::Settling,
@@ -171,7 +182,7 @@ fn second_ctrl_c_has_no_effect() {
     let stops = recording
         .events()
         .iter()
-        .filter(|e| e.kind == EventKind::Request(RequestKind::Stop))
+        .filter(|e| is_request(e, RequestKind::Stop))
         .count();
     assert_eq!(stops, 1);
 }
@@ -197,8 +208,8 @@ fn second_signal_cuts_the_current() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let recording = Recording::open(&recording_in(folder.path())).expect("a recording");
     assert!(!recording.truncated());
-    let finish = tick_of(&recording, EventKind::Request(RequestKind::Finish));
-    let stop = tick_of(&recording, EventKind::Request(RequestKind::Stop));
+    let finish = tick_of_request(&recording, RequestKind::Finish);
+    let stop = tick_of_request(&recording, RequestKind::Stop);
     assert!(stop > finish, "{stop} after {finish}");
     let ticks = ticks(&recording);
     let settled = ticks.iter().filter(|r| r.state == State::Settling);

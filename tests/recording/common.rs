@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bench::recording::{Header, Recorder, Totals};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
+use bench::rt::record::{Event, EventKind, LoopMessage, RequestEvent, RequestKind, TickRecord};
 use bench_hal::Validity;
 
 /// 5 kHz.
@@ -56,7 +56,14 @@ pub fn tick(number: u64) -> TickRecord {
 pub fn run(ticks: u64) -> Vec<LoopMessage> {
     let event = |tick, kind| LoopMessage::Event(Event { tick, kind });
     let mut run = vec![
-        event(0, EventKind::Request(RequestKind::Arm)),
+        event(
+            0,
+            EventKind::Request(RequestEvent {
+                id: 1,
+                kind: RequestKind::Arm,
+                refusal: None,
+            }),
+        ),
         event(
             0,
             EventKind::State {

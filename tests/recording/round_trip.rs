@@ -3,7 +3,9 @@ use std::path::PathBuf;
 
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
+use bench::rt::record::{
+    Event, EventKind, LoopMessage, Refusal, RequestEvent, RequestKind, TickRecord,
+};
 use bench_hal::Validity;
 
 use crate::common::{CONFIG, PERIOD_NS, bits, events_of, header, run, tick, ticks_of, write};
@@ -133,10 +135,26 @@ fn events_of_every_kind_round_trip_in_order() {
     let orders = [
         RequestKind::Arm,
         RequestKind::Start,
+        RequestKind::Finish,
         RequestKind::Stop,
         RequestKind::Clear,
     ];
-    let mut kinds: Vec<_> = orders.map(EventKind::Request).into();
+    let refusals = [
+        None,
+        Some(Refusal::NotDisarmed),
+        Some(Refusal::NotArmed),
+        Some(Refusal::NoRun),
+        Some(Refusal::NoTrip),
+        Some(Refusal::Tripped),
+    ];
+    let answers = orders.iter().flat_map(|&kind| {
+        refusals.map(|refusal| RequestEvent {
+            id: u64::MAX,
+            kind,
+            refusal,
+        })
+    });
+    let mut kinds: Vec<_> = answers.map(EventKind::Request).collect();
     kinds.extend(
         states
             .iter()

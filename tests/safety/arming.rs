@@ -9,11 +9,12 @@ use bench::rt::arming::{State, Transition};
 use bench::rt::clock::{Clock, TickTiming, Virtual};
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::record::{EventKind, LoopMessage, Refusal, RequestEvent};
+use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::{self, Pace};
 use bench_hal::{Rig, Tick, Validity};
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::Fault;
 use crate::rig::{
@@ -286,17 +287,89 @@ fn arm_request_in_other_states_does_not_enable_the_amplifier() {
     }
 }
 
+#[test]
+fn every_request_is_acknowledged_with_its_number_and_answer() {
+    use Refusal::{NoRun, NoTrip, NotArmed, NotDisarmed, Tripped};
+    // By initial state: Disarmed, Armed, Running, Settling, Tripped. `None`: accepted.
+    let arm = [
+        None,
+        Some(NotDisarmed),
+        Some(NotDisarmed),
+        Some(NotDisarmed),
+        Some(Tripped),
+    ];
+    let start = [
+        Some(NotArmed),
+        None,
+        Some(NotArmed),
+        Some(NotArmed),
+        Some(Tripped),
+    ];
+    let finish = [Some(NoRun), None, None, Some(NoRun), Some(Tripped)];
+    let clear = [Some(NoTrip), Some(NoTrip), Some(NoTrip), Some(NoTrip), None];
+    for (index, state) in STATES.into_iter().enumerate() {
+        let expected = [
+            (Request::Arm, arm[index]),
+            (Request::Start(endless(|_| 0.2)), start[index]),
+            (Request::Finish, finish[index]),
+            (Request::Stop, None),
+            (Request::Clear, clear[index]),
+        ];
+        for (request, refusal) in expected {
+            let mut bench = bench_in(state, false);
+            let sent = acknowledged(&bench).len() as u64;
+            let kind = request.kind();
+            bench.request(request);
+            bench.tick();
+            let id = sent + 1;
+            let answer = acknowledged(&bench).last().copied();
+            assert_eq!(
+                answer,
+                Some(RequestEvent { id, kind, refusal }),
+                "in {state:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn requests_are_numbered_from_1_in_the_order_in_which_they_were_sent() {
+    let mut bench = Bench::still(&stage(), &[]);
+    for request in [Request::Stop, Request::Arm, Request::Clear] {
+        bench.request(request);
+    }
+    bench.tick();
+    let ids: Vec<u64> = acknowledged(&bench)
+        .iter()
+        .map(|answer| answer.id)
+        .collect();
+    assert_eq!(ids, [1, 2, 3]);
+    // The numbers and answers are in the recording.
+    let (_folder, recording) = bench.recorded();
+    assert_eq!(recording.events(), bench.events());
+}
+
+/// The answers to the requests so far.
+fn acknowledged(bench: &Bench) -> Vec<RequestEvent> {
+    let events = bench.events().into_iter();
+    let answers = events.filter_map(|event| match event.kind {
+        EventKind::Request(answer) => Some(answer),
+        _ => None,
+    });
+    answers.collect()
+}
+
 /// A clock that adds requests between two ticks while the loop runs.
 struct RequestingClock {
     restarts: Arc<AtomicU64>,
-    requests: Producer<Request>,
+    requests: RequestSender,
     late: Vec<(u64, Request)>,
 }
 
 impl Clock for RequestingClock {
     fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
         while self.late.first().is_some_and(|(tick, _)| *tick == number) {
-            assert!(self.requests.push(self.late.remove(0).1).is_ok());
+            assert!(self.requests.send(self.late.remove(0).1).is_ok());
         }
         Virtual { period_s: 2e-4 }.wait(number, publisher)
     }
@@ -334,9 +407,9 @@ fn schedule_restarts_only_after_enabling_the_amplifier() {
     );
 }
 
-fn loop_around(rig: impl Rig + 'static) -> (Servo, Producer<Request>, Consumer<LoopMessage>) {
+fn loop_around(rig: impl Rig + 'static) -> (Servo, RequestSender, Consumer<LoopMessage>) {
     let (publisher, records) = RingBuffer::new(4096);
-    let (requests, taken) = RingBuffer::new(16);
+    let (requests, taken) = RequestSender::ring(16);
     let (retired, _) = RingBuffer::new(16);
     let connections = Connections {
         requests: taken,
@@ -375,9 +448,9 @@ fn panic_in_the_loop_disables_the_amplifier() {
     let log = Arc::clone(&rig.log);
     let (servo, mut requests, _records) = loop_around(rig);
     assert!(
-        requests.push(Request::Arm).is_ok()
+        requests.send(Request::Arm).is_ok()
             && requests
-                .push(Request::Start(Box::new(PanickingProgram)))
+                .send(Request::Start(Box::new(PanickingProgram)))
                 .is_ok()
     );
     let ended =

@@ -8,6 +8,7 @@ use bench::rt::clock::{Clock, Realtime, TickTiming};
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
+use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::{self, LoopOutcome};
 use bench_hal::{
@@ -58,9 +59,9 @@ fn run(
     let mut config = stage();
     config.interlock.overruns_per_s = overruns_per_s;
     let (publisher, mut records) = RingBuffer::new(1 << 14);
-    let (mut requests, taken) = RingBuffer::new(16);
+    let (mut requests, taken) = RequestSender::ring(16);
     let (retired, _retired) = RingBuffer::new(16);
-    assert!(requests.push(Request::Arm).is_ok() && requests.push(Request::Start(program)).is_ok());
+    assert!(requests.send(Request::Arm).is_ok() && requests.send(Request::Start(program)).is_ok());
     let connections = Connections {
         requests: taken,
         retired,

@@ -182,7 +182,7 @@ fn trips_requests_and_late_ticks_make_no_system_calls() {
             }
             for other in &mut others {
                 if let Some(request) = other.take() {
-                    let _ = test_loop.requests.push(request);
+                    let _ = test_loop.requests.send(request);
                 }
                 test_loop.bare_tick(2);
                 test_loop.collect();

@@ -10,8 +10,9 @@ use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage};
+use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};
 use crate::programs::NO_CURRENT;
@@ -19,7 +20,7 @@ use crate::programs::NO_CURRENT;
 /// A loop with its rings, and a summary of its messages.
 pub struct TestLoop {
     pub servo: Servo,
-    pub requests: Producer<Request>,
+    pub requests: RequestSender,
     records: Consumer<LoopMessage>,
     retired: Consumer<Box<dyn Program>>,
     pub clock: Virtual,
@@ -33,7 +34,7 @@ impl TestLoop {
     pub fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> TestLoop {
         let rig = FaultyRig::new(SimulatedRig::new(config).expect("a rig"), faults);
         let (publisher, records) = RingBuffer::new(1024);
-        let (requests, taken) = RingBuffer::new(16);
+        let (requests, taken) = RequestSender::ring(16);
         let (hand_back, retired) = RingBuffer::new(4);
         let connections = Connections {
             requests: taken,
@@ -74,7 +75,7 @@ impl TestLoop {
     }
 
     pub fn request(&mut self, request: Request) {
-        assert!(self.requests.push(request).is_ok());
+        assert!(self.requests.send(request).is_ok());
     }
 
     /// One tick of the loop, after `missed` missed ticks.

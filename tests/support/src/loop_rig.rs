@@ -13,12 +13,13 @@ use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
 };
-use rtrb::{Consumer, Producer, RingBuffer};
+use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};
 
@@ -198,7 +199,7 @@ pub fn interlocks(config: &Config) -> Interlocks {
 /// The loop, its rings, and everything it has published.
 pub struct Bench {
     servo: Servo,
-    requests: Producer<Request>,
+    requests: RequestSender,
     published: Consumer<LoopMessage>,
     retired: Consumer<Box<dyn Program>>,
     log: Log,
@@ -216,7 +217,7 @@ impl Bench {
         let logged = LoggedRig::new(rig);
         let (log, now) = (Arc::clone(&logged.log), Arc::clone(&logged.now));
         let (publisher, published) = RingBuffer::new(256);
-        let (requests, taken) = RingBuffer::new(16);
+        let (requests, taken) = RequestSender::ring(16);
         let (hand_back, retired) = RingBuffer::new(16);
         let connections = Connections {
             requests: taken,
@@ -276,7 +277,7 @@ impl Bench {
     /// Adds a request, which the loop processes in its next tick.
     pub fn request(&mut self, request: Request) {
         assert!(
-            self.requests.push(request).is_ok(),
+            self.requests.send(request).is_ok(),
             "the ring of requests is full"
         );
     }
