@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use bench::config::{Config, Source, load};
 use bench::control::{Controller, ControllerText};
 use bench::experiment::Plan;
-use bench::recording::{self, Header, Recorder};
+use bench::recording::{self, DiskWatch, Header, Recorder};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
@@ -98,8 +98,8 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
         period_ns: 200_000,
         ..Header::default()
     };
-    let recorder =
-        Recorder::create(&folder.path().join("bench.mcap"), &header).expect("temporary file");
+    let path = folder.path().join("bench.mcap");
+    let recorder = Recorder::create(&path, &header).expect("temporary file");
     let (producer, consumer) = RingBuffer::new(1 << 16);
     let (mut requests, taken) = RequestSender::ring(4);
     let (retired, _kept) = RingBuffer::new(4);
@@ -121,7 +121,9 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
         assert!(requests.send(order).is_ok());
     }
-    let recorder = recording::spawn(recorder, consumer).expect("a thread");
+    let predicted_bytes = recording::predicted_bytes(u64::MAX);
+    let disk = DiskWatch::of(&path, predicted_bytes).expect("the file of the recording");
+    let recorder = recording::spawn(recorder, consumer, disk).expect("a thread");
     let start = Instant::now();
     let ended = run(
         servo,

@@ -13,7 +13,7 @@ use super::table::{labelled, wrap};
 use crate::config::Config;
 use crate::experiment::{
     self, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, Run, RunSummary, Runner,
-    Setup, Stage, TimingSummary, TripSummary,
+    Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
@@ -184,9 +184,25 @@ pub(super) fn run_text(summary: &RunSummary, config: &Config) -> String {
         summary.lost_records,
     );
     wrap(&ending, 0)
+        + &stop_text(summary.stop_cause)
         + &timing_text(&summary.timing)
         + &trip.unwrap_or_default()
         + &labelled("recording", &summary.recording)
+}
+
+/// Why the run was stopped, if nobody stopped it.
+fn stop_text(cause: Option<StopCause>) -> String {
+    match cause {
+        Some(StopCause::DiskNearlyFull) => labelled(
+            "stopped",
+            "the disk of the recording had less than 100 MB of free space; free some space, or record to another disk with --out",
+        ),
+        Some(StopCause::RecordingTooLarge) => labelled(
+            "stopped",
+            "the recording was more than 10 times as large as the plan predicts; report this with the recording",
+        ),
+        Some(StopCause::RecordingFailed | StopCause::Signal) | None => String::new(),
+    }
 }
 
 fn timing_text(timing: &TimingSummary) -> String {

@@ -2,16 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use nix::sys::statvfs::statvfs;
 use nix::unistd::{AccessFlags, eaccess};
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-
-/// Upper limit of the size of a tick in a recording, in bytes (`tests/doctor` measures it).
-pub const BYTES_PER_TICK: u64 = 120;
-/// With less free space than this, in bytes, a recording cannot begin.
-const MIN_FREE_BYTES: u64 = 1 << 20;
+use crate::recording::{MIN_FREE_BYTES, free_bytes, nearest_existing, predicted_bytes};
 
 /// Facts about the folder.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,18 +38,15 @@ pub struct Space {
 
 /// Examines `folder`, for a run of `ticks`.
 pub fn gather(folder: &Path, ticks: u64) -> SpaceFacts {
-    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf());
-    let existing = absolute.ancestors().find(|path| path.exists());
-    let existing = existing.unwrap_or(Path::new("/")).to_path_buf();
+    let existing = nearest_existing(folder);
     let access = eaccess(&existing, AccessFlags::W_OK | AccessFlags::X_OK);
-    let free = statvfs(&existing).map(|fs| fs.blocks_available() * fs.fragment_size());
     SpaceFacts {
         folder: folder.to_path_buf(),
         is_folder: existing.is_dir(),
         not_writable: access.err().map(|error| error.to_string()),
+        free_bytes: free_bytes(&existing),
         existing,
-        free_bytes: free.ok(),
-        needed_bytes: ticks.saturating_mul(BYTES_PER_TICK),
+        needed_bytes: predicted_bytes(ticks),
     }
 }
 
@@ -91,16 +83,20 @@ pub fn finding(facts: &SpaceFacts) -> Finding {
 
 fn space(facts: &SpaceFacts, free_bytes: u64) -> Finding {
     let what = format!(
-        "{} is writable, {} free; the longest configured run needs up to {}",
+        "{} is writable, {} free; the longest configured run needs up to {} and must leave {}",
         facts.folder.display(),
         megabytes(free_bytes),
-        megabytes(facts.needed_bytes)
+        megabytes(facts.needed_bytes),
+        megabytes(MIN_FREE_BYTES)
     );
     let remedy = "free some space, or choose another folder with --out";
     if free_bytes < MIN_FREE_BYTES {
         Subject::Recordings.failure(what, remedy)
-    } else if free_bytes < facts.needed_bytes {
-        Subject::Recordings.warning(what, format!("{remedy}: a full disk stops the run"))
+    } else if free_bytes < facts.needed_bytes.saturating_add(MIN_FREE_BYTES) {
+        Subject::Recordings.warning(
+            what,
+            format!("{remedy}: a run that does not fit is refused"),
+        )
     } else {
         Subject::Recordings.ok(what)
     }
@@ -138,8 +134,13 @@ mod tests {
         assert_eq!(severity(|_| {}), Severity::Ok);
         assert_eq!(severity(|f| f.free_bytes = None), Severity::Note);
         assert_eq!(
+            severity(|f| f.free_bytes = Some(150_000_000)),
+            Severity::Warning,
+            "72 MB and a reserve of 100 MB"
+        );
+        assert_eq!(
             severity(|f| f.free_bytes = Some(50_000_000)),
-            Severity::Warning
+            Severity::Failure
         );
         assert_eq!(severity(|f| f.free_bytes = Some(4096)), Severity::Failure);
         assert_eq!(
@@ -155,7 +156,7 @@ mod tests {
         let facts = gather(&folder.path().join("a/b"), 1000);
         assert_eq!(facts.existing, folder.path());
         assert_eq!((facts.is_folder, &facts.not_writable), (true, &None));
-        assert_eq!(facts.needed_bytes, 1000 * BYTES_PER_TICK);
+        assert_eq!(facts.needed_bytes, predicted_bytes(1000));
         assert!(facts.free_bytes.is_some() && !folder.path().join("a").exists());
     }
 

@@ -62,7 +62,7 @@ pub use prediction::{extremes, predicted_extremes, rig_model};
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use response_estimate::{ClosedResponses, MeasuredMargins};
-pub use run::{Run, run};
+pub use run::{Run, StopCause, run};
 pub use run_error::RunError;
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};

@@ -112,6 +112,7 @@ impl RememberedMotor<'_> {
                 RunError::Plan(_)
                 | RunError::Create(_)
                 | RunError::Folder { .. }
+                | RunError::Space { .. }
                 | RunError::System { .. },
             ) => plan.motor.thermal_a2,
             Err(RunError::Recording(_) | RunError::AnalysisDied | RunError::LoopDied(_)) => return,

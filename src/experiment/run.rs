@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
+use serde::Serialize;
 
 use super::connections::{OutsideEnds, connect};
 use super::file_name;
@@ -15,7 +16,10 @@ use super::motor_start::MotorStart;
 use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, Plan, RAMP_TICKS};
 use super::run_error::RunError;
 use super::signals::{StopSignals, runtime};
-use crate::recording::{self, Header, Health, Recorder, RecordingError, Totals};
+use crate::recording::{
+    self, DiskWatch, Header, Health, MIN_FREE_BYTES, Recorder, RecordingError, Shortage, Totals,
+    free_bytes, lacks_space, predicted_bytes,
+};
 use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
@@ -41,8 +45,8 @@ pub struct Run {
     pub pace: Pace,
     /// How the loop was scheduled.
     pub scheduling: Scheduling,
-    /// Whether the operator or the system stopped it.
-    pub stopped: bool,
+    /// Why it was stopped early; `None` if it was not.
+    pub stop_cause: Option<StopCause>,
     /// The thermal state of the motor at its start.
     pub motor: MotorStart,
     recorder: Recorder,
@@ -86,6 +90,7 @@ struct PreparedRun {
     outside: OutsideEnds,
     pace: Pace,
     total_ticks: u64,
+    recording_bytes: u64,
     motor: MotorStart,
 }
 
@@ -97,9 +102,11 @@ fn prepare_run(
 ) -> Result<PreparedRun, RunError> {
     let program = plan.program()?;
     let total_ticks = program.ticks();
+    let ramp_ticks = plan.ramp_ticks()?;
+    let recording_bytes = recording_bytes(plan, total_ticks, ramp_ticks);
+    require_space(folder, recording_bytes, free_bytes(folder))?;
     let (connections, mut outside) = connect(RING_SLOTS);
     queue_start(&mut outside.requests, program);
-    let ramp_ticks = plan.ramp_ticks()?;
     let servo_loop = prepare_loop(plan, rig, connections, pace, ramp_ticks)?;
     let mut metadata = metadata(plan, pace, servo_loop.scheduling());
     metadata.insert(RAMP_TICKS.into(), ramp_ticks.to_string());
@@ -110,7 +117,32 @@ fn prepare_run(
         outside,
         pace,
         total_ticks,
+        recording_bytes,
         motor: plan.motor.clone(),
+    })
+}
+
+/// Upper limit of the size of the recording: the program, both ramps at its end, and the ticks after it.
+fn recording_bytes(plan: &Plan, program_ticks: u64, ramp_ticks: u64) -> u64 {
+    let after_ticks = ramp_ticks
+        .saturating_mul(2)
+        .saturating_add(tail_ticks(plan));
+    predicted_bytes(program_ticks.saturating_add(after_ticks))
+}
+
+fn tail_ticks(plan: &Plan) -> u64 {
+    (TAIL_S * plan.config.servo.rate_hz) as u64
+}
+
+/// Refuses a run whose recording might fill the disk.
+fn require_space(folder: &Path, bytes: u64, free: Option<u64>) -> Result<(), RunError> {
+    if !lacks_space(free, bytes.saturating_add(MIN_FREE_BYTES)) {
+        return Ok(());
+    }
+    Err(RunError::Space {
+        folder: folder.into(),
+        free_bytes: free.unwrap_or_default(),
+        needed_bytes: bytes,
     })
 }
 
@@ -149,8 +181,7 @@ fn prepare_loop(
 ) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
     let servo = servo(plan, rig, connections, plan.correction()).with_ramps(ramp_ticks);
-    let tail_ticks = (TAIL_S * config.servo.rate_hz) as u64;
-    prepare(servo, &config.servo, pace, tail_ticks)
+    prepare(servo, &config.servo, pace, tail_ticks(plan))
         .map_err(RunError::system("start the thread of the loop"))
 }
 
@@ -240,11 +271,13 @@ impl PreparedRun {
         } = self.outside;
         let path = self.recorder.path().to_path_buf();
         let scheduling = self.servo_loop.scheduling().clone();
-        let recorder = recording::spawn(self.recorder, records).map_err(RunError::Create)?;
+        let disk = DiskWatch::of(&path, self.recording_bytes).map_err(RunError::Create)?;
+        let recorder = recording::spawn(self.recorder, records, disk).map_err(RunError::Create)?;
         let mut supervisor = Supervisor {
             requests,
             health: recorder.health(),
             stopping: Stopping::No,
+            cause: None,
         };
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
@@ -256,7 +289,7 @@ impl PreparedRun {
             ended,
             pace: self.pace,
             scheduling,
-            stopped: supervisor.stopping != Stopping::No,
+            stop_cause: supervisor.cause,
             motor: self.motor,
             recorder,
         })
@@ -268,6 +301,30 @@ struct Supervisor {
     requests: RequestSender,
     health: Arc<Health>,
     stopping: Stopping,
+    cause: Option<StopCause>,
+}
+
+/// Why a run was stopped before its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum StopCause {
+    /// A signal of the operator or of the system.
+    Signal,
+    /// The recording could not be written.
+    RecordingFailed,
+    /// The disk of the recording had little free space.
+    DiskNearlyFull,
+    /// The recording was much larger than the plan predicts.
+    RecordingTooLarge,
+}
+
+impl From<Shortage> for StopCause {
+    fn from(shortage: Shortage) -> StopCause {
+        match shortage {
+            Shortage::DiskNearlyFull => StopCause::DiskNearlyFull,
+            Shortage::TooLarge => StopCause::RecordingTooLarge,
+        }
+    }
 }
 
 /// What the supervisor requested to end the run early.
@@ -310,19 +367,39 @@ impl Supervisor {
                 _ = beat.tick() => watch(),
                 () = signals.received() => self.signalled(),
             }
-            if self.health.failed() && self.stopping == Stopping::No {
-                self.request(Request::Finish, Stopping::Ramp);
-            }
+            self.watch_recording();
+        }
+    }
+
+    /// Ends a run that cannot be recorded any more.
+    fn watch_recording(&mut self) {
+        if let Some(cause) = self.recording_defect()
+            && self.stopping == Stopping::No
+        {
+            self.finish(cause);
+        }
+    }
+
+    /// Why the run cannot be recorded any more, if so.
+    fn recording_defect(&self) -> Option<StopCause> {
+        match self.health.failed() {
+            true => Some(StopCause::RecordingFailed),
+            false => self.health.shortage().map(StopCause::from),
         }
     }
 
     /// The first signal ends the run along a ramp, the second one cuts the current.
     fn signalled(&mut self) {
         match self.stopping {
-            Stopping::No => self.request(Request::Finish, Stopping::Ramp),
+            Stopping::No => self.finish(StopCause::Signal),
             Stopping::Ramp => self.request(Request::Stop, Stopping::Cut),
             Stopping::Cut => {}
         }
+    }
+
+    fn finish(&mut self, cause: StopCause) {
+        self.request(Request::Finish, Stopping::Ramp);
+        self.cause.get_or_insert(cause);
     }
 
     /// Sends a request. If there is no room for it, the next signal sends it again.
@@ -330,5 +407,78 @@ impl Supervisor {
         if self.requests.send(request).is_ok() {
             self.stopping = stopping;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::DiskState;
+    use crate::rt::record::{LoopMessage, TickRecord};
+
+    #[test]
+    fn refuses_a_run_that_leaves_less_than_100_megabytes_free() {
+        let folder = Path::new("somewhere");
+        let free = |free_bytes| require_space(folder, 72_000_000, free_bytes);
+        assert!(free(Some(172_000_000)).is_ok());
+        assert!(free(None).is_ok(), "unknown");
+        let refused = free(Some(171_999_999)).unwrap_err().to_string();
+        for part in ["somewhere", "172.0 MB", "72.0 MB", "100 MB", "--out"] {
+            assert!(refused.contains(part), "{part}: {refused}");
+        }
+        assert!(require_space(folder, u64::MAX, Some(u64::MAX - 1)).is_err());
+    }
+
+    #[test]
+    fn each_shortage_ends_the_run_once_along_a_ramp() {
+        for (free_bytes, size_bytes, cause) in [
+            (50_000_000, 0, StopCause::DiskNearlyFull),
+            (1 << 40, 100_100_000, StopCause::RecordingTooLarge),
+        ] {
+            let (requests, mut taken) = RequestSender::ring(4);
+            let mut supervisor = Supervisor {
+                requests,
+                health: health_of_a_recorder(free_bytes, size_bytes),
+                stopping: Stopping::No,
+                cause: None,
+            };
+            supervisor.watch_recording();
+            assert!(
+                taken
+                    .pop()
+                    .is_ok_and(|sent| matches!(sent.request, Request::Finish))
+            );
+            assert_eq!(supervisor.cause, Some(cause));
+            supervisor.watch_recording();
+            assert!(taken.pop().is_err(), "one request");
+        }
+    }
+
+    /// The state of a recorder after 1000 ticks on a disk with these sizes.
+    fn health_of_a_recorder(free_bytes: u64, size_bytes: u64) -> Arc<Health> {
+        let path = Path::new("recording.mcap");
+        let header = Header {
+            period_ns: 200_000,
+            ..Header::default()
+        };
+        let recorder = Recorder::over(Box::new(std::io::sink()), path, &header).unwrap();
+        let (mut ring, records) = rtrb::RingBuffer::new(1000);
+        for tick in 0..1000 {
+            let tick = TickRecord {
+                tick,
+                ..TickRecord::default()
+            };
+            ring.push(LoopMessage::Tick(tick)).unwrap();
+        }
+        drop(ring);
+        let state = DiskState {
+            free_bytes: Some(free_bytes),
+            size_bytes,
+        };
+        let disk = DiskWatch::over(Box::new(move || state), 1000);
+        let recorder = recording::spawn(recorder, records, disk).unwrap();
+        let health = recorder.health();
+        assert_eq!(recorder.join().unwrap().ticks(), 1000, "all are recorded");
+        health
     }
 }

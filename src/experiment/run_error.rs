@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::plan_error::PlanError;
-use crate::recording::RecordingError;
+use crate::recording::{MIN_FREE_BYTES, RecordingError};
 
 /// A run that was refused, or that failed.
 #[derive(Debug, thiserror::Error)]
@@ -24,6 +24,19 @@ pub enum RunError {
         /// The error of the operating system.
         why: String,
     },
+    /// The disk has too little free space.
+    #[error(
+        "{}: {:.1} MB are free, but the recording may need {:.1} MB and must leave {:.0} MB; free some space, shorten the run or choose another folder with --out; nothing was moved",
+        folder.display(), megabytes(*free_bytes), megabytes(*needed_bytes), megabytes(MIN_FREE_BYTES)
+    )]
+    Space {
+        /// The folder for the recording.
+        folder: PathBuf,
+        /// Free space in bytes.
+        free_bytes: u64,
+        /// Upper limit of the size of the recording in bytes.
+        needed_bytes: u64,
+    },
     /// The recording failed.
     #[error("{0}; the run was stopped with zero current")]
     Recording(#[from] RecordingError),
@@ -43,6 +56,10 @@ pub enum RunError {
         "the thread of the loop panicked, and the amplifier was disabled; report this with the recording up to then, {0}"
     )]
     LoopDied(PathBuf),
+}
+
+fn megabytes(bytes: u64) -> f64 {
+    bytes as f64 * 1e-6
 }
 
 impl RunError {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::ending::Ending;
-use super::run::Run;
+use super::run::{Run, StopCause};
 use crate::recording::{Quantiles, RecordingError};
 use crate::rt::arming::Trip;
 use crate::rt::thread::{Pace, Scheduling};
@@ -13,6 +13,9 @@ use crate::rt::thread::{Pace, Scheduling};
 pub struct RunSummary {
     /// How the run ended.
     pub outcome: Ending,
+    /// Why it was stopped early.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stop_cause: Option<StopCause>,
     /// The trip that ended it.
     pub trip: Option<TripSummary>,
     /// Recorded ticks.
@@ -92,6 +95,7 @@ impl RunSummary {
         let ending = Ending::from(&run.ended);
         Ok(RunSummary {
             outcome: ending,
+            stop_cause: run.stop_cause,
             trip: TripSummary::of(ending),
             ticks: totals.ticks,
             overruns: totals.overruns,

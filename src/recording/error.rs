@@ -50,6 +50,15 @@ pub enum RecordingError {
         /// The previous tick.
         after: u64,
     },
+    /// A run went on after it was ordered to end.
+    #[error("{}: the run did not end when its recording became too large for the disk or for its plan, so the recording ends \
+        after {ticks} ticks; complete it with `bench recover`, and report this", path.display())]
+    Endless {
+        /// The file.
+        path: PathBuf,
+        /// Ticks received until then.
+        ticks: u64,
+    },
     /// The file was removed while it was written.
     #[error("{}: the recording was removed during the run, so its data are lost; record again, and do not change the folder during a run", path.display())]
     Removed {

@@ -12,6 +12,7 @@
 //! | [`messages`], [`schema`] | the protobuf messages of the channels `/loop`, `/event`, `/timing` and their description |
 //! | `writer` | [`Recorder`]: creates the file, writes ticks and events, summarises each second, adds the results |
 //! | `thread` | [`spawn`]: the recorder on its own thread, which a full disk does not stop |
+//! | `disk` | [`DiskWatch`]: ends a run before its recording fills the disk |
 //! | `walk`, `contents` | read a file record by record and return only checked data |
 //! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, counts gaps, streams [`Ticks`] |
 //! | `summary`, `scanner`, `losses` | read a damaged file: pass over each damage to the next intact record |
@@ -34,6 +35,7 @@ mod contents;
 mod continuity;
 mod descriptor;
 mod digest;
+mod disk;
 mod error;
 mod event_message;
 mod losses;
@@ -50,6 +52,10 @@ mod walk;
 mod writer;
 
 pub use continuity::Gap;
+pub use disk::{
+    BYTES_PER_TICK, DiskState, DiskWatch, MIN_FREE_BYTES, Shortage, free_bytes, lacks_space,
+    nearest_existing, predicted_bytes,
+};
 pub use error::{Emptiness, RecordingError};
 pub use losses::{Cut, DamagedRange, MissingTicks};
 pub use reader::{Recording, StoredAttachment};

@@ -1,19 +1,23 @@
 //! The thread of the recorder, between the ring of the loop and the disk.
 
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
 use rtrb::Consumer;
 
+use super::disk::{DiskWatch, Shortage, Space};
 use super::{Recorder, RecordingError};
 use crate::rt::record::LoopMessage;
 
 /// Pause of the thread when the ring is empty: 5 ticks at 5 kHz, so the ring stays nearly empty and an idle recorder needs
 /// almost no processor time.
 const IDLE_PAUSE: Duration = Duration::from_millis(1);
+
+/// Records between two checks of the disk, at most 120 kB.
+const RECORDS_PER_CHECK: u64 = 1000;
 
 /// Nice value of the thread.
 const NICE: libc::c_int = 15;
@@ -24,6 +28,7 @@ pub struct Health {
     written: AtomicU64,
     discarded: AtomicU64,
     failed: AtomicBool,
+    shortage: OnceLock<Shortage>,
 }
 
 impl Health {
@@ -36,6 +41,11 @@ impl Health {
     /// Records that were taken from the ring after writing had failed. They are in no file.
     pub fn discarded(&self) -> u64 {
         self.discarded.load(Ordering::Relaxed)
+    }
+
+    /// Why the run must end although writing still succeeds: the recording is too large for the disk or for its plan.
+    pub fn shortage(&self) -> Option<Shortage> {
+        self.shortage.get().copied()
     }
 
     /// Whether writing has failed: the run should be stopped. [`RecorderHandle::join`] returns the reason.
@@ -71,17 +81,19 @@ impl RecorderHandle {
 /// real-time thread. It ends when the producer is dropped and the ring is empty.
 ///
 /// If writing fails (for example because the disk is full), the thread continues to empty the ring, so that the loop is not
-/// affected. It counts the lost records and reports the failure in [`Health`] at once.
+/// affected. It counts the lost records and reports the failure in [`Health`] at once. A shortage of disk space is reported there
+/// as well, while the recording goes on to the end of the run.
 pub fn spawn(
     recorder: Recorder,
     ring: Consumer<LoopMessage>,
+    disk: DiskWatch,
 ) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
     let shared = Arc::clone(&health);
     let path = recorder.path().to_path_buf();
     let thread = std::thread::Builder::new()
         .name("bench-recorder".into())
-        .spawn(move || run(recorder, ring, &shared))
+        .spawn(move || run(recorder, ring, disk, &shared))
         .map_err(|source| RecordingError::NotStarted {
             path: path.clone(),
             source,
@@ -96,6 +108,7 @@ pub fn spawn(
 fn run(
     mut recorder: Recorder,
     mut ring: Consumer<LoopMessage>,
+    mut disk: DiskWatch,
     health: &Health,
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
@@ -106,11 +119,36 @@ fn run(
         let ended = ring.is_abandoned();
         while let Ok(published) = ring.pop() {
             take(&published, &mut recorder, &mut outcome, health);
+            if outcome.is_ok() && health.written().is_multiple_of(RECORDS_PER_CHECK) {
+                outcome = check_disk(&mut disk, &recorder, health);
+            }
         }
         if ended {
             return outcome.map(|()| recorder);
         }
         std::thread::sleep(IDLE_PAUSE);
+    }
+}
+
+/// Reports a shortage. Fails if the run goes on in spite of it.
+fn check_disk(
+    disk: &mut DiskWatch,
+    recorder: &Recorder,
+    health: &Health,
+) -> Result<(), RecordingError> {
+    match disk.check() {
+        Space::Enough => Ok(()),
+        Space::Short(shortage) => {
+            health.shortage.get_or_init(|| shortage);
+            Ok(())
+        }
+        Space::Exhausted => {
+            health.failed.store(true, Ordering::Release);
+            Err(RecordingError::Endless {
+                path: recorder.path().into(),
+                ticks: recorder.ticks(),
+            })
+        }
     }
 }
 

@@ -105,6 +105,29 @@ fn disk_full_at_start_prevents_motion() {
 }
 
 #[test]
+fn run_that_does_not_fit_on_the_disk_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out");
+    let disk = nix::sys::statvfs::statvfs(folder.path()).expect("a disk");
+    let free_bytes = disk.blocks_available() * disk.fragment_size();
+    // 120 bytes in each of 5000 ticks of a second; twice the free space.
+    let duration = (2 * free_bytes / (120 * 5000)).to_string();
+    let arguments = ["control", "--slow", "--duration", &duration, "--out"];
+    let output = bench(&arguments).arg(&out).output().expect("it runs");
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    for part in [
+        "MB are free",
+        "must leave 100 MB",
+        "--out",
+        "nothing was moved",
+    ] {
+        assert!(message.contains(part), "{part}: {message}");
+    }
+    assert!(!out.exists(), "no folder is created");
+}
+
+#[test]
 fn unwritable_folder_is_reported_before_any_motion() {
     // No user, not even root, can create a file in /proc.
     let folder = tempfile::tempdir().expect("a temporary folder");

@@ -2,7 +2,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bench::recording::{Header, Recorder, Totals};
+use bench::recording::{DiskState, DiskWatch, Header, Recorder, Totals};
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{Event, EventKind, LoopMessage, RequestEvent, RequestKind, TickRecord};
 use bench_hal::Validity;
@@ -134,4 +134,13 @@ pub fn events_of(run: &[LoopMessage]) -> Vec<Event> {
         }
     };
     run.iter().filter_map(event).collect()
+}
+
+/// A disk on which there is always room.
+pub fn disk_with_room() -> DiskWatch {
+    let state = DiskState {
+        free_bytes: None,
+        size_bytes: 0,
+    };
+    DiskWatch::over(Box::new(move || state), 0)
 }

@@ -2,13 +2,17 @@
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use bench::recording::{Recorder, Recording, RecordingError, spawn};
+use bench::recording::{
+    DiskState, DiskWatch, Health, Recorder, Recording, RecordingError, Shortage, spawn,
+};
 use bench::rt::record::LoopMessage;
 use rtrb::RingBuffer;
 
-use crate::common::{header, tick};
+use crate::common::{disk_with_room, header, tick};
 
 fn dev_full() -> File {
     OpenOptions::new()
@@ -68,7 +72,7 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     };
     let recorder = Recorder::over(Box::new(disk), &path, &header()).expect("room for the head");
     let (mut ring, consumer) = RingBuffer::new(1024);
-    let handle = spawn(recorder, consumer).expect("a thread");
+    let handle = spawn(recorder, consumer, disk_with_room()).expect("a thread");
     let health = handle.health();
 
     // 40,000 ticks of about 90 bytes are more than three times the free space.
@@ -94,6 +98,61 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     );
     assert!(health.discarded() >= 15_000, "{}", health.discarded());
     assert_written_part_readable(&path, health.written());
+}
+
+#[test]
+fn nearly_full_disk_is_reported_while_the_recording_goes_on() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("whole.mcap");
+    let (health, recorder) = record_20_000_ticks(&path, |ticks| DiskState {
+        free_bytes: Some(if ticks < 10 { 100_000_000 } else { 99_999_999 }),
+        size_bytes: 1_200 * ticks,
+    });
+    assert_eq!(health.shortage(), Some(Shortage::DiskNearlyFull));
+    assert!(!health.failed());
+    let totals = recorder.expect("no failure").finish(&[]);
+    assert_eq!(totals.expect("complete").ticks, 20_000);
+    let recording = Recording::open(&path).expect("whole");
+    assert_eq!(
+        (recording.truncated(), recording.tick_count()),
+        (false, 20_000)
+    );
+}
+
+#[test]
+fn recording_that_never_ends_is_cut_50_megabytes_after_its_limit() {
+    // 20 MB in each check: above 100 MB at the 6th, 50 MB more at the 9th.
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("endless.mcap");
+    let (health, recorder) = record_20_000_ticks(&path, |checks| DiskState {
+        free_bytes: None,
+        size_bytes: 20_000_000 * checks,
+    });
+    assert_eq!(health.shortage(), Some(Shortage::TooLarge));
+    assert!(health.failed());
+    assert_eq!((health.written(), health.discarded()), (9_000, 11_000));
+    let error = recorder.err().expect("a failure");
+    assert!(
+        matches!(error, RecordingError::Endless { ticks: 9_000, .. }),
+        "{error}"
+    );
+    assert!(error.to_string().contains("bench recover"), "{error}");
+}
+
+/// Records ticks on a disk whose state is given by the number of the check, which is made once in 1000 records.
+fn record_20_000_ticks(
+    path: &Path,
+    state: fn(u64) -> DiskState,
+) -> (Arc<Health>, Result<Recorder, RecordingError>) {
+    let checks = AtomicU64::new(0);
+    let state = move || state(checks.fetch_add(1, Ordering::Relaxed) + 1);
+    let disk = DiskWatch::over(Box::new(state), 0);
+    let recorder = Recorder::create(path, &header()).expect("a fresh file");
+    let (mut ring, consumer) = RingBuffer::new(1024);
+    let handle = spawn(recorder, consumer, disk).expect("a thread");
+    (0..20_000).for_each(|n| push(&mut ring, LoopMessage::Tick(tick(n))));
+    drop(ring);
+    (handle.health(), handle.join())
 }
 
 /// Pushes a message, waiting for a free slot. If the ring stays full, the thread of the recorder has stopped reading it.

@@ -5,7 +5,7 @@ use bench::recording::{Recorder, Recording, spawn};
 use bench::rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
 
-use crate::common::{header, run, tick};
+use crate::common::{disk_with_room, header, run, tick};
 
 #[test]
 fn recording_contains_all_messages_sent_before_the_loop_ended() {
@@ -13,8 +13,12 @@ fn recording_contains_all_messages_sent_before_the_loop_ended() {
     let path = dir.path().join("run.mcap");
     let published = run(20_000);
     let (mut ring, consumer) = RingBuffer::new(published.len());
-    let handle =
-        spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
+    let handle = spawn(
+        Recorder::create(&path, &header()).expect("fresh"),
+        consumer,
+        disk_with_room(),
+    )
+    .expect("a thread");
     let health = handle.health();
     published
         .iter()
@@ -52,8 +56,12 @@ fn messages_beyond_the_ring_capacity_are_counted_as_lost() {
         .filter(|n| ring.push(LoopMessage::Tick(tick(*n))).is_err())
         .count() as u64;
     assert_eq!(refused, 50);
-    let handle =
-        spawn(Recorder::create(&path, &header()).expect("fresh"), consumer).expect("a thread");
+    let handle = spawn(
+        Recorder::create(&path, &header()).expect("fresh"),
+        consumer,
+        disk_with_room(),
+    )
+    .expect("a thread");
     let deadline = Instant::now() + Duration::from_secs(60);
     while ring.slots() < 100 {
         assert!(

@@ -152,7 +152,7 @@ fn measure_point(
     remove(&folder)?;
     let plan = Plan::chirp(config.clone());
     let mut run = run(setup, &plan)?;
-    if run.stopped {
+    if run.stop_cause.is_some() {
         remove(&folder)?;
         return Ok(None);
     }
@@ -188,7 +188,7 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         if let Some((trip, tick)) = run.ended.trip {
             return Err(tripped_at_rest(trip, tick).into());
         }
-        if run.stopped {
+        if run.stop_cause.is_some() {
             return Ok(None);
         }
         let path = run.path.clone();
