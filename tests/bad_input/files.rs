@@ -92,6 +92,8 @@ fn rejects_a_fifo_and_a_device_as_input() {
         "chirp --shape",
         "identify",
         "identify --input x --output y --rate 1000",
+        "model study --vary plant.secondary_stage_mass_kg=+-2% --draws 10 --file",
+        "model study --join",
     ] {
         for (file, what) in [("fifo", "a FIFO"), ("/dev/zero", "a device")] {
             let answer = bench.run(&format!("{command} {file}"));
