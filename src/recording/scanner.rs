@@ -1,5 +1,6 @@
 //! Reads a damaged file: after each damage it continues with the next intact record.
 //!
+//! A chunk whose opcode or length is altered is found by its index in the summary, if there is one.
 //! The record after a damaged one is the one at which the length of the damaged record ends, if a record begins there.
 //! Otherwise it is the next position at which a chunk or an attachment with a matching CRC begins.
 
@@ -8,7 +9,7 @@ use std::io;
 use std::os::unix::fs::FileExt;
 
 use mcap::MAGIC;
-use mcap::records::op;
+use mcap::records::{ChunkIndex, op};
 
 use super::contents::{Contents, Take, is_intact};
 use super::losses::{Cut, DamagedRange};
@@ -39,7 +40,7 @@ pub(super) struct Scanner {
 }
 
 /// Opcode, and position of the content.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 struct RecordHead {
     opcode: u8,
     data_at: u64,
@@ -93,15 +94,74 @@ impl Scanner {
 
     /// Reads one record, or passes over a damage; `false` at the end of the data.
     pub(super) fn step(&mut self, take: &mut Take) -> io::Result<bool> {
-        let Some(head) = self.head_at(self.offset)? else {
+        let Some(head) = self.head_here()? else {
             return self.pass_over(self.why_no_record()?, take);
         };
         let data = self.data_of(head)?;
-        let taken = self.check(head, &data);
-        match taken.and_then(|()| self.contents.record(head.opcode, &data, take)) {
+        let checked = self.check(head, &data);
+        let taken = checked.and_then(|()| self.contents.record(head.opcode, &data, take));
+        let taken = taken.or_else(|why| match self.take_repaired(&data, &why, take) {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(why),
+            Err(why) => Err(why),
+        });
+        match taken {
             Ok(()) => self.advance(head, &data, take),
             Err(why) => self.pass_over(why, take),
         }
+    }
+
+    /// The record at `offset`. Where an intact chunk begins by the index of the chunks, its head may be altered.
+    fn head_here(&mut self) -> io::Result<Option<RecordHead>> {
+        let found = self.head_at(self.offset)?;
+        let Some(indexed) = self.indexed_chunk().filter(|head| found != Some(*head)) else {
+            return Ok(found);
+        };
+        if !is_intact(indexed.opcode, &self.data_of(indexed)?) {
+            return Ok(found);
+        }
+        let why =
+            "the opcode or the length of a chunk is altered; the index of the chunks states it";
+        self.note_damage(self.offset, indexed.data_at, why.into());
+        self.crc = None;
+        Ok(Some(indexed))
+    }
+
+    /// The chunk that begins at `offset` by the index of the chunks.
+    fn indexed_chunk(&self) -> Option<RecordHead> {
+        let length = self.chunk_index()?.chunk_length;
+        let head = RecordHead {
+            opcode: op::CHUNK,
+            data_at: self.offset.checked_add(RECORD_HEAD_BYTES as u64)?,
+            data_bytes: length.checked_sub(RECORD_HEAD_BYTES as u64)?,
+        };
+        (head.data_at <= self.file_bytes && self.contains(&head)).then_some(head)
+    }
+
+    /// What the summary states of the chunk that begins at `offset`.
+    fn chunk_index(&self) -> Option<&ChunkIndex> {
+        self.summary.as_ref()?.chunks.get(&self.offset)
+    }
+
+    /// Takes a damaged chunk if it is intact with the sizes and the compression that its index states; `false` if not.
+    fn take_repaired(&mut self, chunk: &[u8], why: &str, take: &mut Take) -> Result<bool, String> {
+        let index = self.chunk_index();
+        let repaired = index.and_then(|index| with_header_of_index(chunk, index));
+        let Some(repaired) = repaired.filter(|repaired| repaired != chunk) else {
+            return Ok(false);
+        };
+        if !is_intact(op::CHUNK, &repaired) {
+            return Ok(false);
+        }
+        let why = format!("{why}; the index of the chunks states the true header");
+        self.note_damage(
+            self.offset,
+            self.offset + RECORD_HEAD_BYTES as u64 + 24,
+            why,
+        );
+        self.crc = None;
+        self.contents.record(op::CHUNK, &repaired, take)?;
+        Ok(true)
     }
 
     fn advance(&mut self, head: RecordHead, data: &[u8], take: &mut Take) -> io::Result<bool> {
@@ -285,6 +345,26 @@ impl Scanner {
         self.file.read_exact_at(&mut data, head.data_at)?;
         Ok(data)
     }
+}
+
+/// A chunk with the sizes and the compression of its index. A chunk consists of two times and the size of its uncompressed
+/// records (u64 each), their CRC (u32), the name of the compression (length u32 and text), and the length (u64) and the bytes of
+/// the records. `None` if the lengths do not fit.
+fn with_header_of_index(chunk: &[u8], index: &ChunkIndex) -> Option<Vec<u8>> {
+    let records = usize::try_from(index.compressed_size).ok()?;
+    let compression = index.compression.as_bytes();
+    let header_bytes = 3 * 8 + 4 + 4 + compression.len() + 8;
+    if chunk.len() != header_bytes.checked_add(records)? {
+        return None;
+    }
+    let mut repaired = chunk[..16].to_vec();
+    repaired.extend(index.uncompressed_size.to_le_bytes());
+    repaired.extend(&chunk[24..28]);
+    repaired.extend(u32::try_from(compression.len()).ok()?.to_le_bytes());
+    repaired.extend(compression);
+    repaired.extend(index.compressed_size.to_le_bytes());
+    repaired.extend(&chunk[header_bytes..]);
+    Some(repaired)
 }
 
 /// A channel (u16), the length of the entries (u32), and entries of a time and an offset (u64).

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 
-use mcap::records::{Footer, Record, op};
+use mcap::records::{ChunkIndex, Footer, Record, op};
 use mcap::{MAGIC, parse_record};
 
 use super::contents::Contents;
@@ -27,6 +27,8 @@ pub(super) struct Summary {
     pub(super) messages: BTreeMap<u16, u64>,
     /// Names of the attachments.
     pub(super) attachments: Vec<String>,
+    /// The chunks by their start.
+    pub(super) chunks: BTreeMap<u64, ChunkIndex>,
 }
 
 impl Summary {
@@ -52,6 +54,9 @@ impl Summary {
         match parse_record(opcode, data).ok()? {
             Record::Statistics(statistics) => self.messages = statistics.channel_message_counts,
             Record::AttachmentIndex(index) => self.attachments.push(index.name),
+            Record::ChunkIndex(index) => {
+                self.chunks.insert(index.chunk_start_offset, index);
+            }
             _ => {}
         }
         Some(())
