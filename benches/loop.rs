@@ -95,7 +95,8 @@ fn rig_and_record(c: &mut Criterion) {
 fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let folder = tempfile::tempdir().expect("temporary folder");
     let header = Header {
-        period_ns: 200_000,
+        period_s: 2e-4,
+        started_ns: 0,
         ..Header::default()
     };
     let path = folder.path().join("bench.mcap");

@@ -26,7 +26,8 @@ fn tick(number: u64) -> TickRecord {
 
 fn write(path: &Path, ticks: &[LoopMessage]) {
     let header = Header {
-        period_ns: 200_000,
+        period_s: 2e-4,
+        started_ns: 0,
         ..Header::default()
     };
     let mut recorder = Recorder::create(path, &header).expect("temporary file");

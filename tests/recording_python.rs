@@ -85,10 +85,14 @@ fn row(t: &TickRecord) -> Value {
     ])
 }
 
+/// A moment in 2026.
+const STARTED_NS: u64 = 1_790_000_000_000_000_000;
+
 fn record(path: &Path) {
     let header = Header {
         config_toml: CONFIG.into(),
-        period_ns: 200_000,
+        period_s: 2e-4,
+        started_ns: STARTED_NS,
         metadata: [("host".to_string(), "bench-1".to_string())].into(),
     };
     let mut recorder = Recorder::create(path, &header).expect("a fresh file");
@@ -168,8 +172,8 @@ fn python_reads_every_tick_bit_for_bit_with_the_embedded_schema() {
         (&json!(TICKS), &json!(0), &json!(10_999))
     );
     assert_eq!(
-        (&read["gaps"], &read["times_differ"]),
-        (&json!([]), &json!(0))
+        (&read["gaps"], &read["log_offsets_ns"]),
+        (&json!([]), &json!([STARTED_NS]))
     );
     for n in 0..TICKS {
         assert_eq!(read["values"][n as usize], row(&tick(n)), "tick {n}");
@@ -178,7 +182,12 @@ fn python_reads_every_tick_bit_for_bit_with_the_embedded_schema() {
     assert_eq!(read["attachments"]["result.json"], json!(2));
     assert_eq!(
         read["metadata"]["bench"],
-        json!({"host": "bench-1", "period_ns": "200000"})
+        json!({
+            "host": "bench-1",
+            "period_ns": "200000",
+            "period_s": "0.0002",
+            "started_ns": STARTED_NS.to_string(),
+        })
     );
     assert_events_and_summaries(&read);
 }

@@ -201,6 +201,10 @@ fn stop_text(cause: Option<StopCause>) -> String {
             "stopped",
             "the recording was more than 10 times as large as the plan predicts; report this with the recording",
         ),
+        Some(StopCause::RecordsLost) => {
+            let why = "no tick was recorded for 1 s, because the disk is too slow; record on another disk with --out";
+            labelled("stopped", why)
+        }
         Some(StopCause::RecordingFailed | StopCause::Signal) | None => String::new(),
     }
 }

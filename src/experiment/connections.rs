@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::rt::program::Program;
-use crate::rt::publisher::Publisher;
+use crate::rt::publisher::{EVENT_SLOTS, Publisher};
 use crate::rt::record::{LoopMessage, REQUESTS_PER_TICK};
 use crate::rt::request::RequestSender;
 use crate::rt::servo::{Connections, Progress};
@@ -24,7 +24,7 @@ pub(super) struct OutsideEnds {
 
 /// Both ends of new connections, with room for `record_slots` published records.
 pub(super) fn connect(record_slots: usize) -> (Connections, OutsideEnds) {
-    let (published, records) = RingBuffer::new(record_slots);
+    let (published, records) = RingBuffer::new(record_slots + EVENT_SLOTS);
     let (requests, taken) = RequestSender::ring(REQUESTS_PER_TICK);
     let (ended, retired) = RingBuffer::new(REQUESTS_PER_TICK);
     let progress = Arc::new(Progress::default());

@@ -24,7 +24,7 @@ use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
 use crate::rt::request::{Request, RequestSender};
-use crate::rt::servo::{Connections, Servo};
+use crate::rt::servo::{Connections, Progress, Servo};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 use crate::util::timestamp;
 
@@ -32,6 +32,8 @@ use crate::util::timestamp;
 const RING_SLOTS: usize = 1 << 16;
 /// Seconds that are recorded after the motor was switched off.
 pub(super) const TAIL_S: f64 = 0.1;
+/// Longest time in seconds during which a run goes on although its ticks are not recorded.
+const MAX_UNRECORDED_S: f64 = 1.0;
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
@@ -91,6 +93,7 @@ struct PreparedRun {
     pace: Pace,
     total_ticks: u64,
     recording_bytes: u64,
+    max_unrecorded_ticks: u64,
     motor: MotorStart,
 }
 
@@ -118,6 +121,7 @@ fn prepare_run(
         pace,
         total_ticks,
         recording_bytes,
+        max_unrecorded_ticks: (MAX_UNRECORDED_S * plan.config.servo.rate_hz) as u64,
         motor: plan.motor.clone(),
     })
 }
@@ -193,7 +197,8 @@ fn create_recording(
 ) -> Result<Recorder, RunError> {
     let header = Header {
         config_toml: plan.config_toml()?,
-        period_ns: libm::round(plan.config.servo.period_s() * 1e9) as u64,
+        period_s: plan.config.servo.period_s(),
+        started_ns: timestamp::unix_ns(SystemTime::now()),
         metadata,
     };
     create_folder(folder)?;
@@ -276,6 +281,8 @@ impl PreparedRun {
         let mut supervisor = Supervisor {
             requests,
             health: recorder.health(),
+            progress: Arc::clone(&progress),
+            max_unrecorded_ticks: self.max_unrecorded_ticks,
             stopping: Stopping::No,
             cause: None,
         };
@@ -300,6 +307,8 @@ impl PreparedRun {
 struct Supervisor {
     requests: RequestSender,
     health: Arc<Health>,
+    progress: Arc<Progress>,
+    max_unrecorded_ticks: u64,
     stopping: Stopping,
     cause: Option<StopCause>,
 }
@@ -312,6 +321,8 @@ pub enum StopCause {
     Signal,
     /// The recording could not be written.
     RecordingFailed,
+    /// No tick was recorded for [`MAX_UNRECORDED_S`]: the disk is too slow.
+    RecordsLost,
     /// The disk of the recording had little free space.
     DiskNearlyFull,
     /// The recording was much larger than the plan predicts.
@@ -382,9 +393,13 @@ impl Supervisor {
 
     /// Why the run cannot be recorded any more, if so.
     fn recording_defect(&self) -> Option<StopCause> {
-        match self.health.failed() {
-            true => Some(StopCause::RecordingFailed),
-            false => self.health.shortage().map(StopCause::from),
+        let unrecorded_ticks = self.progress.unrecorded_ticks.load(Ordering::Relaxed);
+        if self.health.failed() {
+            Some(StopCause::RecordingFailed)
+        } else if unrecorded_ticks >= self.max_unrecorded_ticks {
+            Some(StopCause::RecordsLost)
+        } else {
+            self.health.shortage().map(StopCause::from)
         }
     }
 
@@ -439,6 +454,8 @@ mod tests {
             let mut supervisor = Supervisor {
                 requests,
                 health: health_of_a_recorder(free_bytes, size_bytes),
+                progress: Arc::new(Progress::default()),
+                max_unrecorded_ticks: 5000,
                 stopping: Stopping::No,
                 cause: None,
             };
@@ -458,7 +475,7 @@ mod tests {
     fn health_of_a_recorder(free_bytes: u64, size_bytes: u64) -> Arc<Health> {
         let path = Path::new("recording.mcap");
         let header = Header {
-            period_ns: 200_000,
+            period_s: 2e-4,
             ..Header::default()
         };
         let recorder = Recorder::over(Box::new(std::io::sink()), path, &header).unwrap();
@@ -480,5 +497,29 @@ mod tests {
         let health = recorder.health();
         assert_eq!(recorder.join().unwrap().ticks(), 1000, "all are recorded");
         health
+    }
+
+    #[test]
+    fn run_ends_when_no_tick_is_recorded_for_a_second() {
+        let (requests, mut taken) = RequestSender::ring(4);
+        let progress = Arc::new(Progress::default());
+        let mut supervisor = Supervisor {
+            requests,
+            health: Arc::new(Health::default()),
+            progress: Arc::clone(&progress),
+            max_unrecorded_ticks: 5000,
+            stopping: Stopping::No,
+            cause: None,
+        };
+        progress.unrecorded_ticks.store(4999, Ordering::Relaxed);
+        supervisor.watch_recording();
+        assert!(taken.pop().is_err(), "a short loss does not end the run");
+        progress.unrecorded_ticks.store(5000, Ordering::Relaxed);
+        supervisor.watch_recording();
+        let taken_request = taken.pop().map(|numbered| numbered.request);
+        assert!(matches!(taken_request, Ok(Request::Finish)));
+        assert_eq!(supervisor.cause, Some(StopCause::RecordsLost));
+        supervisor.watch_recording();
+        assert!(taken.pop().is_err(), "one request");
     }
 }

@@ -3,7 +3,7 @@
 
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
-use crate::rt::record::{Event, EventKind, Refusal, RequestEvent, RequestKind};
+use crate::rt::record::{ClockTimes, Event, EventKind, Refusal, RequestEvent, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
@@ -13,6 +13,7 @@ impl From<&Event> for Message {
             EventKind::Trip(trip) => of_trip(trip),
             EventKind::Completed => message("completed", "the program came to its end".into()),
             EventKind::Lost { records } => of_lost(records),
+            EventKind::Clock(times) => of_clock(times),
         };
         Message {
             tick: event.tick,
@@ -73,6 +74,20 @@ fn of_lost(records: u64) -> Message {
     }
 }
 
+fn of_clock(times: ClockTimes) -> Message {
+    let ClockTimes {
+        loop_ns,
+        monotonic_ns,
+        wall_ns,
+    } = times;
+    Message {
+        loop_ns,
+        monotonic_ns,
+        wall_ns,
+        ..message("clock", "clocks of the system".into())
+    }
+}
+
 const REQUESTS: [(RequestKind, &str); 5] = [
     (RequestKind::Arm, "arm"),
     (RequestKind::Start, "start"),
@@ -96,6 +111,11 @@ impl TryFrom<&Message> for Event {
             "lost" => EventKind::Lost {
                 records: message.records,
             },
+            "clock" => EventKind::Clock(ClockTimes {
+                loop_ns: message.loop_ns,
+                monotonic_ns: message.monotonic_ns,
+                wall_ns: message.wall_ns,
+            }),
             other => return Err(unknown("kind", other)),
         };
         Ok(Event {

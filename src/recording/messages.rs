@@ -115,7 +115,7 @@ messages! {
     Event {
         /// The tick at which it took effect.
         field "1" (uint64) tick,
-        /// `order`, `state`, `trip`, `completed` or `lost`.
+        /// `order`, `state`, `trip`, `completed`, `lost` or `clock`.
         field "2" (string) kind,
         /// Readable text, for every kind.
         field "3" (string) text,
@@ -141,6 +141,12 @@ messages! {
         field "13" (uint64) id,
         /// Of an order that was refused: the short reason.
         field "14" (string) refusal,
+        /// Of `clock`: nanoseconds since the loop started.
+        field "15" (uint64) loop_ns,
+        /// Of `clock`: the monotonic clock of the system at the same moment.
+        field "16" (uint64) monotonic_ns,
+        /// Of `clock`: nanoseconds since 1970 at the same moment.
+        field "17" (uint64) wall_ns,
     }
     /// A summary of up to one second of scheduled time, on channel `/timing`.
     Timing {

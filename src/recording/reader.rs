@@ -15,6 +15,7 @@ use super::scanner::Scanner;
 use super::stream::{Decoded, Decoder, RecordReader, Stream, Ticks};
 use super::summary::Summary;
 use super::walk::{Stop, Walk};
+use super::writer::{PERIOD_S, STARTED_NS};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
 use crate::rt::record::{Event, TickRecord};
 use crate::util::input_file;
@@ -197,6 +198,22 @@ impl Recording {
     /// Period of the loop, if it is recorded.
     pub fn period_ns(&self) -> Option<u64> {
         self.found.metadata.get("period_ns")?.parse().ok()
+    }
+
+    /// Period of the loop in seconds. In recordings of older versions, and in those without metadata, it is known in whole
+    /// nanoseconds only.
+    pub fn period_s(&self) -> Option<f64> {
+        let stored = self.found.metadata.get(PERIOD_S);
+        let period_ns = || self.period_ns().or(self.period_by_ticks_ns());
+        let stored: Option<f64> = stored.and_then(|text| text.parse().ok());
+        let valid = stored.filter(|period_s| period_s.is_finite() && *period_s >= 0.0);
+        valid.or_else(|| Some(period_ns()? as f64 * 1e-9))
+    }
+
+    /// Log time of the start of the loop as known before its first tick, in nanoseconds since 1970; `None` in recordings of older
+    /// versions, whose log times begin with 0.
+    pub fn started_ns(&self) -> Option<u64> {
+        self.found.metadata.get(STARTED_NS)?.parse().ok()
     }
 
     /// The time between the first two consecutive ticks.

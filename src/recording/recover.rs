@@ -78,10 +78,10 @@ fn header(old: &Recording) -> Header {
     if !losses.is_empty() {
         metadata.insert(RECOVERED.into(), losses.join("; "));
     }
-    let period_ns = old.period_ns().or(old.period_by_ticks_ns());
     Header {
         config_toml: old.config_toml().unwrap_or_default().into(),
-        period_ns: period_ns.unwrap_or_default(),
+        period_s: old.period_s().unwrap_or_default(),
+        started_ns: old.started_ns().unwrap_or_default(),
         metadata,
     }
 }

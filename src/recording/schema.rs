@@ -47,10 +47,10 @@ mod tests {
     fn schema_changes_only_on_purpose() {
         // Length and CRC-32 of the descriptor in recordings: a change needs a reason and new numbers. Version 0.1.0: 1001,
         // 0xab158d29. Since then: fields 16 and 17 of `Loop`, readings and set-points before a calibration; state 4, settling;
-        // fields 13 and 14 of `Event`, number and refusal of a request.
+        // fields 13 and 14 of `Event`, number and refusal of a request, and 15 to 17, the clocks.
         let schema = descriptor_set();
-        assert_eq!(schema.len(), 1138);
-        assert_eq!(crc32fast::hash(&schema), 0x8a09_5b77);
+        assert_eq!(schema.len(), 1194);
+        assert_eq!(crc32fast::hash(&schema), 0xf74f_ff02);
     }
 
     /// A message with every field set, by its field numbers on the wire: (number, wire type), with an independent reader.
@@ -123,6 +123,9 @@ mod tests {
             remedy: s(),
             id: 1,
             refusal: s(),
+            loop_ns: 1,
+            monotonic_ns: 1,
+            wall_ns: 1,
         };
         let timing = Timing {
             first_tick: 1,

@@ -13,28 +13,36 @@ use prost::Message;
 
 use super::continuity::Continuity;
 use super::digest::Digest;
+use super::log_time::LogTime;
 use super::messages;
 use super::schema::descriptor_set;
+use super::sync::{Syncable, Syncing};
 use super::timing::{Quantiles, Tally};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
-use crate::rt::record::{Event, LoopMessage, TickRecord};
+use crate::rt::clock::scheduled_ns;
+use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 
-/// A chunk is closed and written at every multiple of this scheduled time, at any rate: if the process is killed, at most half
-/// a second is lost. At 5 kHz a chunk holds 2500 ticks, about 260 kB before compression. Shorter chunks would compress less
-/// and enlarge the index.
-const CHUNK_NS: u64 = 500_000_000;
+/// A chunk is closed and written at every multiple of this scheduled time, at any rate: if the process is killed, at most
+/// 0.2 s is lost, the chunk and what is on the way to it. At 5 kHz a chunk holds 500 ticks, about 52 kB before compression.
+const CHUNK_NS: u64 = 100_000_000;
 
 /// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
 const CHUNK_BYTES: u64 = 1 << 20;
 
+/// Keys of the metadata: period of the loop, and log time of its start.
+pub(super) const PERIOD_S: &str = "period_s";
+pub(super) const STARTED_NS: &str = "started_ns";
+
 /// Properties of a run that are known before its first tick. They are written before [`Recorder::create`] returns, so
 /// that even a recording that is cut off later contains them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// The whole effective configuration.
     pub config_toml: String,
-    /// Period of the loop, which gives the time of an event.
-    pub period_ns: u64,
+    /// Period of the loop in seconds, which gives the time of an event.
+    pub period_s: f64,
+    /// Wall clock at the start of the loop in nanoseconds since 1970. In real time the loop publishes it more exactly.
+    pub started_ns: u64,
     /// Version of the program, host, scheduling of the loop, and begin of the run.
     pub metadata: BTreeMap<String, String>,
 }
@@ -74,7 +82,11 @@ pub struct Recorder {
     channels: [u16; 3],
     /// Messages written on each.
     written: [u64; 3],
-    period_ns: u64,
+    period_s: f64,
+    log_time: LogTime,
+    /// The log time of the last message.
+    last_log_ns: u64,
+    syncing: Option<Syncing>,
     chunk_ends_ns: u64,
     encoded: Vec<u8>,
     account: Continuity,
@@ -92,7 +104,19 @@ impl Recorder {
                 source,
             },
         })?;
-        Recorder::over(Box::new(file), path, header)
+        let not_started = |source| RecordingError::NotStarted {
+            path: path.into(),
+            source,
+        };
+        let same_file = file.try_clone().map_err(not_started)?;
+        let recorder = Recorder::over(Box::new(file), path, header)?;
+        recorder.synced(Box::new(same_file)).map_err(not_started)
+    }
+
+    /// The recorder with a thread that syncs `file` once per second.
+    pub fn synced(mut self, file: Box<dyn Syncable>) -> io::Result<Recorder> {
+        self.syncing = Some(Syncing::start(file)?);
+        Ok(self)
     }
 
     /// Records to any writer; `path` is its name in messages.
@@ -115,11 +139,14 @@ impl Recorder {
             mcap,
             channels,
             written: [0; 3],
-            period_ns: header.period_ns,
+            period_s: header.period_s,
+            log_time: LogTime::new(header.started_ns),
+            last_log_ns: header.started_ns,
+            syncing: None,
             chunk_ends_ns: CHUNK_NS,
             encoded: Vec::new(),
             account: Continuity::default(),
-            tally: Tally::new(header.period_ns),
+            tally: Tally::new(period_ns(header)),
             digest: Digest::default(),
         })
     }
@@ -144,7 +171,8 @@ impl Recorder {
         media_type: &str,
         data: &[u8],
     ) -> Result<(), RecordingError> {
-        let written = attach(&mut self.mcap, name, media_type, data);
+        let file = (name, media_type, data);
+        let written = attach(&mut self.mcap, self.last_log_ns, file);
         written.map_err(|source| self.failed(source))
     }
 
@@ -161,6 +189,8 @@ impl Recorder {
         self.close_second()?;
         let written = self.write_end(attachments);
         written.map_err(|source| self.failed(source))?;
+        let synced = self.syncing.take().map_or(Ok(()), Syncing::finish);
+        synced.map_err(|source| self.failed(McapError::Io(source)))?;
         Ok(self.totals())
     }
 
@@ -170,6 +200,7 @@ impl Recorder {
     }
 
     fn tick(&mut self, tick: &TickRecord) -> Result<(), RecordingError> {
+        self.check_synced()?;
         if self.tally.is_over(tick) {
             self.close_second()?;
         }
@@ -186,8 +217,20 @@ impl Recorder {
 
     fn event(&mut self, event: &Event) -> Result<(), RecordingError> {
         self.account.event(event);
-        let scheduled_ns = event.tick.saturating_mul(self.period_ns);
-        self.write(Topic::Event, scheduled_ns, &messages::Event::from(event))
+        if let EventKind::Clock(times) = &event.kind {
+            self.log_time.follow(times);
+        }
+        let loop_ns = scheduled_ns(event.tick, self.period_s);
+        self.write(Topic::Event, loop_ns, &messages::Event::from(event))
+    }
+
+    /// Fails if the file could not be synced.
+    fn check_synced(&mut self) -> Result<(), RecordingError> {
+        let Some(syncing) = self.syncing.take_if(|syncing| syncing.has_failed()) else {
+            return Ok(());
+        };
+        let failed = syncing.finish();
+        failed.map_err(|source| self.failed(McapError::Io(source)))
     }
 
     fn close_second(&mut self) -> Result<(), RecordingError> {
@@ -208,13 +251,14 @@ impl Recorder {
     fn write(
         &mut self,
         topic: Topic,
-        log_time: u64,
+        loop_ns: u64,
         message: &impl Message,
     ) -> Result<(), RecordingError> {
         self.encoded.clear();
         // Like `encode`, without the check of the capacity: a Vec grows.
         message.encode_raw(&mut self.encoded);
-        let header = self.next_header(topic, log_time);
+        self.last_log_ns = self.log_time.at(loop_ns);
+        let header = self.next_header(topic);
         self.mcap
             .write_to_known_channel(&header, &self.encoded)
             .map_err(|source| self.failed(source))?;
@@ -225,21 +269,21 @@ impl Recorder {
     }
 
     /// Messages of a channel are numbered without a gap, so that a missing chunk is detected.
-    fn next_header(&mut self, topic: Topic, log_time: u64) -> MessageHeader {
+    fn next_header(&mut self, topic: Topic) -> MessageHeader {
         let count = &mut self.written[topic as usize];
         let sequence = *count as u32;
         *count += 1;
         MessageHeader {
             channel_id: self.channels[topic as usize],
             sequence,
-            log_time,
-            publish_time: log_time,
+            log_time: self.last_log_ns,
+            publish_time: self.last_log_ns,
         }
     }
 
     fn write_end(&mut self, attachments: &[(&str, &str, &[u8])]) -> McapResult<()> {
-        for (name, media_type, data) in attachments {
-            attach(&mut self.mcap, name, media_type, data)?;
+        for file in attachments {
+            attach(&mut self.mcap, self.last_log_ns, *file)?;
         }
         self.mcap.finish().map(|_| ())
     }
@@ -284,17 +328,16 @@ fn write_head<W: Write + io::Seek>(
     header: &Header,
 ) -> McapResult<[u16; 3]> {
     let mut metadata = header.metadata.clone();
-    metadata.insert("period_ns".into(), header.period_ns.to_string());
+    metadata.insert("period_ns".into(), period_ns(header).to_string());
+    metadata.insert(PERIOD_S.into(), header.period_s.to_string());
+    metadata.insert(STARTED_NS.into(), header.started_ns.to_string());
     mcap.write_metadata(&Metadata {
         name: METADATA_RECORD.into(),
         metadata,
     })?;
-    attach(
-        mcap,
-        CONFIG_ATTACHMENT,
-        "application/toml",
-        header.config_toml.as_bytes(),
-    )?;
+    let config = header.config_toml.as_bytes();
+    let file = (CONFIG_ATTACHMENT, "application/toml", config);
+    attach(mcap, header.started_ns, file)?;
     let schema = descriptor_set();
     let mut channels = [0; 3];
     for topic in Topic::ALL {
@@ -306,15 +349,20 @@ fn write_head<W: Write + io::Seek>(
     Ok(channels)
 }
 
+/// The period in whole nanoseconds.
+fn period_ns(header: &Header) -> u64 {
+    scheduled_ns(1, header.period_s)
+}
+
+/// Attaches a file, given as name, media type and content.
 fn attach<W: Write + io::Seek>(
     mcap: &mut mcap::Writer<W>,
-    name: &str,
-    media_type: &str,
-    data: &[u8],
+    log_time: u64,
+    (name, media_type, data): (&str, &str, &[u8]),
 ) -> McapResult<()> {
     mcap.attach(&Attachment {
-        log_time: 0,
-        create_time: 0,
+        log_time,
+        create_time: log_time,
         name: name.into(),
         media_type: media_type.into(),
         data: Cow::Borrowed(data),

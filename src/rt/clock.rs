@@ -5,6 +5,7 @@ use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
 use super::publisher::Publisher;
+use super::record::ClockTimes;
 
 /// When a tick was due and when it began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,13 +29,23 @@ pub trait Clock {
 
     /// Restarts the schedule: the tick `number` is due one period from now.
     fn restart(&mut self, number: u64);
+
+    /// The clocks of the system at this moment; `None` if the ticks do not follow them. Runs in the tick: must not allocate or
+    /// block.
+    fn times(&self) -> Option<ClockTimes> {
+        None
+    }
 }
 
-/// Scheduled time of a tick.
+/// Scheduled time of a tick in nanoseconds since the loop started, without an error that grows with the number.
+pub fn scheduled_ns(number: u64, period_s: f64) -> u64 {
+    (number as f64 * period_s * 1e9).round() as u64
+}
+
 fn tick(number: u64, period_s: f64) -> Tick {
     Tick {
         number,
-        scheduled_ns: (number as f64 * period_s * 1e9).round() as u64,
+        scheduled_ns: scheduled_ns(number, period_s),
     }
 }
 
@@ -90,9 +101,13 @@ impl Realtime {
     }
 }
 
-/// The monotonic clock; it cannot fail on Linux, where it always exists.
 fn monotonic_ns() -> i128 {
-    clock_gettime(ClockId::CLOCK_MONOTONIC).map_or(0, |t| {
+    clock_ns(ClockId::CLOCK_MONOTONIC)
+}
+
+/// A clock of the system. The two that are read here always exist on Linux, so the call cannot fail.
+fn clock_ns(clock: ClockId) -> i128 {
+    clock_gettime(clock).map_or(0, |t| {
         i128::from(t.tv_sec()) * 1_000_000_000 + i128::from(t.tv_nsec())
     })
 }
@@ -128,5 +143,14 @@ impl Clock for Realtime {
     fn restart(&mut self, number: u64) {
         let due = tick(number, self.period_s).scheduled_ns;
         self.origin_ns = monotonic_ns() + (self.period_s * 1e9) as i128 - i128::from(due);
+    }
+
+    fn times(&self) -> Option<ClockTimes> {
+        let monotonic_ns = monotonic_ns();
+        Some(ClockTimes {
+            loop_ns: (monotonic_ns - self.origin_ns).max(0) as u64,
+            monotonic_ns: monotonic_ns.max(0) as u64,
+            wall_ns: clock_ns(ClockId::CLOCK_REALTIME).max(0) as u64,
+        })
     }
 }

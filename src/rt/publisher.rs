@@ -10,12 +10,16 @@ pub struct Publisher {
     ring: Producer<LoopMessage>,
     lost: u64,
     unreported: u64,
+    lost_in_a_row: u64,
 }
 
-/// Slots that a tick can need at most: three events per request (an arm request whose amplifier does not enable makes
+/// Slots that only events may use. Events are few; a trip and what follows it finds room in a ring that is full of records.
+pub const EVENT_SLOTS: usize = 64;
+
+/// Slots that a tick can need at most: the clocks, three events per request (an arm request whose amplifier does not enable makes
 /// four, but needs a clear request before the next one, which makes two), a trip and its state, the end of the
 /// program and its state, the record, and the count of lost records.
-pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 6;
+pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 7;
 
 impl Publisher {
     /// A publisher into `ring`.
@@ -24,12 +28,13 @@ impl Publisher {
             ring,
             lost: 0,
             unreported: 0,
+            lost_in_a_row: 0,
         }
     }
 
     /// Whether there is room for everything that a tick may publish.
     pub fn has_room(&self) -> bool {
-        self.ring.slots() >= SLOTS_PER_TICK
+        self.ring.slots() >= SLOTS_PER_TICK + EVENT_SLOTS
     }
 
     /// Whether the recorder is gone for good.
@@ -42,9 +47,15 @@ impl Publisher {
         self.lost
     }
 
+    /// Number of ticks without a record since the last recorded one.
+    pub fn lost_in_a_row(&self) -> u64 {
+        self.lost_in_a_row
+    }
+
     /// Publishes the signals of a tick. Runs in the tick: must not allocate or block.
     pub fn record(&mut self, record: TickRecord) {
-        if self.unreported > 0 && self.ring.slots() >= 2 {
+        let slots = self.ring.slots();
+        if self.unreported > 0 && slots >= EVENT_SLOTS + 2 {
             let lost = Event {
                 tick: record.tick,
                 kind: EventKind::Lost {
@@ -54,7 +65,13 @@ impl Publisher {
             self.unreported = 0;
             self.push(LoopMessage::Event(lost));
         }
-        self.push(LoopMessage::Tick(record));
+        self.lost_in_a_row += 1;
+        if slots <= EVENT_SLOTS {
+            return self.count_lost();
+        }
+        if self.push(LoopMessage::Tick(record)) {
+            self.lost_in_a_row = 0;
+        }
     }
 
     /// Publishes a change. Runs in the tick: must not allocate or block.
@@ -62,11 +79,18 @@ impl Publisher {
         self.push(LoopMessage::Event(Event { tick, kind }));
     }
 
-    fn push(&mut self, published: LoopMessage) {
-        if self.ring.push(published).is_err() {
-            self.lost += 1;
-            self.unreported += 1;
+    /// Whether there was room.
+    fn push(&mut self, published: LoopMessage) -> bool {
+        let pushed = self.ring.push(published).is_ok();
+        if !pushed {
+            self.count_lost();
         }
+        pushed
+    }
+
+    fn count_lost(&mut self) {
+        self.lost += 1;
+        self.unreported += 1;
     }
 }
 
@@ -77,7 +101,7 @@ mod tests {
 
     #[test]
     fn counts_lost_records_and_reports_them_when_there_is_room() {
-        let (producer, mut consumer) = RingBuffer::new(4);
+        let (producer, mut consumer) = RingBuffer::new(EVENT_SLOTS + 4);
         let mut publisher = Publisher::new(producer);
         let record = |tick| TickRecord {
             tick,
@@ -101,5 +125,23 @@ mod tests {
             "{lost:?}"
         );
         assert!(matches!(consumer.pop(), Ok(LoopMessage::Tick(t)) if t.tick == 7));
+    }
+
+    #[test]
+    fn full_ring_has_room_for_a_trip() {
+        let (producer, mut consumer) = RingBuffer::new(EVENT_SLOTS + 4);
+        let mut publisher = Publisher::new(producer);
+        (0..100).for_each(|tick| {
+            publisher.record(TickRecord {
+                tick,
+                ..TickRecord::default()
+            });
+        });
+        assert_eq!((publisher.lost(), publisher.lost_in_a_row()), (96, 96));
+        (0..EVENT_SLOTS).for_each(|_| publisher.event(100, EventKind::Completed));
+        assert_eq!(publisher.lost(), 96, "no event was lost");
+        let is_event = |message: &LoopMessage| matches!(message, LoopMessage::Event(_));
+        let events = std::iter::from_fn(|| consumer.pop().ok()).filter(is_event);
+        assert_eq!(events.count(), EVENT_SLOTS);
     }
 }

@@ -90,6 +90,19 @@ pub enum EventKind {
         /// How many.
         records: u64,
     },
+    /// The clocks at one moment in the tick; only in real time, at the start and once per second.
+    Clock(ClockTimes),
+}
+
+/// Three clocks at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClockTimes {
+    /// Nanoseconds since the loop started, as [`TickRecord::scheduled_ns`].
+    pub loop_ns: u64,
+    /// The monotonic clock of the system (CLOCK_MONOTONIC) in nanoseconds.
+    pub monotonic_ns: u64,
+    /// The wall clock (CLOCK_REALTIME) in nanoseconds since 1970.
+    pub wall_ns: u64,
 }
 
 /// Requests that one tick takes; more wait for the next.

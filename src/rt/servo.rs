@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Validity, blocking};
+use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Tick, Validity, blocking};
 use rtrb::{Consumer, Producer};
 
 use super::arming::{State, Transition, Trip};
@@ -24,11 +24,16 @@ const NOT_FINITE: DeviceError = DeviceError {
     code: 0,
 };
 
+/// Period of the events with the clocks of the system.
+const CLOCKS_PERIOD_NS: u64 = 1_000_000_000;
+
 /// Progress of a running loop, for other threads.
 #[derive(Debug, Default)]
 pub struct Progress {
     /// Ticks of the program done so far.
     pub run_ticks: AtomicU64,
+    /// Ticks without a record since the last recorded one.
+    pub unrecorded_ticks: AtomicU64,
 }
 
 /// The loop and its state between ticks.
@@ -52,6 +57,8 @@ pub struct Servo {
     trip: Option<(Trip, u64)>,
     completed: bool,
     took_slow_request: bool,
+    /// When the clocks are published next, in nanoseconds since the loop started.
+    clocks_due_ns: u64,
 }
 
 /// The loop's ends of the rings.
@@ -85,6 +92,7 @@ impl Servo {
             trip: None,
             completed: false,
             took_slow_request: false,
+            clocks_due_ns: 0,
         }
     }
 
@@ -108,6 +116,7 @@ impl Servo {
     /// is zero meanwhile, and the caller restarts the schedule afterwards (see [`Servo::took_slow_request`]).
     pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
         let now = timing.tick;
+        self.publish_clocks(now, clock);
         self.take_requests(now.number);
         let raw = self.rig.latest(now); // read
         let reading = self.corrected(raw);
@@ -116,8 +125,32 @@ impl Servo {
         self.write(decision.requested_a, now.number); // write
         let done_ns = clock.now_ns(now);
         let record = self.record(timing, done_ns, &raw, &reading, &decision);
-        self.connections.publisher.record(record); // publish
+        self.publish(record); // publish
         self.finish_run(now.number);
+    }
+
+    fn publish(&mut self, record: TickRecord) {
+        let Connections {
+            publisher,
+            progress,
+            ..
+        } = &mut self.connections;
+        publisher.record(record);
+        let unrecorded = publisher.lost_in_a_row();
+        progress
+            .unrecorded_ticks
+            .store(unrecorded, Ordering::Relaxed);
+    }
+
+    /// Publishes the clocks of the system at the first tick and once per second.
+    fn publish_clocks(&mut self, now: Tick, clock: &impl Clock) {
+        if now.scheduled_ns < self.clocks_due_ns {
+            return;
+        }
+        self.clocks_due_ns = now.scheduled_ns.saturating_add(CLOCKS_PERIOD_NS);
+        if let Some(times) = clock.times() {
+            self.event(now.number, EventKind::Clock(times));
+        }
     }
 
     fn corrected(&self, raw: Reading) -> Reading {
@@ -375,7 +408,11 @@ impl Servo {
 
     /// Whether a request since the last call may have taken longer than a tick: the schedule must then restart.
     pub fn took_slow_request(&mut self) -> bool {
-        std::mem::take(&mut self.took_slow_request)
+        let took = std::mem::take(&mut self.took_slow_request);
+        if took {
+            self.clocks_due_ns = 0;
+        }
+        took
     }
 
     /// Whether the amplifier is enabled.

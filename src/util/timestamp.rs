@@ -17,6 +17,14 @@ pub fn milliseconds(time: SystemTime) -> String {
     humantime::format_rfc3339_millis(displayable(time)).to_string()
 }
 
+/// Nanoseconds since 1970; 0 for a clock before 1970.
+pub fn unix_ns(time: SystemTime) -> u64 {
+    let since = time.duration_since(SystemTime::UNIX_EPOCH);
+    since.map_or(0, |since| {
+        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+    })
+}
+
 fn displayable(time: SystemTime) -> SystemTime {
     let first = SystemTime::UNIX_EPOCH;
     time.clamp(first, first + Duration::from_secs(LAST_S))
@@ -31,6 +39,8 @@ mod tests {
         let epoch = SystemTime::UNIX_EPOCH;
         let second = Duration::from_secs(1);
         assert_eq!(seconds(epoch - second), "1970-01-01T00:00:00Z");
+        assert_eq!(unix_ns(epoch - second), 0);
+        assert_eq!(unix_ns(epoch + 2 * second), 2_000_000_000);
         assert_eq!(milliseconds(epoch - second), "1970-01-01T00:00:00.000Z");
         let last = Duration::from_secs(LAST_S);
         assert_eq!(seconds(epoch + last + second), "9999-12-31T23:59:59Z");

@@ -9,7 +9,7 @@ use serde_json::Value;
 
 use crate::common::{AT_1_KHZ, bench, recording_in, stderr, stdout};
 
-/// A chirp of 8 s at 1 kHz in virtual time; a chunk holds 500 ticks.
+/// A chirp of 8 s at 1 kHz in virtual time; a chunk holds 100 ticks.
 fn chirp(folder: &Path) -> PathBuf {
     let arguments = ["chirp", "--duration", "8", "--start", "5Hz"];
     let output = bench(&[&arguments[..], &AT_1_KHZ[..4]].concat())
@@ -190,10 +190,10 @@ fn a_recovered_gap_is_neither_identified_nor_replayed() {
     let (output, report) = recover(&damaged, &to);
     assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
     let missing = &report["missing_ticks"][0];
-    assert_eq!(missing["ticks"], 500, "half a second: {report}");
+    assert_eq!(missing["ticks"], 100, "a tenth of a second: {report}");
     for (command, words) in [
-        ("identify", "500 ticks are missing"),
-        ("replay", "500 records are missing"),
+        ("identify", "100 ticks are missing"),
+        ("replay", "100 records are missing"),
     ] {
         let output = bench(&[command]).arg(&to).output().expect("it runs");
         let message = stderr(&output);

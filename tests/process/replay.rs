@@ -114,7 +114,8 @@ fn altered_recording_exits_with_1_and_names_the_tick() {
     let altered = folder.path().join("altered");
     let header = Header {
         config_toml: old.config_toml().expect("a configuration").into(),
-        period_ns: old.period_ns().expect("a period"),
+        period_s: old.period_s().expect("a period"),
+        started_ns: 0,
         metadata: old.metadata().clone(),
     };
     let mut new = Recorder::create(&altered, &header).expect("a new file");

@@ -46,11 +46,11 @@ def read(path, with_values):
     with open(path, "rb") as stream:
         reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
         seen = {"/loop": [], "/event": [], "/timing": []}
-        times_differ = 0
+        log_offsets_ns = set()
         for _, channel, message, decoded in reader.iter_decoded_messages(log_time_order=False):
             seen[channel.topic].append(decoded)
             if channel.topic == "/loop":
-                times_differ += message.log_time != decoded.scheduled_ns
+                log_offsets_ns.add(message.log_time - decoded.scheduled_ns)
         attachments = {a.name: len(a.data) for a in reader.iter_attachments()}
         metadata = {m.name: m.metadata for m in reader.iter_metadata()}
     ticks = [m.tick for m in seen["/loop"]]
@@ -59,7 +59,7 @@ def read(path, with_values):
         "first_tick": min(ticks, default=None),
         "last_tick": max(ticks, default=None),
         "gaps": [[a, b] for a, b in zip(ticks, ticks[1:]) if b != a + 1],
-        "times_differ": times_differ,
+        "log_offsets_ns": sorted(log_offsets_ns),
         "events": [event(m) for m in seen["/event"]],
         "timings": [event(m) for m in seen["/timing"]],
         "config_bytes": attachments.get("config.toml"),

@@ -9,6 +9,8 @@ use bench_hal::Validity;
 
 /// 5 kHz.
 pub const PERIOD_NS: u64 = 200_000;
+/// A moment in 2026.
+pub const STARTED_NS: u64 = 1_790_000_000_000_000_000;
 
 pub const CONFIG: &str = "profile = \"stage\"\n[loop]\nservo_rate_hz = 5000\n";
 
@@ -20,7 +22,8 @@ pub fn header() -> Header {
     ];
     Header {
         config_toml: CONFIG.into(),
-        period_ns: PERIOD_NS,
+        period_s: PERIOD_NS as f64 * 1e-9,
+        started_ns: STARTED_NS,
         metadata: BTreeMap::from(metadata.map(|(k, v)| (k.to_string(), v.to_string()))),
     }
 }

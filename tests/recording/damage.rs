@@ -8,11 +8,11 @@ use proptest::prelude::*;
 
 use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
 
-/// 100 ms per tick: few ticks make many chunks, so that a large part of the file is structure.
+/// 20 ms per tick: few ticks make many chunks, so that a large part of the file is structure.
 fn slow_run(ticks: u64) -> Vec<LoopMessage> {
     let slow = |p: LoopMessage| match p {
         LoopMessage::Tick(t) => LoopMessage::Tick(TickRecord {
-            scheduled_ns: t.tick * 100_000_000,
+            scheduled_ns: t.tick * 20_000_000,
             ..t
         }),
         event @ LoopMessage::Event(_) => event,
@@ -332,7 +332,7 @@ fn rejects_attachment_without_crc() {
 #[test]
 fn detects_a_missing_chunk_in_a_truncated_file() {
     let chunks = chunks(&ORIGINAL.bytes);
-    let (at, length) = chunks[2]; // the first holds the schemas, the second the first half second
+    let (at, length) = chunks[2]; // the first holds the schemas, the second the first tenth of a second
     let end = chunks[4].0;
     let without = [&ORIGINAL.bytes[..at], &ORIGINAL.bytes[at + length..end]].concat();
     let refused = open(&without).expect_err("refused");

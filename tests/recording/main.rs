@@ -3,4 +3,5 @@ mod common;
 mod damage;
 mod disk_full;
 mod round_trip;
+mod syncing;
 mod thread;

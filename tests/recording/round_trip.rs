@@ -4,11 +4,13 @@ use std::path::PathBuf;
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{
-    Event, EventKind, LoopMessage, Refusal, RequestEvent, RequestKind, TickRecord,
+    ClockTimes, Event, EventKind, LoopMessage, Refusal, RequestEvent, RequestKind, TickRecord,
 };
 use bench_hal::Validity;
 
-use crate::common::{CONFIG, PERIOD_NS, bits, events_of, header, run, tick, ticks_of, write};
+use crate::common::{
+    CONFIG, PERIOD_NS, STARTED_NS, bits, events_of, header, run, tick, ticks_of, write,
+};
 
 fn fresh() -> (tempfile::TempDir, PathBuf) {
     let dir = tempfile::tempdir().expect("temporary directory");
@@ -162,6 +164,11 @@ fn events_of_every_kind_round_trip_in_order() {
     );
     kinds.extend(trips.map(EventKind::Trip));
     kinds.extend([EventKind::Completed, EventKind::Lost { records: u64::MAX }]);
+    kinds.push(EventKind::Clock(ClockTimes {
+        loop_ns: u64::MAX,
+        monotonic_ns: 1,
+        wall_ns: STARTED_NS,
+    }));
     let put: Vec<_> = (0..)
         .zip(kinds)
         .map(|(tick, kind)| Event { tick, kind })
@@ -337,10 +344,10 @@ fn timing_is_summarised_per_second_and_per_run() {
 }
 
 #[test]
-fn killed_process_loses_at_most_half_a_second() {
+fn killed_process_loses_at_most_a_tenth_of_a_second() {
     let (_dir, path) = fresh();
     let mut recorder = Recorder::create(&path, &header()).expect("fresh");
-    let published = run(7_499); // 1.4998 s: the chunks up to 0.5 and 1.0 s are full
+    let published = run(7_499); // 1.4998 s: the chunks up to 1.4 s are full
     published
         .iter()
         .for_each(|p| recorder.record(p).expect("good disk"));
@@ -348,7 +355,7 @@ fn killed_process_loses_at_most_half_a_second() {
 
     let recording = Recording::open(&path).expect("readable up to the cut");
     assert!(recording.truncated());
-    assert_eq!(recording.tick_count(), 5000);
+    assert_eq!(recording.tick_count(), 7000);
     assert_eq!(recording.config_toml(), Some(CONFIG));
     let ticks: Vec<_> = recording
         .ticks()
@@ -357,7 +364,7 @@ fn killed_process_loses_at_most_half_a_second() {
         .collect();
     assert_eq!(
         ticks.iter().map(bits).collect::<Vec<_>>(),
-        (0..5000).map(|n| bits(&tick(n))).collect::<Vec<_>>()
+        (0..7000).map(|n| bits(&tick(n))).collect::<Vec<_>>()
     );
 }
 

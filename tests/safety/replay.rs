@@ -195,6 +195,7 @@ fn tripped_runs_replay_bit_for_bit() {
                 EventKind::Request(_)
                 | EventKind::State { .. }
                 | EventKind::Completed
+                | EventKind::Clock(_)
                 | EventKind::Lost { .. } => None,
             });
             assert_eq!(trip, Some((reason, at)));
@@ -240,7 +241,8 @@ fn copy_altered(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
     let old = Recording::open(path).expect("a recording");
     let header = Header {
         config_toml: old.config_toml().expect("a configuration").into(),
-        period_ns: old.period_ns().expect("a period"),
+        period_s: old.period_s().expect("a period"),
+        started_ns: 0,
         metadata: old.metadata().clone(),
     };
     let mut new = Recorder::create(to, &header).expect("a new file");

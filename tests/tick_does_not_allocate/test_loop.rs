@@ -96,7 +96,10 @@ impl TestLoop {
                 LoopMessage::Event(event) => match event.kind {
                     EventKind::Trip(trip) => self.trip = Some(trip.reason()),
                     EventKind::Completed => self.completed = true,
-                    EventKind::Request(_) | EventKind::State { .. } | EventKind::Lost { .. } => {}
+                    EventKind::Request(_)
+                    | EventKind::State { .. }
+                    | EventKind::Lost { .. }
+                    | EventKind::Clock(_) => {}
                 },
             }
         }

@@ -375,7 +375,8 @@ impl Bench {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let path = folder.path().join("loop.mcap");
         let header = Header {
-            period_ns: (self.clock.period_s * 1e9).round() as u64,
+            period_s: self.clock.period_s,
+            started_ns: 0,
             ..Header::default()
         };
         let mut recorder = Recorder::create(&path, &header).expect("a new file");
