@@ -13,6 +13,7 @@
 //! never by the result of a write. The drive monitors the heartbeat of this program. The service thread ends this heartbeat if
 //! the drive does not confirm that it is off. Thus the current is stopped whichever part fails: loop, process, cable or drive.
 
+mod access;
 mod errors;
 pub mod faults;
 mod inspect;
@@ -27,29 +28,32 @@ mod transitions;
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::task::Poll;
-use std::time::Duration;
 
 pub use errors::OpenError;
 pub use faults::fault_text;
 pub use inspect::{ABORT_CONNECTION, Inspection, REQUIRED_OBJECTS, inspect};
 pub use settings::{DriveSettings, DriveTimes, ExpectedIdentity, TorqueMode};
 
-use self::monitor::{Monitor, received_ids, set_point};
+use self::access::{channel, configure, exchange, wait_for};
+use self::monitor::{Monitor, received_ids};
 use self::reset::{ResetOutcome, ResetTask};
 use self::service::Service;
-use self::setup::{Configured, Setup};
+use self::setup::Configured;
 use self::shared::{Intent, Shared};
-use self::transitions::Enabling;
-use super::budget::Exchange;
 use super::bus::{CanBus, Claim, Host, TaskHandle};
 use super::cia402::{DISABLE_VOLTAGE, ENABLE_OPERATION};
+use super::nmt;
 use super::objects::HEARTBEAT_CONSUMER;
-use super::sdo::{Channel, answer_id};
-use super::{nmt, sync};
+use super::sdo::answer_id;
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
-/// Time between checks of the state of the drive while it changes.
-const STATE_POLL: Duration = Duration::from_millis(2);
+/// Times of a transition to Operation Enabled, on the clock of the host.
+#[derive(Clone, Copy, Debug, Default)]
+struct Enabling {
+    deadline_ns: u64,
+    /// When the next controlword is due.
+    step_ns: u64,
+}
 
 /// A CANopen drive in torque mode. The module documentation describes how it is monitored.
 pub struct CanopenDrive {
@@ -177,63 +181,6 @@ fn start_service(
     let service = Service { bus, monitor };
     host.start("can-service", Box::new(service))
         .map_err(OpenError::Thread)
-}
-
-/// Sends a set-point, and SYNC if the exchange is synchronous. Called in the tick: must not allocate or block.
-fn exchange(
-    bus: &mut dyn CanBus,
-    settings: &DriveSettings,
-    controlword: u16,
-    target: i16,
-) -> Result<(), DeviceError> {
-    let frame = set_point(settings.node, controlword, target);
-    let mut sent = bus.send(&frame);
-    if sent.is_ok() && matches!(settings.exchange, Exchange::Synchronous { .. }) {
-        sent = bus.send(&sync::FRAME);
-    }
-    sent.map_err(|error| faults::device_error(faults::of_bus_error(error)))
-}
-
-/// Waits until `condition` holds; `false` if it does not within `limit`.
-fn wait_for(
-    host: &dyn Host,
-    shared: &Shared,
-    limit: Duration,
-    condition: impl Fn(&Shared) -> bool,
-) -> bool {
-    let deadline_ns = host.now_ns().saturating_add(limit.as_nanos() as u64);
-    while !condition(shared) {
-        if host.now_ns() >= deadline_ns {
-            return false;
-        }
-        host.sleep(STATE_POLL);
-    }
-    true
-}
-
-fn channel<'a>(
-    settings: &DriveSettings,
-    bus: &'a mut dyn CanBus,
-    host: &'a dyn Host,
-) -> Channel<'a> {
-    Channel {
-        bus,
-        host,
-        node: settings.node,
-        timeout: settings.times.sdo_timeout,
-    }
-}
-
-fn configure(
-    settings: &DriveSettings,
-    bus: &mut dyn CanBus,
-    host: &dyn Host,
-) -> Result<Configured, OpenError> {
-    Setup {
-        channel: channel(settings, bus, host),
-        settings,
-    }
-    .run()
 }
 
 impl CurrentAmplifier for CanopenDrive {

@@ -12,10 +12,12 @@ use std::time::Duration;
 use super::super::bus::{BusError, CanBus, Host, Task};
 use super::super::cia402::{CYCLIC_TORQUE, DISABLE_VOLTAGE, FAULT_RESET, State};
 use super::super::nmt;
+use super::access::{STATE_POLL, configure, exchange, wait_for};
+use super::errors::OpenError;
+use super::faults;
 use super::settings::DriveSettings;
 use super::setup::Configured;
 use super::shared::Shared;
-use super::{OpenError, STATE_POLL, configure, exchange, faults, wait_for};
 
 /// Time between two looks for a request.
 const IDLE: Duration = Duration::from_millis(10);

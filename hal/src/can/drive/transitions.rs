@@ -3,17 +3,10 @@
 use std::task::Poll;
 
 use super::super::cia402::{DISABLE_VOLTAGE, REMOTE, State};
+use super::access::STATE_POLL;
 use super::shared::Intent;
-use super::{CanopenDrive, STATE_POLL, faults};
+use super::{CanopenDrive, Enabling, faults};
 use crate::DeviceError;
-
-/// Times of a transition to Operation Enabled, on the clock of the host.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Enabling {
-    deadline_ns: u64,
-    /// When the next controlword is due.
-    step_ns: u64,
-}
 
 impl CanopenDrive {
     /// Begins the transition. A controlword is sent in [`CanopenDrive::step_towards_enabled`].

@@ -7,6 +7,7 @@ mod failing;
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
+use super::super::budget::Exchange;
 use super::super::bus::{Host, SimulatedHost};
 use super::super::cia402::State;
 use super::super::emulator::{
