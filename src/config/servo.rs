@@ -25,6 +25,11 @@ pub struct LoopSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 60.0))]
     pub stop_ramp_s: Option<f64>,
+    /// Time for which the readings are judged before the amplifier is enabled, in seconds. If absent: 0.02 s at real-time pace,
+    /// one tick at virtual pace.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub healthy_s: Option<f64>,
 }
 
 impl LoopSettings {

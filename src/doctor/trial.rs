@@ -216,6 +216,7 @@ mod tests {
             priority: 80,
             cpu: None,
             stop_ramp_s: None,
+            healthy_s: None,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

@@ -73,15 +73,19 @@ impl RecordedRig {
 
 impl CurrentAmplifier for RecordedRig {
     fn begin_enable(&mut self) -> Result<(), DeviceError> {
-        if self.enables.pop() == Ok(false) {
-            return Err(REFUSED);
-        }
-        self.status = AmplifierStatus::Enabled;
         Ok(())
     }
 
+    /// Ready in the tick in which the recorded amplifier was enabled.
     fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
-        Poll::Ready(Ok(()))
+        match self.enables.pop() {
+            Ok(true) => {
+                self.status = AmplifierStatus::Enabled;
+                Poll::Ready(Ok(()))
+            }
+            Ok(false) => Poll::Ready(Err(REFUSED)),
+            Err(_) => Poll::Pending,
+        }
     }
 
     /// Returns the recorded command for the recorded request. Another request is returned unchanged; the comparison
@@ -108,8 +112,12 @@ impl CurrentAmplifier for RecordedRig {
         self.now.record.actual_a
     }
 
-    fn begin_reset(&mut self) -> Result<(), DeviceError> {
-        self.clears.pop().map_err(|_| REFUSED)
+    /// Ready in the tick in which the recorded trip was cleared.
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        match self.clears.pop() {
+            Ok(()) => Poll::Ready(Ok(())),
+            Err(_) => Poll::Pending,
+        }
     }
 
     /// After a fault the loop does not request a command from the program. If the record contains a command, this
@@ -159,6 +167,4 @@ impl Clock for RecordedClock {
     fn now_ns(&self, _tick: Tick) -> u64 {
         self.0
     }
-
-    fn restart(&mut self, _number: u64) {}
 }

@@ -146,7 +146,10 @@ impl Replay {
         while let Some(event) = events.next_if(|event| event.tick <= tick) {
             match event.kind {
                 EventKind::Request(request) => self.request(request.kind),
-                ARMING => {
+                // From `Enabling`; in recordings of older versions from `Disarmed`.
+                EventKind::State {
+                    to: State::Armed, ..
+                } => {
                     let same_tick = |next: &&Event| next.tick == event.tick;
                     let refused = events.next_if(|next| same_tick(next) && is_amplifier_trip(next));
                     push(&mut self.feed.enables, refused.is_none());
@@ -192,11 +195,6 @@ impl Replay {
         }
     }
 }
-
-const ARMING: EventKind = EventKind::State {
-    from: State::Disarmed,
-    to: State::Armed,
-};
 
 const CLEARING: EventKind = EventKind::State {
     from: State::Tripped,

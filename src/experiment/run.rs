@@ -16,6 +16,7 @@ use super::motor_start::MotorStart;
 use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, Plan, RAMP_TICKS};
 use super::run_error::RunError;
 use super::signals::{StopSignals, runtime};
+use crate::config::LoopSettings;
 use crate::recording::{
     self, DiskWatch, Header, Health, MIN_FREE_BYTES, Recorder, RecordingError, Shortage, Totals,
     free_bytes, lacks_space, predicted_bytes,
@@ -34,6 +35,8 @@ const RING_SLOTS: usize = 1 << 16;
 pub(super) const TAIL_S: f64 = 0.1;
 /// Longest time in seconds during which a run goes on although its ticks are not recorded.
 const MAX_UNRECORDED_S: f64 = 1.0;
+/// Time for which the readings are judged before a device is enabled, unless `loop.healthy_s` is set.
+const HEALTHY_S: f64 = 0.02;
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
@@ -184,9 +187,20 @@ fn prepare_loop(
     ramp_ticks: u64,
 ) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
-    let servo = servo(plan, rig, connections, plan.correction()).with_ramps(ramp_ticks);
+    let servo = servo(plan, rig, connections, plan.correction())
+        .with_ramps(ramp_ticks)
+        .with_healthy_ticks(healthy_ticks(&config.servo, pace));
     prepare(servo, &config.servo, pace, tail_ticks(plan))
         .map_err(RunError::system("start the thread of the loop"))
+}
+
+/// Ticks for which the readings are judged before the amplifier is enabled. A simulated stage has its readings from the first tick.
+fn healthy_ticks(servo: &LoopSettings, pace: Pace) -> u64 {
+    let default_s = match pace {
+        Pace::Realtime => HEALTHY_S,
+        Pace::Virtual => 0.0,
+    };
+    libm::round(servo.healthy_s.unwrap_or(default_s) * servo.rate_hz) as u64
 }
 
 /// Creates the recording, with everything that is known before the first tick.

@@ -188,12 +188,13 @@ pub(super) const VALIDITIES: [(Validity, &str); 4] = [
 ];
 
 /// The states; the index is the number in a message.
-pub(super) const STATES: [State; 5] = [
+pub(super) const STATES: [State; 6] = [
     State::Disarmed,
     State::Armed,
     State::Running,
     State::Tripped,
     State::Settling,
+    State::Enabling,
 ];
 
 /// A name or number in a message that this version of the program does not know.
@@ -302,7 +303,7 @@ mod tests {
                 .to_string();
             assert!(error.contains("validity") && error.contains(&number.to_string()));
         }
-        for number in [5, -1, i32::MAX] {
+        for number in [6, -1, i32::MAX] {
             let later = Loop {
                 state: number,
                 ..good

@@ -27,9 +27,6 @@ pub trait Clock {
     /// Nanoseconds since the loop started, read within `tick`. Runs in the tick: must not allocate or block.
     fn now_ns(&self, tick: Tick) -> u64;
 
-    /// Restarts the schedule: the tick `number` is due one period from now.
-    fn restart(&mut self, number: u64);
-
     /// The clocks of the system at this moment; `None` if the ticks do not follow them. Runs in the tick: must not allocate or
     /// block.
     fn times(&self) -> Option<ClockTimes> {
@@ -73,8 +70,6 @@ impl Clock for Virtual {
     fn now_ns(&self, tick: Tick) -> u64 {
         tick.scheduled_ns
     }
-
-    fn restart(&mut self, _number: u64) {}
 }
 
 /// Ticks at absolute times of the monotonic clock of the system.
@@ -88,12 +83,10 @@ pub struct Realtime {
 impl Realtime {
     /// A clock whose tick 0 is due one period from now.
     pub fn new(period_s: f64) -> Self {
-        let mut clock = Realtime {
+        Realtime {
             period_s,
-            origin_ns: 0,
-        };
-        clock.restart(0);
-        clock
+            origin_ns: monotonic_ns() + (period_s * 1e9) as i128,
+        }
     }
 
     fn elapsed_ns(&self) -> i128 {
@@ -138,11 +131,6 @@ impl Clock for Realtime {
 
     fn now_ns(&self, _tick: Tick) -> u64 {
         self.elapsed_ns().max(0) as u64
-    }
-
-    fn restart(&mut self, number: u64) {
-        let due = tick(number, self.period_s).scheduled_ns;
-        self.origin_ns = monotonic_ns() + (self.period_s * 1e9) as i128 - i128::from(due);
     }
 
     fn times(&self) -> Option<ClockTimes> {

@@ -16,10 +16,9 @@ pub struct Publisher {
 /// Slots that only events may use. Events are few; a trip and what follows it finds room in a ring that is full of records.
 pub const EVENT_SLOTS: usize = 64;
 
-/// Slots that a tick can need at most: the clocks, three events per request (an arm request whose amplifier does not enable makes
-/// four, but needs a clear request before the next one, which makes two), a trip and its state, the end of the
-/// program and its state, the record, and the count of lost records.
-pub const SLOTS_PER_TICK: usize = 3 * REQUESTS_PER_TICK + 7;
+/// Slots that a tick can need at most: the clocks, the end of a reset, two events per request, the states armed and running, a
+/// trip and its state, the end of the program and its state, the record, and the count of lost records.
+pub const SLOTS_PER_TICK: usize = 2 * REQUESTS_PER_TICK + 10;
 
 impl Publisher {
     /// A publisher into `ring`.

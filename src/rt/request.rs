@@ -77,7 +77,11 @@ impl RequestKind {
         let allows = |transition| state.after(transition).is_some();
         let (is_accepted, reason) = match self {
             RequestKind::Arm => (allows(Transition::Arm), Refusal::NotDisarmed),
-            RequestKind::Start => (allows(Transition::Start), Refusal::NotArmed),
+            // While the amplifier is being enabled, the program waits.
+            RequestKind::Start => (
+                allows(Transition::Start) || state == State::Enabling,
+                Refusal::NotArmed,
+            ),
             RequestKind::Finish => (
                 allows(Transition::Stop) && state != State::Settling,
                 Refusal::NoRun,

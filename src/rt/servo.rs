@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::task::Poll;
 
-use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Tick, Validity, blocking};
+use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Tick, Validity};
 use rtrb::{Consumer, Producer};
 
 use super::arming::{State, Transition, Trip};
@@ -11,7 +12,9 @@ use super::clock::{Clock, TickTiming};
 use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
-use super::record::{EventKind, REQUESTS_PER_TICK, RequestEvent, TickRecord, flag};
+use super::record::{
+    EventKind, REQUESTS_PER_TICK, Refusal, RequestEvent, RequestKind, TickRecord, flag,
+};
 use super::request::NumberedRequest;
 pub use super::request::Request;
 use super::settling::{Settling, SettlingStep};
@@ -56,9 +59,22 @@ pub struct Servo {
     connections: Connections,
     trip: Option<(Trip, u64)>,
     completed: bool,
-    took_slow_request: bool,
     /// When the clocks are published next, in nanoseconds since the loop started.
     clocks_due_ns: u64,
+    enabling: Enabling,
+    /// Whether a reset of the amplifier has begun and not ended.
+    is_clearing: bool,
+}
+
+/// Progress of [`State::Enabling`].
+#[derive(Clone, Copy, Debug, Default)]
+struct Enabling {
+    /// Healthy ticks that are required before the amplifier is enabled.
+    required_ticks: u64,
+    /// Healthy ticks since the request to arm.
+    healthy_ticks: u64,
+    /// Whether the amplifier is being enabled.
+    has_begun: bool,
 }
 
 /// The loop's ends of the rings.
@@ -91,8 +107,9 @@ impl Servo {
             connections,
             trip: None,
             completed: false,
-            took_slow_request: false,
             clocks_due_ns: 0,
+            enabling: Enabling::default(),
+            is_clearing: false,
         }
     }
 
@@ -109,18 +126,24 @@ impl Servo {
         self
     }
 
+    /// The loop with `ticks` healthy ticks between the request to arm and the enabling of the amplifier. A tick is healthy if no
+    /// interlock would trip in it. The first tick is always judged before the amplifier is enabled.
+    pub fn with_healthy_ticks(mut self, ticks: u64) -> Self {
+        self.enabling.required_ticks = ticks;
+        self
+    }
+
     /// Executes one tick. It does not allocate, lock or print; its only system calls are those of the clock and of
     /// the devices.
-    ///
-    /// A tick that takes [`Request::Arm`] or [`Request::Clear`] calls `enable` or `reset_fault`. These may block; the current
-    /// is zero meanwhile, and the caller restarts the schedule afterwards (see [`Servo::took_slow_request`]).
     pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
         let now = timing.tick;
         self.publish_clocks(now, clock);
+        self.poll_clearing(now.number);
         self.take_requests(now.number);
         let raw = self.rig.latest(now); // read
         let reading = self.corrected(raw);
         let checked = self.check(&raw, &reading, timing); // check
+        self.advance_enabling(checked, now.number);
         let decision = self.decide(&reading, checked, now.number); // decide
         self.write(decision.requested_a, now.number); // write
         let done_ns = clock.now_ns(now);
@@ -168,7 +191,7 @@ impl Servo {
         let missed = self.interlocks.check_timing(timing.missed, timing.tick);
         let raw = self.interlocks.check_reading(raw, timing.tick);
         let corrected = self.interlocks.check_travel(reading.position_m);
-        let actual_a = self.rig.actual_current_a().filter(|_| self.is_on());
+        let actual_a = self.rig.actual_current_a().filter(|_| !self.is_off());
         let current = self.interlocks.check_current(actual_a, timing.tick);
         match self.rig.status() {
             AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
@@ -284,7 +307,7 @@ impl Servo {
             State::Running => self.count_tick(tick, ticks),
             State::Settling if self.settling.is_done() => self.switch_off(Transition::Stop, tick),
             State::Settling => self.run_tick = (self.run_tick + 1).min(ticks.saturating_sub(1)),
-            State::Disarmed | State::Armed | State::Tripped => {}
+            State::Disarmed | State::Enabling | State::Armed | State::Tripped => {}
         }
     }
 
@@ -309,7 +332,9 @@ impl Servo {
                 self.settling = Settling::new(self.ramp_ticks);
                 self.change(Transition::Finish, tick);
             }
-            State::Running | State::Armed => self.switch_off(Transition::Stop, tick),
+            State::Running | State::Armed | State::Enabling => {
+                self.switch_off(Transition::Stop, tick);
+            }
             State::Settling | State::Disarmed | State::Tripped => {}
         }
     }
@@ -320,9 +345,18 @@ impl Servo {
                 return;
             };
             let kind = request.kind();
-            let refusal = kind.refusal(self.state);
+            let refusal = self.refusal(kind);
             self.event(tick, EventKind::Request(RequestEvent { id, kind, refusal }));
             self.take(request, tick);
+        }
+    }
+
+    /// Why a request is refused; `None` if it is accepted.
+    fn refusal(&self, kind: RequestKind) -> Option<Refusal> {
+        let waits = self.state == State::Enabling && self.program.is_some();
+        match kind {
+            RequestKind::Start if waits => Some(Refusal::NotArmed),
+            _ => kind.refusal(self.state),
         }
     }
 
@@ -336,38 +370,90 @@ impl Servo {
         }
     }
 
-    /// Enables the amplifier. This may block, at zero current, so the schedule restarts afterwards. A request that changes no
-    /// state does not restart the schedule: during a run that would hide a late tick.
+    /// Begins to enable: [`Servo::advance_enabling`] continues in this tick and in the next ones.
     fn arm(&mut self, tick: u64) {
-        if self.state.after(Transition::Arm).is_none() {
-            return;
-        }
-        self.took_slow_request = true;
-        self.change(Transition::Arm, tick);
-        if let Err(error) = blocking::enable(&mut self.rig, std::thread::sleep) {
-            self.trip(Trip::from(error), tick);
+        if self.state.after(Transition::Arm).is_some() {
+            self.enabling = Enabling {
+                required_ticks: self.enabling.required_ticks,
+                ..Enabling::default()
+            };
+            self.change(Transition::Arm, tick);
         }
     }
 
-    /// Clears the fault of the amplifier, then the trip. If the amplifier keeps its fault, the trip remains.
+    /// Counts a healthy tick in [`State::Enabling`]. When the amplifier is enabled, a program that waits is started.
+    fn advance_enabling(&mut self, checked: Result<(), Trip>, tick: u64) {
+        if self.state != State::Enabling || checked.is_err() {
+            return;
+        }
+        self.enabling.healthy_ticks += 1;
+        match self.enable_amplifier() {
+            Poll::Pending => {}
+            Poll::Ready(Err(error)) => self.trip(Trip::from(error), tick),
+            Poll::Ready(Ok(())) => {
+                self.change(Transition::Enabled, tick);
+                if self.program.is_some() {
+                    self.begin_run(tick);
+                }
+            }
+        }
+    }
+
+    fn enable_amplifier(&mut self) -> Poll<Result<(), DeviceError>> {
+        if self.enabling.healthy_ticks < self.enabling.required_ticks {
+            return Poll::Pending;
+        }
+        if !self.enabling.has_begun {
+            self.enabling.has_begun = true;
+            self.rig.begin_enable()?;
+        }
+        self.rig.poll_enable()
+    }
+
+    /// Begins to reset the fault of the amplifier. If the amplifier keeps its fault, the trip remains.
     fn clear(&mut self, tick: u64) {
-        if self.state.after(Transition::Clear).is_none() {
-            return;
-        }
-        self.took_slow_request = true;
-        if blocking::reset_fault(&mut self.rig, std::thread::sleep).is_ok() {
-            self.change(Transition::Clear, tick);
+        if self.state.after(Transition::Clear).is_some() && !self.is_clearing {
+            self.is_clearing = self.rig.begin_reset().is_ok();
+            self.poll_clearing(tick);
         }
     }
 
-    fn start(&mut self, program: Box<dyn Program>, tick: u64) {
-        if self.state.after(Transition::Start).is_none() {
-            return self.retire(Some(program));
+    /// Clears the trip when the amplifier has reset its fault.
+    fn poll_clearing(&mut self, tick: u64) {
+        if !self.is_clearing {
+            return;
         }
+        if let Poll::Ready(result) = self.rig.poll_reset() {
+            self.is_clearing = false;
+            if result.is_ok() {
+                self.change(Transition::Clear, tick);
+            }
+        }
+    }
+
+    /// Starts a program, or keeps it until the amplifier is enabled. In other states, and if another program waits already, it is
+    /// returned.
+    fn start(&mut self, program: Box<dyn Program>, tick: u64) {
+        match self.state {
+            State::Enabling if self.program.is_none() => self.program = Some(program),
+            State::Armed => {
+                let old = self.program.replace(program);
+                self.retire(old);
+                self.begin_run(tick);
+            }
+            State::Enabling
+            | State::Disarmed
+            | State::Running
+            | State::Settling
+            | State::Tripped => {
+                self.retire(Some(program));
+            }
+        }
+    }
+
+    fn begin_run(&mut self, tick: u64) {
         self.change(Transition::Start, tick);
         (self.run_tick, self.completed, self.trip) = (0, false, None);
-        let old = self.program.replace(program);
-        self.retire(old);
     }
 
     /// Zero current in this tick, amplifier disabled, the reason published.
@@ -406,15 +492,6 @@ impl Servo {
         }
     }
 
-    /// Whether a request since the last call may have taken longer than a tick: the schedule must then restart.
-    pub fn took_slow_request(&mut self) -> bool {
-        let took = std::mem::take(&mut self.took_slow_request);
-        if took {
-            self.clocks_due_ns = 0;
-        }
-        took
-    }
-
     /// Whether the amplifier is enabled.
     fn is_on(&self) -> bool {
         self.state == State::Armed || self.runs()
@@ -425,9 +502,9 @@ impl Servo {
         matches!(self.state, State::Running | State::Settling)
     }
 
-    /// Whether the amplifier is disabled.
+    /// Whether the amplifier is disabled and is not being enabled.
     pub fn is_off(&self) -> bool {
-        !self.is_on()
+        matches!(self.state, State::Disarmed | State::Tripped)
     }
 
     /// The trip since the last start, if there was one, and its tick.

@@ -135,9 +135,6 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
         let timing = clock.wait(number, servo.publisher());
         servo.tick(&timing, &clock);
         number = timing.tick.number + 1;
-        if servo.took_slow_request() {
-            clock.restart(number);
-        }
         off_ticks = if servo.is_off() { off_ticks + 1 } else { 0 };
     }
     LoopOutcome {

@@ -1,19 +1,18 @@
 //! The arming state machine, transition by transition, in the loop.
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bench::experiment::{self, Plan};
 use bench::rt::arming::{State, Transition};
-use bench::rt::clock::{Clock, TickTiming, Virtual};
+use bench::rt::clock::Virtual;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage, Refusal, RequestEvent};
 use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::{self, Pace};
-use bench_hal::{Rig, Tick, Validity};
+use bench_hal::{Rig, Validity};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::Fault;
@@ -21,8 +20,9 @@ use crate::rig::{
     AmplifierCall, Bench, CurrentProgram, LoggedRig, StillRig, endless, interlocks, stage,
 };
 
-const STATES: [State; 5] = [
+const STATES: [State; 6] = [
     State::Disarmed,
+    State::Enabling,
     State::Armed,
     State::Running,
     State::Settling,
@@ -30,31 +30,18 @@ const STATES: [State; 5] = [
 ];
 
 /// The state after each transition, by initial state: the diagram in `rt/arming.rs`.
-const TRANSITIONS: [(Transition, [State; 5]); 6] = {
-    use State::{Armed, Disarmed, Running, Settling, Tripped};
+#[rustfmt::skip]
+const TRANSITIONS: [(Transition, [State; 6]); 7] = {
+    use State::{Armed, Disarmed, Enabling, Running, Settling, Tripped};
     [
-        // from:            Disarmed  Armed     Running   Settling  Tripped
-        (Transition::Arm, [Armed, Armed, Running, Settling, Tripped]),
-        (
-            Transition::Start,
-            [Disarmed, Running, Running, Settling, Tripped],
-        ),
-        (
-            Transition::Finish,
-            [Disarmed, Disarmed, Settling, Settling, Tripped],
-        ),
-        (
-            Transition::Stop,
-            [Disarmed, Disarmed, Disarmed, Disarmed, Tripped],
-        ),
-        (
-            Transition::Trip,
-            [Disarmed, Tripped, Tripped, Tripped, Tripped],
-        ),
-        (
-            Transition::Clear,
-            [Disarmed, Armed, Running, Settling, Disarmed],
-        ),
+        // from:               Disarmed  Enabling  Armed     Running   Settling  Tripped
+        (Transition::Arm,     [Enabling, Enabling, Armed,    Running,  Settling, Tripped]),
+        (Transition::Enabled, [Disarmed, Armed,    Armed,    Running,  Settling, Tripped]),
+        (Transition::Start,   [Disarmed, Enabling, Running,  Running,  Settling, Tripped]),
+        (Transition::Finish,  [Disarmed, Disarmed, Disarmed, Settling, Settling, Tripped]),
+        (Transition::Stop,    [Disarmed, Disarmed, Disarmed, Disarmed, Disarmed, Tripped]),
+        (Transition::Trip,    [Disarmed, Tripped,  Tripped,  Tripped,  Tripped,  Tripped]),
+        (Transition::Clear,   [Disarmed, Enabling, Armed,    Running,  Settling, Disarmed]),
     ]
 };
 /// Length of each of the two ramps at the end of a run in ticks.
@@ -64,9 +51,20 @@ const RAMP_TICKS: u64 = 10;
 const TRIP: u64 = 20;
 const TRIP_BEFORE: u64 = 5;
 
-fn bench_in(state: State, trip: bool) -> Bench {
+/// Healthy ticks before the amplifier is enabled. In the state Enabling two have passed before the tick with the transition.
+fn healthy_ticks(state: State, change: Option<Transition>) -> u64 {
+    match (state, change) {
+        (_, Some(Transition::Enabled)) => 3,
+        (_, Some(_)) => 4,
+        (State::Enabling, None) => 1000,
+        (_, None) => 0,
+    }
+}
+
+/// A loop in a state, before the tick with a transition.
+fn bench_in(state: State, change: Option<Transition>) -> Bench {
     let mut faults = Vec::new();
-    if trip {
+    if change == Some(Transition::Trip) {
         faults.push((TRIP..TRIP + 1, Fault::Validity(Validity::Faulty)));
     }
     if state == State::Tripped {
@@ -75,16 +73,20 @@ fn bench_in(state: State, trip: bool) -> Bench {
             Fault::Validity(Validity::Faulty),
         ));
     }
-    let mut bench = Bench::still(&stage(), &faults).with_ramps(RAMP_TICKS);
-    if state != State::Disarmed {
+    let mut bench = Bench::still(&stage(), &faults)
+        .with_ramps(RAMP_TICKS)
+        .with_healthy_ticks(healthy_ticks(state, change));
+    if !matches!(state, State::Disarmed | State::Enabling) {
         bench.request(Request::Arm);
     }
     if matches!(state, State::Running | State::Settling) {
         bench.request(Request::Start(endless(|_| 0.1)));
     }
     bench.run(TRIP - 2);
-    if state == State::Settling {
-        bench.request(Request::Finish);
+    match state {
+        State::Enabling => bench.request(Request::Arm),
+        State::Settling => bench.request(Request::Finish),
+        State::Disarmed | State::Armed | State::Running | State::Tripped => {}
     }
     bench.run(2);
     assert_eq!(bench.state(), state);
@@ -96,7 +98,7 @@ fn transitions_match_the_state_diagram() {
     for (column, from) in STATES.into_iter().enumerate() {
         for (change, to) in TRANSITIONS {
             let to = to[column];
-            let mut bench = bench_in(from, change == Transition::Trip);
+            let mut bench = bench_in(from, Some(change));
             let events = bench.events().len();
             match change {
                 Transition::Arm => bench.request(Request::Arm),
@@ -104,7 +106,7 @@ fn transitions_match_the_state_diagram() {
                 Transition::Finish => bench.request(Request::Finish),
                 Transition::Stop => bench.request(Request::Stop),
                 Transition::Clear => bench.request(Request::Clear),
-                Transition::Trip => {}
+                Transition::Enabled | Transition::Trip => {}
             }
             let record = bench.tick();
             assert_eq!(
@@ -135,7 +137,7 @@ fn transitions_match_the_state_diagram() {
             );
             // Without a run there is no current to ramp down: the loop disarms at once.
             let change = match (change, from) {
-                (Transition::Finish, State::Armed) => Transition::Stop,
+                (Transition::Finish, State::Enabling | State::Armed) => Transition::Stop,
                 (change, _) => change,
             };
             assert_eq!(
@@ -188,7 +190,7 @@ fn start_request_does_not_replace_the_running_program() {
 
 #[test]
 fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
-    let mut bench = bench_in(State::Tripped, false);
+    let mut bench = bench_in(State::Tripped, None);
     let trip = bench.servo().last_trip().expect("tripped");
     let before = bench.amplifier_calls().len();
     for _ in 0..50 {
@@ -257,7 +259,7 @@ fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
 
 #[test]
 fn new_run_resets_the_last_trip() {
-    let mut bench = bench_in(State::Tripped, false);
+    let mut bench = bench_in(State::Tripped, None);
     for request in [
         Request::Clear,
         Request::Arm,
@@ -276,7 +278,7 @@ fn new_run_resets_the_last_trip() {
 #[test]
 fn arm_request_in_other_states_does_not_enable_the_amplifier() {
     for state in STATES.into_iter().filter(|state| *state != State::Disarmed) {
-        let mut bench = bench_in(state, false);
+        let mut bench = bench_in(state, None);
         let before = bench.amplifier_calls().len();
         bench.request(Request::Arm);
         bench.run(3);
@@ -290,9 +292,10 @@ fn arm_request_in_other_states_does_not_enable_the_amplifier() {
 #[test]
 fn every_request_is_acknowledged_with_its_number_and_answer() {
     use Refusal::{NoRun, NoTrip, NotArmed, NotDisarmed, Tripped};
-    // By initial state: Disarmed, Armed, Running, Settling, Tripped. `None`: accepted.
+    // By initial state: Disarmed, Enabling, Armed, Running, Settling, Tripped. `None`: accepted.
     let arm = [
         None,
+        Some(NotDisarmed),
         Some(NotDisarmed),
         Some(NotDisarmed),
         Some(NotDisarmed),
@@ -301,12 +304,14 @@ fn every_request_is_acknowledged_with_its_number_and_answer() {
     let start = [
         Some(NotArmed),
         None,
+        None,
         Some(NotArmed),
         Some(NotArmed),
         Some(Tripped),
     ];
-    let finish = [Some(NoRun), None, None, Some(NoRun), Some(Tripped)];
-    let clear = [Some(NoTrip), Some(NoTrip), Some(NoTrip), Some(NoTrip), None];
+    let finish = [Some(NoRun), None, None, None, Some(NoRun), Some(Tripped)];
+    let no_trip = Some(NoTrip);
+    let clear = [no_trip, no_trip, no_trip, no_trip, no_trip, None];
     for (index, state) in STATES.into_iter().enumerate() {
         let expected = [
             (Request::Arm, arm[index]),
@@ -316,7 +321,7 @@ fn every_request_is_acknowledged_with_its_number_and_answer() {
             (Request::Clear, clear[index]),
         ];
         for (request, refusal) in expected {
-            let mut bench = bench_in(state, false);
+            let mut bench = bench_in(state, None);
             let sent = acknowledged(&bench).len() as u64;
             let kind = request.kind();
             bench.request(request);
@@ -357,54 +362,6 @@ fn acknowledged(bench: &Bench) -> Vec<RequestEvent> {
         _ => None,
     });
     answers.collect()
-}
-
-/// A clock that adds requests between two ticks while the loop runs.
-struct RequestingClock {
-    restarts: Arc<AtomicU64>,
-    requests: RequestSender,
-    late: Vec<(u64, Request)>,
-}
-
-impl Clock for RequestingClock {
-    fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
-        while self.late.first().is_some_and(|(tick, _)| *tick == number) {
-            assert!(self.requests.send(self.late.remove(0).1).is_ok());
-        }
-        Virtual { period_s: 2e-4 }.wait(number, publisher)
-    }
-    fn now_ns(&self, tick: Tick) -> u64 {
-        tick.scheduled_ns
-    }
-    fn restart(&mut self, _number: u64) {
-        self.restarts.fetch_add(1, Ordering::Relaxed);
-    }
-}
-
-#[test]
-fn schedule_restarts_only_after_enabling_the_amplifier() {
-    let (servo, requests, _records) = loop_around(StillRig::default());
-    let restarts = Arc::new(AtomicU64::new(0));
-    let program = Request::Start(Box::new(CurrentProgram(|_| 0.1, 10)));
-    let late = vec![
-        (0, Request::Arm),
-        (1, program),
-        (4, Request::Arm),
-        (5, Request::Clear),
-        (6, Request::Arm),
-    ];
-    let clock = RequestingClock {
-        restarts: Arc::clone(&restarts),
-        requests,
-        late,
-    };
-    let ended = thread::run(servo, clock, 5);
-    assert!(ended.completed && ended.trip.is_none());
-    assert_eq!(
-        restarts.load(Ordering::Relaxed),
-        1,
-        "a restart of the schedule during a run would hide a late tick"
-    );
 }
 
 fn loop_around(rig: impl Rig + 'static) -> (Servo, RequestSender, Consumer<LoopMessage>) {

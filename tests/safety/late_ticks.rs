@@ -46,7 +46,6 @@ impl Clock for LateClock {
     fn now_ns(&self, tick: Tick) -> u64 {
         tick.scheduled_ns + 2000
     }
-    fn restart(&mut self, _number: u64) {}
 }
 
 fn run(
@@ -239,6 +238,51 @@ fn real_time_ticks_are_served_or_counted_as_missed() {
             "{record:?}"
         );
     }
+}
+
+/// A rig whose driver blocks the loop for 20 ms when it is enabled, against the rules.
+struct SlowToEnable(StillRig);
+
+impl CurrentAmplifier for SlowToEnable {
+    fn begin_enable(&mut self) -> Result<(), DeviceError> {
+        std::thread::sleep(Duration::from_millis(20));
+        self.0.begin_enable()
+    }
+    fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
+        self.0.poll_enable()
+    }
+    fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
+        self.0.command(current_a)
+    }
+    fn disable(&mut self) {
+        self.0.disable();
+    }
+    fn status(&self) -> AmplifierStatus {
+        self.0.status()
+    }
+}
+
+impl DisplacementProbe for SlowToEnable {
+    fn latest(&mut self, now: Tick) -> Reading {
+        self.0.latest(now)
+    }
+}
+
+#[test]
+fn ticks_missed_while_the_amplifier_is_enabled_are_counted() {
+    // 500 Hz: 20 ms are ten periods, so that at least nine ticks are missed.
+    let (ended, records) = run(
+        SlowToEnable(StillRig::default()),
+        Box::new(CurrentProgram(|_| 0.1, 50)),
+        Realtime::new(0.002),
+        u32::MAX,
+        0,
+    );
+    assert!(ended.completed);
+    let missed: u64 = records.iter().map(|r| u64::from(r.missed_ticks)).sum();
+    assert!(missed >= 9, "{missed}");
+    let last = records.last().expect("ticks").tick;
+    assert_eq!(records.len() as u64 + missed, last + 1);
 }
 
 #[test]

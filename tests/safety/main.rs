@@ -3,6 +3,7 @@ mod arming;
 mod bumpless;
 mod calibrated;
 use bench_test_support::faulty_rig;
+mod enabling;
 mod late_ticks;
 mod replay;
 mod reproducible;

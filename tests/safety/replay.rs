@@ -11,7 +11,8 @@ use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::calibration::Correction;
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::record::{EventKind, LoopMessage, TickRecord, flag};
+use bench::rt::arming::State;
+use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench_hal::Validity;
@@ -236,8 +237,106 @@ fn peak_current_trip_by_the_controller_replays_bit_for_bit() {
     assert_identical(&path, "peak current");
 }
 
+#[test]
+fn enabling_replays_bit_for_bit() {
+    let pending = (0..120, Fault::PendingEnable);
+    let cases = [
+        (vec![], None),
+        (vec![pending.clone()], None),
+        (
+            vec![(70..71, Fault::FailedEnable(7)), pending.clone()],
+            Some(70),
+        ),
+        (
+            vec![(70..71, Fault::AmplifierFault(7)), pending.clone()],
+            Some(70),
+        ),
+        (vec![(70..71, Fault::Position(0.00095)), pending], Some(70)),
+        (vec![(20..21, Fault::Age(1_000_001))], Some(20)),
+    ];
+    for (faults, tripped_at) in cases {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut plan = short_chirp(Sweep::Linear);
+        plan.config.servo.healthy_s = Some(0.01); // 50 ticks
+        let path = record(&plan, &faults, folder.path());
+        let recording = Recording::open(&path).expect("a recording");
+        let trips = recording.events().iter();
+        let trips = trips.filter(|event| matches!(event.kind, EventKind::Trip(_)));
+        assert_eq!(trips.map(|event| event.tick).next(), tripped_at);
+        let states: Vec<_> = recording.ticks().expect("readable").collect();
+        let enabling = states
+            .iter()
+            .flatten()
+            .filter(|r| r.state == State::Enabling);
+        assert!(enabling.count() >= 20);
+        assert_identical(&path, &format!("{faults:?}"));
+    }
+}
+
+/// Recordings of earlier versions have no state Enabling.
+#[test]
+fn recordings_without_the_state_enabling_replay_bit_for_bit() {
+    let cases = [
+        vec![],
+        vec![(0..1, Fault::RefusedEnable(79))],
+        vec![(4000..4001, Fault::Position(0.00095))],
+    ];
+    for faults in cases {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = record(&control("fast"), &faults, folder.path());
+        let old = folder.path().join("old.mcap");
+        copy(
+            &path,
+            &old,
+            |_| {},
+            |event| match event.kind {
+                EventKind::State {
+                    from: State::Disarmed,
+                    to: State::Enabling,
+                } if faults == [(0..1, Fault::RefusedEnable(79))] => Some(Event {
+                    kind: EventKind::State {
+                        from: State::Disarmed,
+                        to: State::Armed,
+                    },
+                    ..event
+                }),
+                EventKind::State {
+                    to: State::Enabling,
+                    ..
+                } => None,
+                EventKind::State {
+                    from: State::Enabling,
+                    to,
+                } => {
+                    let from = if to == State::Armed {
+                        State::Disarmed
+                    } else {
+                        State::Armed
+                    };
+                    Some(Event {
+                        kind: EventKind::State { from, to },
+                        ..event
+                    })
+                }
+                _ => Some(event),
+            },
+        );
+        assert_identical(&old, &format!("{faults:?}"));
+    }
+}
+
 /// Copies a recording and applies `alter` to its ticks.
 fn copy_altered(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
+    copy(path, to, alter, Some);
+}
+
+/// Copies a recording and applies `alter` to its ticks and `convert` to its events.
+fn copy(
+    path: &Path,
+    to: &Path,
+    alter: impl Fn(&mut TickRecord),
+    convert: impl Fn(Event) -> Option<Event>,
+) {
     let old = Recording::open(path).expect("a recording");
     let header = Header {
         config_toml: old.config_toml().expect("a configuration").into(),
@@ -254,8 +353,9 @@ fn copy_altered(path: &Path, to: &Path, alter: impl Fn(&mut TickRecord)) {
     for record in old.ticks().expect("readable") {
         let mut record = record.expect("readable");
         while let Some(event) = events.next_if(|event| event.tick <= record.tick) {
-            new.record(&LoopMessage::Event(*event))
-                .expect("a good disk");
+            if let Some(event) = convert(*event) {
+                new.record(&LoopMessage::Event(event)).expect("a good disk");
+            }
         }
         alter(&mut record);
         new.record(&LoopMessage::Tick(record)).expect("a good disk");

@@ -59,11 +59,11 @@ fn same_seed_gives_identical_run_and_other_seed_does_not() {
 fn two_second_run_has_the_reference_digest() {
     // A stored value; `bench control --fast --duration 2 --seed 1 --json` prints it as `loop_digest`. It is the same on any
     // x86-64 or ARM machine, because the path from the settings to a command calls no function of the platform's libm (checked
-    // by the test below) and sums have a fixed order. It depends on the profile `stage`, the simulated rig, the controller and
-    // the fields of a tick and of an event. After an intended change of one of them, put the new value here.
+    // by the test below) and sums have a fixed order. It depends on the profile `stage`, the simulated rig, the controller,
+    // the fields of a tick and the texts of the events. After an intended change of one of them, put the new value here.
     assert_eq!(
         format!("{:016x}", digest(&control("fast", 1))),
-        "55d42dd9c305a536"
+        "c9092a51c497ccd1"
     );
 }
 

@@ -225,13 +225,15 @@ fn generators_cover_runs_trips_clears_and_completions() {
 
 #[test]
 fn virtual_pace_loses_no_message_with_a_full_request_ring() {
-    // A full request ring in which every request causes as many events as possible: the amplifier refuses to be enabled.
-    let mut bench = Bench::still(&stage(), &[(0..10, Fault::RefusedEnable(1))]);
+    // A full request ring with as many events as possible: the last run starts, and its first command is refused.
+    let mut bench = Bench::still(&stage(), &[(0..10, Fault::RefusedCommand(1))]);
     bench.tick();
-    for _ in 0..8 {
+    for _ in 0..7 {
         bench.request(Request::Arm);
-        bench.request(Request::Clear);
+        bench.request(Request::Stop);
     }
+    bench.request(Request::Arm);
+    bench.request(Request::Start(crate::rig::endless(|_| 0.1)));
     let before = bench.all.len();
     bench.tick();
     let published = bench.all.len() - before;
@@ -239,6 +241,6 @@ fn virtual_pace_loses_no_message_with_a_full_request_ring() {
         published <= bench::rt::publisher::SLOTS_PER_TICK,
         "{published} in one tick"
     );
-    // Request, state, trip, state for each arm request; request and state for each clear request; then the record.
-    assert_eq!(published, 8 * (4 + 2) + 1);
+    // Request and state for each request except the last, which waits; armed, running, trip, tripped; then the record.
+    assert_eq!(published, 15 * 2 + 1 + 4 + 1);
 }

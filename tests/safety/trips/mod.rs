@@ -104,7 +104,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
             && matches!(
                 e.kind,
                 EventKind::State {
-                    from: State::Armed | State::Running,
+                    from: State::Enabling | State::Armed | State::Running,
                     to: State::Tripped
                 }
             )

@@ -29,6 +29,14 @@ pub enum Fault {
     RefusedCommand(i64),
     /// The amplifier refuses to be enabled, with this code.
     RefusedEnable(i64),
+    /// The amplifier is still being enabled.
+    PendingEnable,
+    /// The amplifier fails while it is being enabled, with this code.
+    FailedEnable(i64),
+    /// The amplifier is still resetting its fault.
+    PendingClear,
+    /// The amplifier keeps its fault at the end of the reset.
+    FailedClear,
     /// The amplifier refuses to clear its fault.
     RefusedClear,
     /// The amplifier returns this current from every command, in amperes.
@@ -81,10 +89,9 @@ fn refusal(code: i64) -> DeviceError {
 }
 
 impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
-    /// The loop processes requests before it reads the probe, so the tick is the one after the last reading.
+    /// The loop judges the reading of the tick before it enables the amplifier.
     fn begin_enable(&mut self) -> Result<(), DeviceError> {
-        let tick = self.now.map_or(0, |now| now + 1);
-        match self.find(tick, |fault| {
+        match self.find(self.now(), |fault| {
             if let Fault::RefusedEnable(code) = fault {
                 Some(*code)
             } else {
@@ -97,7 +104,12 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
     }
 
     fn poll_enable(&mut self) -> Poll<Result<(), DeviceError>> {
-        self.inner.poll_enable()
+        let result = self.find(self.now(), |fault| match fault {
+            Fault::PendingEnable => Some(Poll::Pending),
+            Fault::FailedEnable(code) => Some(Poll::Ready(Err(refusal(*code)))),
+            _ => None,
+        });
+        result.unwrap_or_else(|| self.inner.poll_enable())
     }
 
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
@@ -138,12 +150,23 @@ impl<R: Rig> CurrentAmplifier for FaultyRig<R> {
             .map(|offset_a| self.commanded_a + offset_a)
     }
 
+    /// The loop processes requests before it reads the probe, so the tick is the one after the last reading.
     fn begin_reset(&mut self) -> Result<(), DeviceError> {
         let tick = self.now.map_or(0, |now| now + 1);
         let refused = self.find(tick, |fault| {
             (*fault == Fault::RefusedClear).then_some(refusal(5))
         });
         refused.map_or(Ok(()), Err)
+    }
+
+    fn poll_reset(&mut self) -> Poll<Result<(), DeviceError>> {
+        let tick = self.now.map_or(0, |now| now + 1);
+        let result = self.find(tick, |fault| match fault {
+            Fault::PendingClear => Some(Poll::Pending),
+            Fault::FailedClear => Some(Poll::Ready(Err(refusal(6)))),
+            _ => None,
+        });
+        result.unwrap_or(Poll::Ready(Ok(())))
     }
 
     fn status(&self) -> AmplifierStatus {
@@ -177,6 +200,10 @@ impl<R: Rig> DisplacementProbe for FaultyRig<R> {
                 | Fault::RefusedEnable(_)
                 | Fault::ReturnedCurrent(_)
                 | Fault::MeasuredOffset(_)
+                | Fault::PendingEnable
+                | Fault::FailedEnable(_)
+                | Fault::PendingClear
+                | Fault::FailedClear
                 | Fault::RefusedClear => {}
             }
         }

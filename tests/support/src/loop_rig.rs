@@ -257,6 +257,14 @@ impl Bench {
         }
     }
 
+    /// The same loop with `ticks` healthy ticks before the amplifier is enabled.
+    pub fn with_healthy_ticks(self, ticks: u64) -> Bench {
+        Bench {
+            servo: self.servo.with_healthy_ticks(ticks),
+            ..self
+        }
+    }
+
     /// A stage at rest, disarmed.
     pub fn still(config: &Config, faults: &[(Range<u64>, Fault)]) -> Bench {
         Bench::around(config, FaultyRig::new(StillRig::default(), faults))
