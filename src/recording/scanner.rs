@@ -264,9 +264,11 @@ impl Scanner {
         if let Some(head) = self.head_at(self.offset)?
             && self.is_plausible_at(head.end())?
         {
-            return Ok(Some(head.end()));
+            // An altered length may end at a later record: the intact ones before it are not passed over.
+            let before_end = self.search(self.offset + 1, head.end())?;
+            return Ok(Some(before_end.unwrap_or(head.end())));
         }
-        self.search(self.search_from.max(self.before + 1))
+        self.search(self.search_from.max(self.before + 1), self.file_bytes)
     }
 
     /// Whether a record at a position is most probably one.
@@ -281,12 +283,12 @@ impl Scanner {
         }
     }
 
-    /// The first position from `from` at which an intact record begins.
-    fn search(&self, from: u64) -> io::Result<Option<u64>> {
+    /// The first position in `from..end` at which an intact record begins.
+    fn search(&self, from: u64, end: u64) -> io::Result<Option<u64>> {
         let mut block = vec![0; SEARCH_BYTES];
         let mut start = from;
-        while start < self.file_bytes {
-            let length = (self.file_bytes - start).min(SEARCH_BYTES as u64);
+        while start < end {
+            let length = (end - start).min(SEARCH_BYTES as u64);
             let block = &mut block[..length as usize];
             self.file.read_exact_at(block, start)?;
             for (index, position) in (start..start + length).enumerate() {
