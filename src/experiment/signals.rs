@@ -9,8 +9,11 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot::error::RecvError;
 
 use super::run_error::RunError;
+use crate::util::thread_priority::lower;
 
 const START: &str = "start the analysis";
+/// Nice value of an analysis: less urgent than the recorder and everything else.
+const ANALYSIS_NICE: i32 = 19;
 
 /// The signals that end a run: SIGINT (Ctrl-C), SIGTERM, SIGQUIT (Ctrl-\\) and SIGHUP (a closed terminal or connection).
 /// SIGHUP is left alone where it is ignored, as by `nohup`.
@@ -64,7 +67,7 @@ fn is_ignored(kind: SignalKind) -> bool {
     mask.is_some_and(|mask| mask >> (kind.as_raw_value() - 1) & 1 == 1)
 }
 
-/// Does `work` on a thread and returns its result; `None` if a signal arrives before it is done. The thread is then
+/// Does `work` on a thread of low priority and returns its result; `None` if a signal arrives before it is done. The thread is then
 /// abandoned and ends with the process: `work` must not hold anything that has to be closed.
 pub fn abandon_on_signal<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
@@ -73,7 +76,11 @@ pub fn abandon_on_signal<T: Send + 'static>(
     runtime.block_on(async {
         let mut signals = StopSignals::listen().map_err(RunError::system(START))?;
         let (sender, result) = tokio::sync::oneshot::channel();
-        let thread = analysis_thread().spawn(move || drop(sender.send(work())));
+        let work = move || {
+            lower(ANALYSIS_NICE);
+            drop(sender.send(work()));
+        };
+        let thread = analysis_thread().spawn(work);
         thread.map_err(RunError::system(START))?;
         tokio::select! {
             result = result => result.map(Some).map_err(thread_panicked),
@@ -167,6 +174,18 @@ mod tests {
             assert_eq!(ended.unwrap(), "in order");
         }
         assert!(!stop_on_signal(|stop| stop.load(Ordering::Relaxed)).unwrap());
+    }
+
+    #[test]
+    fn analysis_has_the_lowest_priority() {
+        let _alone = one_at_a_time();
+        // Field 19 [Linux, proc_pid_stat(5)]; the name in field 2 ends with the last parenthesis.
+        let nice = abandon_on_signal(|| {
+            let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
+            let (_, from_field_3) = stat.rsplit_once(") ").unwrap();
+            from_field_3.split(' ').nth(16).unwrap().to_string()
+        });
+        assert_eq!(nice.unwrap().unwrap(), "19");
     }
 
     #[test]

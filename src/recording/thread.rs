@@ -11,6 +11,7 @@ use rtrb::Consumer;
 use super::disk::{DiskWatch, Shortage, Space};
 use super::{Recorder, RecordingError};
 use crate::rt::record::LoopMessage;
+use crate::util::thread_priority::lower;
 
 /// Pause of the thread when the ring is empty: 5 ticks at 5 kHz, so the ring stays nearly empty and an idle recorder needs
 /// almost no processor time.
@@ -19,8 +20,9 @@ const IDLE_PAUSE: Duration = Duration::from_millis(1);
 /// Records between two checks of the disk, at most 120 kB.
 const RECORDS_PER_CHECK: u64 = 1000;
 
-/// Nice value of the thread.
-const NICE: libc::c_int = 15;
+/// Nice value of the thread. Compressing a chunk takes milliseconds, while the ring holds seconds: everything else is more urgent,
+/// above all the work of the kernel between a serial port and its reader.
+const NICE: i32 = 15;
 
 /// The state of a running recorder, for a supervisor.
 #[derive(Debug, Default)]
@@ -112,7 +114,7 @@ fn run(
     health: &Health,
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
-    lower_priority();
+    lower(NICE);
     let mut outcome = Ok(());
     loop {
         // Read before the ring is emptied: everything that was pushed before the producer was dropped is then in the ring.
@@ -150,14 +152,6 @@ fn check_disk(
             })
         }
     }
-}
-
-/// Lowers the priority of this thread, if possible. Compressing a chunk takes milliseconds, while the ring holds seconds:
-/// everything else is more urgent, above all the work of the kernel between a serial port and its reader.
-#[allow(unsafe_code, reason = "setpriority has no safe wrapper")]
-fn lower_priority() {
-    // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.
-    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, NICE) };
 }
 
 /// Reports a recording failure if the recorder thread panics, so that the run does not continue without a recording.

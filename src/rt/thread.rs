@@ -4,7 +4,7 @@
 use std::sync::mpsc::{Sender, channel};
 use std::thread::JoinHandle;
 
-use nix::sys::mman::{MlockAllFlags, mlockall};
+use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
 use serde::{Deserialize, Serialize};
 
 use super::arming::Trip;
@@ -92,7 +92,9 @@ pub fn prepare(
     let (report, reported) = channel();
     let builder = std::thread::Builder::new().name("bench-loop".into());
     let thread = builder.spawn(move || {
-        let _ = report.send(pace.schedule(&settings)); // without a receiver the loop is not started
+        let scheduling = pace.schedule(&settings);
+        let _lock = scheduling.memory_locked.then_some(MemoryLock);
+        let _ = report.send(scheduling); // without a receiver the loop is not started
         match started.recv() {
             Ok(()) => pace.run(servo, settings.period_s(), tail_ticks),
             Err(_) => LoopOutcome::default(),
@@ -106,6 +108,16 @@ pub fn prepare(
         start,
         scheduling,
     })
+}
+
+/// The locked memory of the process. It is unlocked at the end of the loop, also by a panic: the memory that the analysis allocates
+/// afterwards would be locked as well.
+struct MemoryLock;
+
+impl Drop for MemoryLock {
+    fn drop(&mut self) {
+        let _ = munlockall(); // does not fail for locked memory
+    }
 }
 
 impl Pace {

@@ -13,6 +13,13 @@ pub(crate) fn set_fifo(priority: i32) -> nix::Result<()> {
     nix::errno::Errno::result(result).map(drop)
 }
 
+/// Lowers the priority of the calling thread to a nice value from 1 to 19, if possible.
+#[allow(unsafe_code, reason = "setpriority has no safe wrapper")]
+pub(crate) fn lower(nice: i32) {
+    // SAFETY: no memory is touched; 0 is the calling thread, and raising its nice value is always permitted.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, nice) };
+}
+
 /// Setup of a thread that serves a device: it takes the priority directly below that of the loop.
 ///
 /// A refusal is ignored here, because the loop's own thread reports the same refusal.
