@@ -56,6 +56,7 @@ mod tests {
             node: 23,
             current_limit_a: 1.0,
             status_timeout: Duration::from_millis(100),
+            command_timeout: Duration::from_millis(20),
         };
         let traffic = BusTraffic {
             seconds: 0.5,

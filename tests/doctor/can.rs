@@ -277,6 +277,7 @@ fn vesc_is_examined_by_listening_only() {
             node,
             current_limit_a: 1.0,
             status_timeout: Duration::from_millis(100),
+            command_timeout: Duration::from_millis(20),
         };
         let mut report = Report::default();
         examine_vesc(&host, &settings, 500_000, &mut report);

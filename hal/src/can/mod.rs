@@ -13,7 +13,7 @@
 //!
 //! | failure of | detected by | by |
 //! |---|---|---|
-//! | the loop (no more set-points) | the service thread | [`drive::DriveTimes::command_timeout`] |
+//! | the loop (no more set-points) | the service thread | [`drive::DriveTimes::command_timeout`], [`vesc::VescSettings::command_timeout`] |
 //! | this process | the drive | its heartbeat consumer (0x1016) and abort connection option (0x6007) |
 //! | the drive's processor, its power | the service thread | heartbeat, boot-up message |
 //! | the drive's power stage | the service thread | EMCY, statusword |

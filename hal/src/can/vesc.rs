@@ -6,8 +6,9 @@
 //! from the VESC    command 9   STATUS        rpm i32, current i16 in 0.1 A, duty i16 in 1/1000
 //! ```
 //!
-//! A VESC releases the motor after 0.5 s without a command. Only the loop sends commands, so the current is zero when the loop
-//! stops.
+//! A VESC releases the motor after 0.5 s without a command. The driver does not rely on it: after a disable or a fault its thread
+//! sends SET_CURRENT 0 every 10 ms until two STATUS have arrived and the last shows at most 0.2 A, for 1 s at most. If the loop sends
+//! no command for [`VescSettings::command_timeout`] while the VESC is enabled, this is a fault.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering};
@@ -45,6 +46,8 @@ pub struct VescSettings {
     pub current_limit_a: f64,
     /// Without STATUS for this time the VESC is lost.
     pub status_timeout: Duration,
+    /// If the loop sends no command for this time while the VESC is enabled, the current is switched off.
+    pub command_timeout: Duration,
 }
 
 impl VescSettings {
@@ -64,9 +67,10 @@ const BUS_OFF: u32 = 2;
 const BUS_FAILED: u32 = 3;
 const NOT_ARMED: u32 = 4;
 const NOT_SENT: u32 = 5;
+const COMMANDS_STOPPED: u32 = 6;
 
 /// Code, meaning and remedy of each fault.
-const FAULTS: [(u32, &str, &str); 5] = [
+const FAULTS: [(u32, &str, &str); 6] = [
     (
         SILENT,
         "the VESC sends no STATUS",
@@ -88,7 +92,21 @@ const FAULTS: [(u32, &str, &str); 5] = [
         "a command could not be sent",
         "check that the VESC is on the bus, or lower the rate",
     ),
+    (
+        COMMANDS_STOPPED,
+        "the loop sent no more commands and the current was switched off",
+        "look for overruns, then clear the fault",
+    ),
 ];
+
+/// Time between repeats of SET_CURRENT 0.
+const REPEAT_NS: u64 = 10_000_000;
+/// Longest time of the repeats: twice the time after which a VESC releases the motor without a command.
+const REPEATS_END_NS: u64 = 1_000_000_000;
+/// Largest current that counts as none, in units of 0.1 A.
+const NO_CURRENT_TENTHS: u32 = 2;
+/// Longest time that closing the driver waits until the current is confirmed to be zero: five periods of STATUS.
+const CLOSE_TIMEOUT_NS: u64 = 100_000_000;
 
 fn text(code: u32) -> FaultText {
     let fault = FAULTS.iter().find(|(known, ..)| *known == code);
@@ -105,9 +123,17 @@ fn error(code: u32) -> DeviceError {
     }
 }
 
-/// State that the monitor passes to the tick.
+/// State that the tick and the thread of the driver share.
 #[derive(Debug, Default)]
 struct Shared {
+    /// Whether commands are followed. Written by the tick.
+    is_on: AtomicBool,
+    /// How often the VESC was enabled, so that a short use is noticed as well. Written by the tick.
+    uses: AtomicU32,
+    /// Number of commands since it was enabled. Written by the tick.
+    commands: AtomicU32,
+    /// The value of `uses` for which the repeats of SET_CURRENT 0 have ended. Written by the thread.
+    ended_uses: AtomicU32,
     fault: AtomicU32,
     is_heard: AtomicBool,
     /// Number of STATUS frames.
@@ -120,6 +146,19 @@ impl Shared {
         let _ = self
             .fault
             .compare_exchange(0, code, Ordering::AcqRel, Ordering::Acquire); // the first fault is kept
+    }
+
+    fn switch(&self, is_on: bool) {
+        if is_on {
+            self.commands.store(0, Ordering::Release);
+            self.uses.fetch_add(1, Ordering::Release);
+        }
+        self.is_on.store(is_on, Ordering::Release);
+    }
+
+    /// Whether the VESC is off and zero current is no longer repeated.
+    fn has_settled(&self) -> bool {
+        self.ended_uses.load(Ordering::Acquire) == self.uses.load(Ordering::Acquire)
     }
 }
 
@@ -138,7 +177,6 @@ pub struct Vesc {
     host: Box<dyn Host>,
     shared: Arc<Shared>,
     settings: VescSettings,
-    is_on: bool,
     change: Option<Change>,
     _claim: Claim,
 }
@@ -154,8 +192,12 @@ impl Vesc {
         let watch = Watch {
             bus: host.endpoint(&status).map_err(|e| e.to_string())?,
             shared: Arc::clone(&shared),
-            timeout_ns: settings.status_timeout.as_nanos() as u64,
+            node: settings.node,
+            status_timeout_ns: settings.status_timeout.as_nanos() as u64,
+            command_timeout_ns: settings.command_timeout.as_nanos() as u64,
             heard_ns: host.now_ns(),
+            use_state: UseState::Off,
+            uses: 0,
         };
         Ok(Vesc {
             _watch: host
@@ -165,7 +207,6 @@ impl Vesc {
             host,
             shared,
             settings,
-            is_on: false,
             change: None,
             _claim: claim,
         })
@@ -178,6 +219,10 @@ impl Vesc {
             status_count: self.shared.status_count.load(Ordering::Acquire),
             deadline_ns: self.host.now_ns().saturating_add(limit_ns),
         }
+    }
+
+    fn is_on(&self) -> bool {
+        self.shared.is_on.load(Ordering::Acquire)
     }
 
     fn no_fault(&self) -> Result<(), DeviceError> {
@@ -200,14 +245,14 @@ impl CurrentAmplifier for Vesc {
         let Some(change) = self.change else {
             return Poll::Ready(Err(error(NOT_ARMED)));
         };
-        self.is_on = self.shared.status_count.load(Ordering::Acquire) != change.status_count;
+        let has_answered = self.shared.status_count.load(Ordering::Acquire) != change.status_count;
         let result = match self.no_fault() {
-            Ok(()) if self.is_on => Ok(()),
+            Ok(()) if has_answered => Ok(()),
             Ok(()) if self.host.now_ns() < change.deadline_ns => return Poll::Pending,
             Ok(()) => Err(error(SILENT)),
             Err(fault) => Err(fault),
         };
-        self.is_on = result.is_ok();
+        self.shared.switch(result.is_ok());
         self.change = None;
         Poll::Ready(result)
     }
@@ -217,7 +262,7 @@ impl CurrentAmplifier for Vesc {
             self.disable();
             return Err(error);
         }
-        if !self.is_on {
+        if !self.is_on() {
             return Err(error(NOT_ARMED));
         }
         let limit_a = self.settings.current_limit_a;
@@ -225,17 +270,19 @@ impl CurrentAmplifier for Vesc {
         self.bus
             .send(&set_current(self.settings.node, current_ma))
             .map_err(|_| error(NOT_SENT))?;
+        self.shared.commands.fetch_add(1, Ordering::Release);
         Ok(f64::from(current_ma) * 1e-3)
     }
 
     fn disable(&mut self) {
-        (self.is_on, self.change) = (false, None);
-        let _ = self.bus.send(&set_current(self.settings.node, 0)); // if it is lost, 0.5 s without command have the same effect
+        self.change = None;
+        self.shared.switch(false);
+        let _ = self.bus.send(&set_current(self.settings.node, 0)); // if it is lost, the thread of the driver repeats it
     }
 
     fn status(&self) -> AmplifierStatus {
         match self.shared.fault.load(Ordering::Acquire) {
-            0 if self.is_on => AmplifierStatus::Enabled,
+            0 if self.is_on() => AmplifierStatus::Enabled,
             0 => AmplifierStatus::Disabled,
             code => AmplifierStatus::Fault(code),
         }
@@ -270,17 +317,72 @@ impl CurrentAmplifier for Vesc {
 }
 
 impl Drop for Vesc {
+    /// Waits until the thread of the driver has seen the current gone.
     fn drop(&mut self) {
         self.disable();
+        let end_ns = self.host.now_ns().saturating_add(CLOSE_TIMEOUT_NS);
+        while !self.shared.has_settled() && self.host.now_ns() < end_ns {
+            self.host.sleep(Duration::from_millis(1));
+        }
     }
 }
 
-/// Receives STATUS and error frames.
+/// The use of the VESC as the thread of the driver sees it.
+#[derive(Clone, Copy, Debug)]
+enum UseState {
+    /// No current was commanded, or its end is confirmed.
+    Off,
+    /// The VESC follows commands.
+    On(OnWatch),
+    /// SET_CURRENT 0 is repeated.
+    Ending(OffWatch),
+}
+
+/// Monitoring of the commands.
+#[derive(Clone, Copy, Debug, Default)]
+struct OnWatch {
+    commands: u32,
+    /// When the last command was noticed; `None` before the first.
+    last_command_ns: Option<u64>,
+}
+
+impl OnWatch {
+    /// The state with the present number of commands.
+    fn updated(self, commands: u32, now_ns: u64) -> OnWatch {
+        match commands == self.commands {
+            true => self,
+            false => OnWatch {
+                commands,
+                last_command_ns: Some(now_ns),
+            },
+        }
+    }
+
+    fn is_overdue(self, timeout_ns: u64, now_ns: u64) -> bool {
+        let last_ns = self.last_command_ns;
+        last_ns.is_some_and(|last_ns| now_ns.saturating_sub(last_ns) > timeout_ns)
+    }
+}
+
+/// Monitoring after a disable or a fault, until the current is gone.
+#[derive(Clone, Copy, Debug)]
+struct OffWatch {
+    since_ns: u64,
+    repeat_ns: u64,
+    status_count: u32,
+}
+
+/// The thread of the driver: receives STATUS and error frames, watches the commands, and repeats zero current.
 struct Watch {
     bus: Box<dyn CanBus>,
     shared: Arc<Shared>,
-    timeout_ns: u64,
+    node: u8,
+    status_timeout_ns: u64,
+    command_timeout_ns: u64,
     heard_ns: u64,
+    use_state: UseState,
+    /// The value of [`Shared::uses`] that `use_state` belongs to.
+    uses: u32,
 }
 
 impl Watch {
@@ -303,6 +405,75 @@ impl Watch {
             }
         }
     }
+
+    fn check_status(&self, now_ns: u64) {
+        if now_ns.saturating_sub(self.heard_ns) > self.status_timeout_ns {
+            self.shared.is_heard.store(false, Ordering::Release);
+            self.shared.latch(SILENT);
+        }
+    }
+
+    /// Follows the use by the tick. A fault ends it.
+    fn follow_use(&mut self, now_ns: u64) {
+        let has_fault = self.shared.fault.load(Ordering::Acquire) != 0;
+        let is_on = self.shared.is_on.load(Ordering::Acquire) && !has_fault;
+        let uses = self.shared.uses.load(Ordering::Acquire);
+        let is_new = uses != self.uses;
+        self.uses = uses;
+        self.use_state = match (self.use_state, is_on) {
+            (UseState::On(_), true) if !is_new => return,
+            (_, true) => UseState::On(OnWatch::default()),
+            (UseState::On(_), false) => UseState::Ending(self.off_watch(now_ns)),
+            (UseState::Off | UseState::Ending(_), false) if is_new => {
+                UseState::Ending(self.off_watch(now_ns))
+            }
+            (UseState::Off | UseState::Ending(_), false) => return,
+        };
+    }
+
+    fn off_watch(&self, now_ns: u64) -> OffWatch {
+        OffWatch {
+            since_ns: now_ns,
+            repeat_ns: now_ns,
+            status_count: self.shared.status_count.load(Ordering::Acquire),
+        }
+    }
+
+    /// A loop that sends no more commands is a fault.
+    fn check_commands(&mut self, now_ns: u64) {
+        let UseState::On(watch) = self.use_state else {
+            return;
+        };
+        let watch = watch.updated(self.shared.commands.load(Ordering::Acquire), now_ns);
+        self.use_state = UseState::On(watch);
+        if watch.is_overdue(self.command_timeout_ns, now_ns) {
+            self.shared.latch(COMMANDS_STOPPED);
+        }
+    }
+
+    /// Repeats zero current until the VESC reports it, or for [`REPEATS_END_NS`].
+    fn ensure_zero(&mut self, now_ns: u64) {
+        let UseState::Ending(mut watch) = self.use_state else {
+            return;
+        };
+        let is_overdue = now_ns.saturating_sub(watch.since_ns) > REPEATS_END_NS;
+        if is_overdue || self.is_confirmed(watch) {
+            self.use_state = UseState::Off;
+            return self.shared.ended_uses.store(self.uses, Ordering::Release);
+        }
+        if now_ns >= watch.repeat_ns {
+            watch.repeat_ns = now_ns.saturating_add(REPEAT_NS);
+            let _ = self.bus.send(&set_current(self.node, 0)); // the next repeat follows
+        }
+        self.use_state = UseState::Ending(watch);
+    }
+
+    /// Whether the second or a later STATUS after the end shows no current: the first may have been measured before it.
+    fn is_confirmed(&self, watch: OffWatch) -> bool {
+        let count = self.shared.status_count.load(Ordering::Acquire);
+        let tenths = self.shared.current_tenths.load(Ordering::Acquire);
+        count.wrapping_sub(watch.status_count) >= 2 && tenths.unsigned_abs() <= NO_CURRENT_TENTHS
+    }
 }
 
 impl Task for Watch {
@@ -314,10 +485,12 @@ impl Task for Watch {
         if let Ok(Some(event)) = received {
             self.take(event, now_ns());
         }
-        if now_ns().saturating_sub(self.heard_ns) > self.timeout_ns {
-            self.shared.is_heard.store(false, Ordering::Release);
-            self.shared.latch(SILENT);
-        }
+        let now_ns = now_ns();
+        self.check_status(now_ns);
+        self.follow_use(now_ns);
+        self.check_commands(now_ns);
+        self.follow_use(now_ns); // a new fault ends the use at once
+        self.ensure_zero(now_ns);
         received.map(|_| ())
     }
 }

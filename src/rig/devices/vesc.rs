@@ -10,6 +10,10 @@ use bench_hal::can::vesc::{self, Vesc};
 use super::amplifier::{AmplifierError, CanAddress, CanAmplifier, OpenAmplifier, Requirements};
 use crate::config::VescSettings;
 
+/// The current is switched off after this time without a command, in seconds, or after [`PERIODS_LOST`] periods of a slow loop.
+const COMMAND_LOST_S: f64 = 0.02;
+/// Fewest periods of the loop without a command after which the current is switched off.
+const PERIODS_LOST: f64 = 3.0;
 /// Set-points are whole milliamperes.
 const STEP_A: f64 = 1e-3;
 
@@ -53,9 +57,11 @@ pub fn identity(device: &VescSettings) -> String {
 
 /// The settings of the driver.
 pub fn driver_settings(device: &VescSettings, requirements: Requirements) -> vesc::VescSettings {
+    let command_lost_s = COMMAND_LOST_S.max(PERIODS_LOST / requirements.rate_hz);
     vesc::VescSettings {
         node: device.node,
         current_limit_a: requirements.current_limit_a,
         status_timeout: Duration::from_secs_f64(device.status_lost_s),
+        command_timeout: Duration::from_secs_f64(command_lost_s),
     }
 }

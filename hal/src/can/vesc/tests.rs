@@ -10,6 +10,7 @@ const SETTINGS: VescSettings = VescSettings {
     node: 23,
     current_limit_a: 60.0,
     status_timeout: Duration::from_millis(100),
+    command_timeout: Duration::from_millis(20),
 };
 
 struct Rig {
@@ -26,6 +27,18 @@ impl Rig {
 
     fn reset_fault(&mut self) -> Result<(), DeviceError> {
         crate::blocking::reset_fault(&mut self.vesc, |time| self.world.sleep(time))
+    }
+
+    /// Commands a current once per millisecond, as a loop at 1 kHz; errors are ignored, as when the VESC has a fault.
+    fn drive(&mut self, current_a: f64, milliseconds: u64) {
+        for _ in 0..milliseconds {
+            let _ = self.vesc.command(current_a);
+            self.world.sleep(Duration::from_millis(1));
+        }
+    }
+
+    fn sleep_ms(&self, milliseconds: u64) {
+        self.world.sleep(Duration::from_millis(milliseconds));
     }
 
     fn current_a(&self) -> f64 {
@@ -80,7 +93,7 @@ fn a_vesc_follows_commands_and_reports_its_current() {
     );
     assert_eq!(rig.vesc.command(99.0), Ok(60.0), "limited");
     assert_eq!(rig.vesc.command(-1.2345), Ok(-1.234));
-    rig.world.sleep(Duration::from_millis(40));
+    rig.drive(-1.2345, 40);
     assert_eq!(rig.current_a(), -1.234);
     assert!(
         (rig.vesc.actual_current_a().unwrap() + 1.2).abs() < 1e-9,
@@ -123,7 +136,7 @@ fn a_silent_vesc_and_bus_off_are_faults_until_cleared() {
         rig.enable().unwrap();
         rig.vesc.command(1.0).unwrap();
         fail(&rig);
-        rig.world.sleep(Duration::from_millis(130));
+        rig.drive(1.0, 130);
         assert_eq!(rig.vesc.status(), AmplifierStatus::Fault(code));
         assert_eq!(rig.vesc.command(1.0).unwrap_err().code, i64::from(code));
         rig.world.sleep(Duration::from_millis(1));
@@ -147,7 +160,7 @@ fn vesc_releases_the_motor_after_loss_of_commands() {
     rig.vesc.command(1.0).unwrap();
     rig.world.sleep(Duration::from_millis(1));
     rig.inject(DeviceFault::Unplugged);
-    rig.world.sleep(Duration::from_millis(490));
+    rig.drive(1.0, 490);
     assert_eq!(
         (rig.current_a(), rig.vesc.status()),
         (1.0, AmplifierStatus::Fault(SILENT))
@@ -157,14 +170,119 @@ fn vesc_releases_the_motor_after_loss_of_commands() {
 }
 
 #[test]
-fn current_is_zero_after_the_command_timeout() {
+fn emulated_vesc_releases_the_motor_after_half_a_second_without_command() {
+    let rig = rig();
+    let mut bus = rig.world.endpoint(&[]).unwrap();
+    bus.send(&set_current(23, 2000)).unwrap();
+    rig.sleep_ms(490);
+    assert_eq!(rig.current_a(), 2.0);
+    rig.sleep_ms(20);
+    assert_eq!(rig.current_a(), 0.0);
+}
+
+#[test]
+fn current_ends_20_ms_after_the_last_command_of_a_hung_loop() {
+    // One command before the thread of the driver runs, and many.
+    for milliseconds in [1, 50] {
+        let mut rig = rig();
+        rig.enable().unwrap();
+        rig.drive(2.0, milliseconds); // the last command is 1 ms old
+        rig.sleep_ms(18);
+        assert_eq!(
+            (rig.current_a(), rig.vesc.status()),
+            (2.0, AmplifierStatus::Enabled)
+        );
+        rig.sleep_ms(3);
+        let fault = AmplifierStatus::Fault(COMMANDS_STOPPED);
+        assert_eq!((rig.current_a(), rig.vesc.status()), (0.0, fault));
+        let refused = rig.vesc.command(2.0).unwrap_err();
+        assert_eq!(refused.code, i64::from(COMMANDS_STOPPED));
+        rig.sleep_ms(1);
+        assert_eq!(rig.current_a(), 0.0);
+        rig.reset_fault().unwrap();
+        rig.enable().unwrap();
+        rig.drive(1.0, 50);
+        assert_eq!(
+            (rig.current_a(), rig.vesc.status()),
+            (1.0, AmplifierStatus::Enabled)
+        );
+    }
+}
+
+#[test]
+fn enabled_vesc_waits_for_its_first_command() {
+    let mut rig = rig();
+    rig.enable().unwrap();
+    rig.sleep_ms(1000);
+    assert_eq!(rig.vesc.status(), AmplifierStatus::Enabled);
+}
+
+#[test]
+fn lost_zero_is_repeated_until_the_current_is_gone() {
+    // The zero of the disable is lost, and those of the next 45 ms.
+    let mut rig = rig();
+    rig.enable().unwrap();
+    rig.drive(2.0, 30);
+    rig.inject(DeviceFault::SetPointsIgnored);
+    rig.vesc.disable();
+    rig.sleep_ms(45);
+    assert_eq!(rig.current_a(), 2.0);
+    rig.inject(DeviceFault::None);
+    rig.sleep_ms(11); // the period of the repeats
+    assert_eq!(rig.current_a(), 0.0);
+}
+
+#[test]
+fn zero_is_repeated_until_two_status_frames_confirm_it_and_at_most_for_a_second() {
+    // Ten milliseconds between repeats. The second STATUS is at most 40 ms away; without STATUS, a second has 101 repeats. A VESC that
+    // receives none of them releases the motor after 500 ms, and the next STATUS shows it.
+    for (fault, repeats) in [
+        (DeviceFault::None, 2..=6),
+        (DeviceFault::Mute, 100..=102),
+        (DeviceFault::SetPointsIgnored, 50..=54),
+    ] {
+        let mut rig = rig();
+        rig.enable().unwrap();
+        rig.drive(2.0, 3);
+        let mut listener = rig.world.endpoint(&[set_current(23, 0).id()]).unwrap();
+        rig.inject(fault);
+        rig.vesc.disable();
+        rig.sleep_ms(3000);
+        let frames = std::iter::from_fn(|| listener.receive(Duration::ZERO).unwrap());
+        let count = frames.inspect(|frame| assert_eq!(*frame, BusEvent::Frame(set_current(23, 0))));
+        let count = count.count();
+        assert!(repeats.contains(&count), "{fault:?}: {count}");
+    }
+}
+
+#[test]
+fn use_of_one_command_is_ended_by_repeated_zero() {
+    // Enabled, commanded and disabled within one step of the thread of the driver.
     let mut rig = rig();
     rig.enable().unwrap();
     rig.vesc.command(2.0).unwrap();
-    rig.world.sleep(Duration::from_millis(490));
-    assert_eq!(rig.current_a(), 2.0);
-    rig.world.sleep(Duration::from_millis(20));
+    rig.vesc.disable();
+    rig.sleep_ms(1);
+    rig.device
+        .lock()
+        .unwrap()
+        .handle(&set_current(23, 2000), 0, &mut Vec::new());
+    assert_eq!(rig.current_a(), 2.0, "as if the zero had been lost");
+    rig.sleep_ms(11);
     assert_eq!(rig.current_a(), 0.0);
+}
+
+#[test]
+fn closing_waits_until_the_current_is_gone() {
+    let mut rig = rig();
+    rig.enable().unwrap();
+    rig.drive(2.0, 3);
+    let begun_ns = rig.world.now_ns();
+    drop(rig.vesc);
+    // Two STATUS at a period of 20 ms.
+    let closed_ms = (rig.world.now_ns() - begun_ns) / 1_000_000;
+    assert!((20..=45).contains(&closed_ms), "{closed_ms}");
+    assert_eq!(rig.device.lock().unwrap().current_a(), 0.0);
 }
 
 proptest! {
