@@ -205,7 +205,9 @@ fn stop_text(cause: Option<StopCause>) -> String {
             let why = "no tick was recorded for 1 s, because the disk is too slow; record on another disk with --out";
             labelled("stopped", why)
         }
-        Some(StopCause::RecordingFailed | StopCause::Signal) | None => String::new(),
+        Some(StopCause::RecordingFailed | StopCause::Signal | StopCause::LeaseExpired) | None => {
+            String::new()
+        }
     }
 }
 

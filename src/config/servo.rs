@@ -3,6 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Arm lease without a setting in seconds.
+const DEFAULT_ARM_LEASE_S: f64 = 2.0;
+
 /// The real-time loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -30,11 +33,22 @@ pub struct LoopSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 10.0))]
     pub healthy_s: Option<f64>,
+    /// Time in seconds after which the loop ends a run at real-time pace by itself, because the command line does not respond; 2
+    /// if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.1, max = 60.0))]
+    pub arm_lease_s: Option<f64>,
 }
 
 impl LoopSettings {
     /// Length of a tick in seconds.
     pub fn period_s(&self) -> f64 {
         1.0 / self.rate_hz
+    }
+
+    /// Time in ticks after which a run ends whose arm lease was not renewed.
+    pub fn arm_lease_ticks(&self) -> u64 {
+        let lease_s = self.arm_lease_s.unwrap_or(DEFAULT_ARM_LEASE_S);
+        (lease_s * self.rate_hz).ceil() as u64
     }
 }

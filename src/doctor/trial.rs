@@ -217,6 +217,7 @@ mod tests {
             cpu: None,
             stop_ramp_s: None,
             healthy_s: None,
+            arm_lease_s: None,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

@@ -20,8 +20,9 @@ use crate::rt::arming::{State, Trip};
 use crate::rt::clock::TickTiming;
 use crate::rt::program::Program;
 use crate::rt::publisher::SLOTS_PER_TICK;
-use crate::rt::record::{Event, EventKind, LoopMessage, RequestKind, TickRecord};
+use crate::rt::record::{Event, EventKind, LoopMessage, Origin, RequestKind, TickRecord};
 use crate::rt::servo::{Request, Servo};
+use crate::rt::supervision::StopFlags;
 
 /// A recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]
@@ -116,6 +117,7 @@ struct Replay {
     servo: Servo,
     outside: OutsideEnds,
     feed: RigFeed,
+    stop_flags: StopFlags,
     program: Option<Box<dyn Program>>,
     result: Replayed,
 }
@@ -127,8 +129,11 @@ impl Replay {
         let (connections, outside) = connect(SLOTS_PER_TICK);
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
+        let stop_flags = StopFlags::default();
+        let servo = servo(plan, Box::new(rig), connections, correction).with_ramps(ramp_ticks);
         Ok(Replay {
-            servo: servo(plan, Box::new(rig), connections, correction).with_ramps(ramp_ticks),
+            servo: servo.with_stop_flags(stop_flags.clone()),
+            stop_flags,
             outside,
             feed,
             program: Some(plan.program()?),
@@ -145,6 +150,9 @@ impl Replay {
         let mut tripped = false;
         while let Some(event) = events.next_if(|event| event.tick <= tick) {
             match event.kind {
+                EventKind::Request(request) if request.origin == Origin::Signal => {
+                    self.stop_flags.raise();
+                }
                 EventKind::Request(request) => self.request(request.kind),
                 // From `Enabling`; in recordings of older versions from `Disarmed`.
                 EventKind::State {

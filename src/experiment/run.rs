@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::thread::JoinHandle;
 use std::time::{Duration, SystemTime};
 
 use bench_hal::Rig;
@@ -15,7 +14,7 @@ use super::file_name;
 use super::motor_start::MotorStart;
 use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, Plan, RAMP_TICKS};
 use super::run_error::RunError;
-use super::signals::{StopSignals, runtime};
+use super::signals::SignalFlags;
 use crate::config::LoopSettings;
 use crate::recording::{
     self, DiskWatch, Header, Health, MIN_FREE_BYTES, Recorder, RecordingError, Shortage, Totals,
@@ -24,8 +23,10 @@ use crate::recording::{
 use crate::rig::calibration::Correction;
 use crate::rt::interlock::Interlocks;
 use crate::rt::program::Program;
+use crate::rt::record::Origin;
 use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo::{Connections, Progress, Servo};
+use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use crate::rt::thread::{LoopOutcome, Pace, PreparedLoop, Scheduling, prepare};
 use crate::util::timestamp;
 
@@ -98,6 +99,8 @@ struct PreparedRun {
     recording_bytes: u64,
     max_unrecorded_ticks: u64,
     motor: MotorStart,
+    stop_flags: StopFlags,
+    lease: Arc<ArmLease>,
 }
 
 fn prepare_run(
@@ -113,7 +116,13 @@ fn prepare_run(
     require_space(folder, recording_bytes, free_bytes(folder))?;
     let (connections, mut outside) = connect(RING_SLOTS);
     queue_start(&mut outside.requests, program);
-    let servo_loop = prepare_loop(plan, rig, connections, pace, ramp_ticks)?;
+    let (stop_flags, lease) = (StopFlags::default(), Arc::<ArmLease>::default());
+    let servo = servo(plan, rig, connections, plan.correction())
+        .with_ramps(ramp_ticks)
+        .with_healthy_ticks(healthy_ticks(&plan.config.servo, pace))
+        .with_stop_flags(stop_flags.clone())
+        .with_lease(lease_watch(plan, pace, &lease));
+    let servo_loop = prepare_loop(plan, servo, pace)?;
     let mut metadata = metadata(plan, pace, servo_loop.scheduling());
     metadata.insert(RAMP_TICKS.into(), ramp_ticks.to_string());
     let recorder = create_recording(plan, metadata, folder)?;
@@ -126,6 +135,8 @@ fn prepare_run(
         recording_bytes,
         max_unrecorded_ticks: (MAX_UNRECORDED_S * plan.config.servo.rate_hz) as u64,
         motor: plan.motor.clone(),
+        stop_flags,
+        lease,
     })
 }
 
@@ -179,17 +190,19 @@ pub(super) fn servo(
     Servo::new(rig, interlocks, connections).with_correction(correction)
 }
 
-fn prepare_loop(
-    plan: &Plan,
-    rig: Box<dyn Rig>,
-    connections: Connections,
-    pace: Pace,
-    ramp_ticks: u64,
-) -> Result<PreparedLoop, RunError> {
+/// The arm lease of a run. In virtual pace, ticks do not measure the time of the supervisor.
+fn lease_watch(plan: &Plan, pace: Pace, lease: &Arc<ArmLease>) -> Option<LeaseWatch> {
+    match pace {
+        Pace::Virtual => None,
+        Pace::Realtime => {
+            let limit_ticks = plan.config.servo.arm_lease_ticks();
+            Some(LeaseWatch::new(Arc::clone(lease), limit_ticks))
+        }
+    }
+}
+
+fn prepare_loop(plan: &Plan, servo: Servo, pace: Pace) -> Result<PreparedLoop, RunError> {
     let config = &plan.config;
-    let servo = servo(plan, rig, connections, plan.correction())
-        .with_ramps(ramp_ticks)
-        .with_healthy_ticks(healthy_ticks(&config.servo, pace));
     prepare(servo, &config.servo, pace, tail_ticks(plan))
         .map_err(RunError::system("start the thread of the loop"))
 }
@@ -294,37 +307,30 @@ impl PreparedRun {
         let recorder = recording::spawn(self.recorder, records, disk).map_err(RunError::Create)?;
         let mut supervisor = Supervisor {
             requests,
+            lease: self.lease,
             health: recorder.health(),
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: self.max_unrecorded_ticks,
-            stopping: Stopping::No,
             cause: None,
         };
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
-        let ended = supervisor.wait_for_end(self.servo_loop, report)?;
+        let ended = supervisor.wait_for_end(self.servo_loop, &self.stop_flags, report)?;
         let recorder = recorder.join()?;
         let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
+        warn_of_expired_lease(&ended);
         Ok(Run {
             path,
-            ended,
             pace: self.pace,
             scheduling,
-            stop_cause: supervisor.cause,
+            stop_cause: supervisor
+                .cause
+                .or(ended.stopped_by.and_then(StopCause::by)),
+            ended,
             motor: self.motor,
             recorder,
         })
     }
-}
-
-/// Watches the loop from outside: signals, progress, and the state of the recorder.
-struct Supervisor {
-    requests: RequestSender,
-    health: Arc<Health>,
-    progress: Arc<Progress>,
-    max_unrecorded_ticks: u64,
-    stopping: Stopping,
-    cause: Option<StopCause>,
 }
 
 /// Why a run was stopped before its end.
@@ -333,6 +339,8 @@ struct Supervisor {
 pub enum StopCause {
     /// A signal of the operator or of the system.
     Signal,
+    /// The loop itself: the supervisor did not renew the arm lease.
+    LeaseExpired,
     /// The recording could not be written.
     RecordingFailed,
     /// No tick was recorded for [`MAX_UNRECORDED_S`]: the disk is too slow.
@@ -352,56 +360,64 @@ impl From<Shortage> for StopCause {
     }
 }
 
-/// What the supervisor requested to end the run early.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stopping {
-    /// Nothing.
-    No,
-    /// The current goes to zero along a ramp.
-    Ramp,
-    /// The current was cut.
-    Cut,
+impl StopCause {
+    /// Why the loop ended a run at the request of `origin`. The supervisor knows the reasons of its own requests.
+    fn by(origin: Origin) -> Option<StopCause> {
+        match origin {
+            Origin::Supervisor => None,
+            Origin::Signal => Some(StopCause::Signal),
+            Origin::Lease => Some(StopCause::LeaseExpired),
+        }
+    }
+}
+
+/// States why the loop ended a run by itself.
+fn warn_of_expired_lease(ended: &LoopOutcome) {
+    if ended.stopped_by == Some(Origin::Lease) {
+        tracing::warn!(
+            "the loop ended the run by itself, because the command line did not respond for the time of loop.arm_lease_s; find out what blocked it, for example a paused terminal"
+        );
+    }
+}
+
+/// Watches the loop from outside: progress and the state of the recorder. It renews the arm lease.
+struct Supervisor {
+    requests: RequestSender,
+    lease: Arc<ArmLease>,
+    health: Arc<Health>,
+    progress: Arc<Progress>,
+    max_unrecorded_ticks: u64,
+    /// Why it has requested the end of the run, if it has.
+    cause: Option<StopCause>,
 }
 
 impl Supervisor {
-    /// Starts the loop and waits for its end.
+    /// Starts the loop and waits for its end. Signals reach the loop without this thread.
     fn wait_for_end(
         &mut self,
         prepared: PreparedLoop,
-        watch: impl FnMut(),
-    ) -> Result<std::thread::Result<LoopOutcome>, RunError> {
-        const WHAT: &str = "start the supervisor of the run";
-        let runtime = runtime().map_err(RunError::system(WHAT))?;
-        runtime.block_on(async {
-            let signals = StopSignals::listen().map_err(RunError::system(WHAT))?;
-            let thread = prepared.begin();
-            self.until_finished(&thread, signals, watch).await;
-            Ok(thread.join())
-        })
-    }
-
-    async fn until_finished(
-        &mut self,
-        thread: &JoinHandle<LoopOutcome>,
-        mut signals: StopSignals,
+        stop_flags: &StopFlags,
         mut watch: impl FnMut(),
-    ) {
-        let mut beat = tokio::time::interval(SUPERVISION_PERIOD);
+    ) -> Result<std::thread::Result<LoopOutcome>, RunError> {
+        let signals = SignalFlags::set(stop_flags);
+        let _signals = signals.map_err(RunError::system("start the supervisor of the run"))?;
+        let thread = prepared.begin();
         while !thread.is_finished() {
-            tokio::select! {
-                _ = beat.tick() => watch(),
-                () = signals.received() => self.signalled(),
-            }
+            self.lease.renew();
+            watch();
             self.watch_recording();
+            std::thread::sleep(SUPERVISION_PERIOD);
         }
+        Ok(thread.join())
     }
 
-    /// Ends a run that cannot be recorded any more.
+    /// Ends a run that cannot be recorded any more. If there is no room for the request, it is sent again.
     fn watch_recording(&mut self) {
         if let Some(cause) = self.recording_defect()
-            && self.stopping == Stopping::No
+            && self.cause.is_none()
+            && self.requests.send(Request::Finish).is_ok()
         {
-            self.finish(cause);
+            self.cause = Some(cause);
         }
     }
 
@@ -414,27 +430,6 @@ impl Supervisor {
             Some(StopCause::RecordsLost)
         } else {
             self.health.shortage().map(StopCause::from)
-        }
-    }
-
-    /// The first signal ends the run along a ramp, the second one cuts the current.
-    fn signalled(&mut self) {
-        match self.stopping {
-            Stopping::No => self.finish(StopCause::Signal),
-            Stopping::Ramp => self.request(Request::Stop, Stopping::Cut),
-            Stopping::Cut => {}
-        }
-    }
-
-    fn finish(&mut self, cause: StopCause) {
-        self.request(Request::Finish, Stopping::Ramp);
-        self.cause.get_or_insert(cause);
-    }
-
-    /// Sends a request. If there is no room for it, the next signal sends it again.
-    fn request(&mut self, request: Request, stopping: Stopping) {
-        if self.requests.send(request).is_ok() {
-            self.stopping = stopping;
         }
     }
 }
@@ -470,7 +465,7 @@ mod tests {
                 health: health_of_a_recorder(free_bytes, size_bytes),
                 progress: Arc::new(Progress::default()),
                 max_unrecorded_ticks: 5000,
-                stopping: Stopping::No,
+                lease: Arc::default(),
                 cause: None,
             };
             supervisor.watch_recording();
@@ -522,7 +517,7 @@ mod tests {
             health: Arc::new(Health::default()),
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: 5000,
-            stopping: Stopping::No,
+            lease: Arc::default(),
             cause: None,
         };
         progress.unrecorded_ticks.store(4999, Ordering::Relaxed);

@@ -2,13 +2,18 @@
 
 use std::future::poll_fn;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::Poll;
 
+use signal_hook::SigId;
+use signal_hook::flag::{register, register_conditional_default};
+use signal_hook::low_level::unregister;
 use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot::error::RecvError;
 
 use super::run_error::RunError;
+use crate::rt::supervision::StopFlags;
 use crate::util::thread_priority::lower;
 
 const START: &str = "start the analysis";
@@ -17,27 +22,27 @@ const ANALYSIS_NICE: i32 = 19;
 
 /// The signals that end a run: SIGINT (Ctrl-C), SIGTERM, SIGQUIT (Ctrl-\\) and SIGHUP (a closed terminal or connection).
 /// SIGHUP is left alone where it is ignored, as by `nohup`.
-pub struct StopSignals(Vec<Signal>);
+pub struct StopSignals {
+    signals: Vec<Signal>,
+    _listener: Listener,
+}
 
 impl StopSignals {
     /// Installs process-wide handlers. Must be called within a tokio runtime.
     pub fn listen() -> std::io::Result<StopSignals> {
-        let mut kinds = vec![
-            SignalKind::interrupt(),
-            SignalKind::terminate(),
-            SignalKind::quit(),
-        ];
-        if !is_ignored(SignalKind::hangup()) {
-            kinds.push(SignalKind::hangup());
-        }
-        let signals: std::io::Result<_> = kinds.into_iter().map(signal).collect();
-        Ok(StopSignals(signals?))
+        let listener = Listener::begin()?;
+        let kinds = stop_signals().map(SignalKind::from_raw);
+        let signals: std::io::Result<_> = kinds.map(signal).collect();
+        Ok(StopSignals {
+            signals: signals?,
+            _listener: listener,
+        })
     }
 
     /// Waits for the next of the signals.
     pub async fn received(&mut self) {
         poll_fn(|context| {
-            let mut signals = self.0.iter_mut();
+            let mut signals = self.signals.iter_mut();
             match signals.any(|signal| signal.poll_recv(context).is_ready()) {
                 true => Poll::Ready(()),
                 false => Poll::Pending,
@@ -45,6 +50,97 @@ impl StopSignals {
         })
         .await
     }
+}
+
+/// Sets the stop flags of a loop in the signal handler itself, until it is dropped.
+pub(super) struct SignalFlags {
+    actions: Vec<SigId>,
+    _listener: Listener,
+}
+
+impl SignalFlags {
+    /// Each stop signal sets a flag of its own.
+    ///
+    /// # Errors
+    /// When the system refuses a handler.
+    pub(super) fn set(flags: &StopFlags) -> std::io::Result<SignalFlags> {
+        let mut installed = SignalFlags {
+            actions: Vec::new(),
+            _listener: Listener::begin()?,
+        };
+        for (number, flag) in stop_signals().zip(flags.flags()) {
+            installed.actions.push(register(number, Arc::clone(flag))?);
+        }
+        Ok(installed)
+    }
+}
+
+impl Drop for SignalFlags {
+    fn drop(&mut self) {
+        for action in self.actions.drain(..) {
+            unregister(action);
+        }
+    }
+}
+
+/// Part of the program that waits for a stop signal. Without one, a stop signal ends the process as it does without handlers.
+struct Listener;
+
+/// Whether nothing in the program waits for a stop signal.
+static NO_LISTENER: AtomicBool = AtomicBool::new(false);
+
+static LISTENERS: Mutex<Listeners> = Mutex::new(Listeners {
+    count: 0,
+    have_default: false,
+});
+
+struct Listeners {
+    count: usize,
+    /// Whether the stop signals have their default action without a listener.
+    have_default: bool,
+}
+
+impl Listener {
+    fn begin() -> std::io::Result<Listener> {
+        let mut listeners = Listeners::lock();
+        listeners.install_default()?;
+        NO_LISTENER.store(false, Ordering::SeqCst);
+        listeners.count += 1;
+        Ok(Listener)
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        let mut listeners = Listeners::lock();
+        listeners.count -= 1;
+        NO_LISTENER.store(listeners.count == 0, Ordering::SeqCst);
+    }
+}
+
+impl Listeners {
+    fn lock() -> MutexGuard<'static, Listeners> {
+        LISTENERS.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A handler stays installed after its listener has gone, and would swallow the signal.
+    fn install_default(&mut self) -> std::io::Result<()> {
+        if self.have_default {
+            return Ok(());
+        }
+        for number in stop_signals() {
+            register_conditional_default(number, &NO_LISTENER)?;
+        }
+        self.have_default = true;
+        Ok(())
+    }
+}
+
+/// The numbers of the signals that end a run.
+fn stop_signals() -> impl Iterator<Item = i32> {
+    let hang_up = (!is_ignored(libc::SIGHUP)).then_some(libc::SIGHUP);
+    let always = [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT];
+    always.into_iter().chain(hang_up)
 }
 
 /// Lets a write beyond the limit of the file size (`ulimit -f`) fail with an error. By default, SIGXFSZ would kill the process.
@@ -59,12 +155,12 @@ pub fn survive_file_size_limit() -> std::io::Result<()> {
 }
 
 /// Whether this process ignores a signal: bit `number - 1` of `SigIgn` [Linux, proc_pid_status(5)].
-fn is_ignored(kind: SignalKind) -> bool {
+fn is_ignored(number: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let mut lines = status.lines();
     let mask = lines.find_map(|line| line.strip_prefix("SigIgn:"));
     let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
-    mask.is_some_and(|mask| mask >> (kind.as_raw_value() - 1) & 1 == 1)
+    mask.is_some_and(|mask| mask >> (number - 1) & 1 == 1)
 }
 
 /// Does `work` on a thread of low priority and returns its result; `None` if a signal arrives before it is done. The thread is then
@@ -115,7 +211,7 @@ fn analysis_thread() -> std::thread::Builder {
 }
 
 /// A runtime on the calling thread.
-pub(super) fn runtime() -> std::io::Result<Runtime> {
+fn runtime() -> std::io::Result<Runtime> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
@@ -186,6 +282,37 @@ mod tests {
             from_field_3.split(' ').nth(16).unwrap().to_string()
         });
         assert_eq!(nice.unwrap().unwrap(), "19");
+    }
+
+    #[test]
+    fn a_signal_sets_the_flags_of_a_run_and_ends_the_process_afterwards() {
+        const CHILD: &str = "BENCH_TEST_SIGNAL_CHILD";
+        if std::env::var_os(CHILD).is_some() {
+            return signal_during_and_after_a_run();
+        }
+        let name = "a_signal_sets_the_flags_of_a_run_and_ends_the_process_afterwards";
+        let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+        child.args([name, "--nocapture", "--test-threads=1"]);
+        let output = child.env(CHILD, "1").output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let signal = std::os::unix::process::ExitStatusExt::signal(&output.status);
+        assert_eq!(signal, Some(libc::SIGINT), "{text}");
+        assert!(text.contains("the run is over"), "{text}");
+    }
+
+    /// Ends the process by the second signal.
+    fn signal_during_and_after_a_run() {
+        let flags = StopFlags::default();
+        let during = SignalFlags::set(&flags).unwrap();
+        // SAFETY: no memory is touched; the handlers were installed before.
+        unsafe { libc::raise(libc::SIGINT) };
+        let set = flags.flags().iter().filter(|f| f.load(Ordering::SeqCst));
+        assert_eq!(set.count(), 1);
+        drop(during);
+        println!("the run is over");
+        // SAFETY: no memory is touched.
+        unsafe { libc::raise(libc::SIGINT) };
+        println!("the signal was swallowed");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
-use crate::rt::record::{ClockTimes, Event, EventKind, Refusal, RequestEvent, RequestKind};
+use crate::rt::record::{ClockTimes, Event, EventKind, Origin, Refusal, RequestEvent, RequestKind};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
@@ -37,6 +37,7 @@ fn of_request(request: RequestEvent) -> Message {
         order: name.into(),
         id: request.id,
         refusal: request.refusal.map_or("", Refusal::name).into(),
+        origin: origin_name(request.origin).into(),
         ..message("order", format!("order: {name}"))
     }
 }
@@ -133,7 +134,24 @@ fn request(message: &Message) -> Result<RequestEvent, UnknownValue> {
         id: message.id,
         kind: kind.ok_or_else(|| unknown("order", name))?,
         refusal: refusal(&message.refusal)?,
+        origin: origin(&message.origin)?,
     })
+}
+
+/// Empty for the supervisor, as in recordings of older versions.
+fn origin_name(origin: Origin) -> &'static str {
+    match origin {
+        Origin::Supervisor => "",
+        Origin::Signal => "signal",
+        Origin::Lease => "lease",
+    }
+}
+
+fn origin(name: &str) -> Result<Origin, UnknownValue> {
+    let origins = [Origin::Supervisor, Origin::Signal, Origin::Lease];
+    let mut origins = origins.into_iter();
+    let found = origins.find(|other| origin_name(*other) == name);
+    found.ok_or_else(|| unknown("origin", name))
 }
 
 /// The refusal of a name; an empty name belongs to an accepted request.

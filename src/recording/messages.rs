@@ -137,7 +137,7 @@ messages! {
         field "11" (uint64) records,
         /// Of a trip: what the operator can do about it.
         field "12" (string) remedy,
-        /// Of an order: its number, from 1.
+        /// Of an order of the supervisor: its number, from 1.
         field "13" (uint64) id,
         /// Of an order that was refused: the short reason.
         field "14" (string) refusal,
@@ -147,6 +147,8 @@ messages! {
         field "16" (uint64) monotonic_ns,
         /// Of `clock`: nanoseconds since 1970 at the same moment.
         field "17" (uint64) wall_ns,
+        /// Of an order: who gave it, if it was not the supervisor: `signal` or `lease`.
+        field "18" (string) origin,
     }
     /// A summary of up to one second of scheduled time, on channel `/timing`.
     Timing {

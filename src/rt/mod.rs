@@ -8,7 +8,8 @@
 //! ```
 //!
 //! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`settling`] the end of a run, [`clock`] its two paces, [`program`] what it
-//! runs, [`record`] what it publishes, [`request`] what it is asked to do.
+//! runs, [`record`] what it publishes, [`request`] what it is asked to do,
+//! [`supervision`] what ends a run without a request.
 
 pub mod arming;
 pub mod clock;
@@ -20,5 +21,6 @@ pub mod record;
 pub mod request;
 pub mod servo;
 pub mod settling;
+pub mod supervision;
 pub mod thread;
 mod trip;

@@ -17,8 +17,9 @@ pub struct Publisher {
 pub const EVENT_SLOTS: usize = 64;
 
 /// Slots that a tick can need at most: the clocks, the end of a reset, two events per request, the states armed and running, a
-/// trip and its state, the end of the program and its state, the record, and the count of lost records.
-pub const SLOTS_PER_TICK: usize = 2 * REQUESTS_PER_TICK + 10;
+/// trip and its state, the end of the program and its state, the record, and the count of lost records; two signals and an
+/// expired arm lease, each with its state.
+pub const SLOTS_PER_TICK: usize = 2 * REQUESTS_PER_TICK + 16;
 
 impl Publisher {
     /// A publisher into `ring`.

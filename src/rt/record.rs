@@ -126,12 +126,26 @@ pub enum RequestKind {
 /// The answer of the loop to a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestEvent {
-    /// Number of the request, from 1; 0 in recordings of older versions.
+    /// Number of a request of the supervisor, from 1; 0 for another origin, and in recordings of older versions.
     pub id: u64,
+    /// Who requested it.
+    pub origin: Origin,
     /// What was requested.
     pub kind: RequestKind,
     /// Why it was refused; `None` if it was accepted, and in recordings of older versions.
     pub refusal: Option<Refusal>,
+}
+
+/// Who requested something of the loop.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Origin {
+    /// The supervisor, through the ring of requests.
+    #[default]
+    Supervisor,
+    /// A signal of the operator or the system.
+    Signal,
+    /// The arm lease, which was not renewed in time.
+    Lease,
 }
 
 /// Why the loop refused a request.

@@ -13,11 +13,12 @@ use super::interlock::Interlocks;
 use super::program::{Decision, Program, ProgramInput};
 use super::publisher::Publisher;
 use super::record::{
-    EventKind, REQUESTS_PER_TICK, Refusal, RequestEvent, RequestKind, TickRecord, flag,
+    EventKind, Origin, REQUESTS_PER_TICK, Refusal, RequestEvent, RequestKind, TickRecord, flag,
 };
 use super::request::NumberedRequest;
 pub use super::request::Request;
 use super::settling::{Settling, SettlingStep};
+use super::supervision::{LeaseWatch, StopFlags, Supervision};
 use crate::rig::calibration::Correction;
 
 /// The current is unknown if the driver returns a value that is not finite.
@@ -50,6 +51,9 @@ pub struct Servo {
     /// Length of each of the two ramps to zero current in ticks; without ramps if 0.
     ramp_ticks: u64,
     settling: Settling,
+    supervision: Supervision,
+    /// Who ended the run early without a request of the supervisor.
+    stopped_by: Option<Origin>,
     /// Current in amperes that the program requested in the last tick.
     requested_a: f64,
     /// Current in amperes that the amplifier gives since the last tick.
@@ -101,6 +105,8 @@ impl Servo {
             run_tick: 0,
             ramp_ticks: 0,
             settling: Settling::new(0),
+            supervision: Supervision::default(),
+            stopped_by: None,
             requested_a: 0.0,
             applied_a: 0.0,
             raw_command_a: 0.0,
@@ -133,6 +139,18 @@ impl Servo {
         self
     }
 
+    /// The loop with the flags that signals set.
+    pub fn with_stop_flags(mut self, flags: StopFlags) -> Self {
+        self.supervision.flags = flags;
+        self
+    }
+
+    /// The loop with an arm lease, if there is one. When it expires, the loop ends the run along a ramp.
+    pub fn with_lease(mut self, lease: Option<LeaseWatch>) -> Self {
+        self.supervision.lease = lease;
+        self
+    }
+
     /// Executes one tick. It does not allocate, lock or print; its only system calls are those of the clock and of
     /// the devices.
     pub fn tick(&mut self, timing: &TickTiming, clock: &impl Clock) {
@@ -140,6 +158,8 @@ impl Servo {
         self.publish_clocks(now, clock);
         self.poll_clearing(now.number);
         self.take_requests(now.number);
+        self.take_signals(now.number);
+        self.check_lease(timing);
         let raw = self.rig.latest(now); // read
         let reading = self.corrected(raw);
         let checked = self.check(&raw, &reading, timing); // check
@@ -344,9 +364,7 @@ impl Servo {
             let Ok(NumberedRequest { id, request }) = self.connections.requests.pop() else {
                 return;
             };
-            let kind = request.kind();
-            let refusal = self.refusal(kind);
-            self.event(tick, EventKind::Request(RequestEvent { id, kind, refusal }));
+            self.answer(id, Origin::Supervisor, request.kind(), tick);
             self.take(request, tick);
         }
     }
@@ -358,6 +376,38 @@ impl Servo {
             RequestKind::Start if waits => Some(Refusal::NotArmed),
             _ => kind.refusal(self.state),
         }
+    }
+
+    /// Publishes a request and whether this state allows it.
+    fn answer(&mut self, id: u64, origin: Origin, kind: RequestKind, tick: u64) {
+        let request = RequestEvent {
+            id,
+            origin,
+            kind,
+            refusal: self.refusal(kind),
+        };
+        self.event(tick, EventKind::Request(request));
+    }
+
+    fn take_signals(&mut self, tick: u64) {
+        for request in self.supervision.signalled() {
+            self.end(request, Origin::Signal, tick);
+        }
+    }
+
+    /// An expired arm lease ends a run, and disarms an armed loop.
+    fn check_lease(&mut self, timing: &TickTiming) {
+        let expired = self.supervision.lease_expired(timing.missed);
+        if expired && RequestKind::Finish.refusal(self.state).is_none() {
+            self.end(Request::Finish, Origin::Lease, timing.tick.number);
+        }
+    }
+
+    /// Ends the run without a request of the supervisor.
+    fn end(&mut self, request: Request, origin: Origin, tick: u64) {
+        self.answer(0, origin, request.kind(), tick);
+        self.stopped_by.get_or_insert(origin);
+        self.take(request, tick);
     }
 
     fn take(&mut self, request: Request, tick: u64) {
@@ -515,6 +565,11 @@ impl Servo {
     /// Whether the program ran to its end.
     pub fn completed(&self) -> bool {
         self.completed
+    }
+
+    /// Who ended the run early without a request of the supervisor: a signal or the arm lease.
+    pub fn stopped_by(&self) -> Option<Origin> {
+        self.stopped_by
     }
 
     /// The thermal state of the motor in A^2.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arming::Trip;
 use super::clock::{Clock, Realtime, Virtual};
+use super::record::Origin;
 use super::servo::Servo;
 use crate::config::LoopSettings;
 use crate::util::thread_priority::set_fifo;
@@ -53,6 +54,8 @@ pub struct LoopOutcome {
     pub trip: Option<(Trip, u64)>,
     /// Whether the program ran to its end.
     pub completed: bool,
+    /// Who ended the run early without a request of the supervisor: a signal or the arm lease.
+    pub stopped_by: Option<Origin>,
     /// Records that did not fit into the ring.
     pub lost_records: u64,
     /// The thermal state of the motor at the end, in A^2.
@@ -152,6 +155,7 @@ pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutc
     LoopOutcome {
         trip: servo.last_trip(),
         completed: servo.completed(),
+        stopped_by: servo.stopped_by(),
         lost_records: servo.publisher().lost(),
         thermal_a2: servo.thermal_a2(),
     }

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use bench::recording::{DiskState, DiskWatch, Header, Recorder, Totals};
 use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, LoopMessage, RequestEvent, RequestKind, TickRecord};
+use bench::rt::record::{
+    Event, EventKind, LoopMessage, Origin, RequestEvent, RequestKind, TickRecord,
+};
 use bench_hal::Validity;
 
 /// 5 kHz.
@@ -64,6 +66,7 @@ pub fn run(ticks: u64) -> Vec<LoopMessage> {
             EventKind::Request(RequestEvent {
                 id: 1,
                 kind: RequestKind::Arm,
+                origin: Origin::Supervisor,
                 refusal: None,
             }),
         ),

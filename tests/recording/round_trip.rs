@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{
-    ClockTimes, Event, EventKind, LoopMessage, Refusal, RequestEvent, RequestKind, TickRecord,
+    ClockTimes, Event, EventKind, LoopMessage, Origin, Refusal, RequestEvent, RequestKind,
+    TickRecord,
 };
 use bench_hal::Validity;
 
@@ -149,12 +150,17 @@ fn events_of_every_kind_round_trip_in_order() {
         Some(Refusal::NoTrip),
         Some(Refusal::Tripped),
     ];
+    let origins = [Origin::Supervisor, Origin::Signal, Origin::Lease];
     let answers = orders.iter().flat_map(|&kind| {
-        refusals.map(|refusal| RequestEvent {
-            id: u64::MAX,
-            kind,
-            refusal,
-        })
+        refusals
+            .iter()
+            .zip(origins.iter().cycle())
+            .map(move |(refusal, origin)| RequestEvent {
+                id: u64::MAX,
+                origin: *origin,
+                kind,
+                refusal: *refusal,
+            })
     });
     let mut kinds: Vec<_> = answers.map(EventKind::Request).collect();
     kinds.extend(

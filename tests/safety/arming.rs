@@ -8,7 +8,7 @@ use bench::rt::arming::{State, Transition};
 use bench::rt::clock::Virtual;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage, Refusal, RequestEvent};
+use bench::rt::record::{EventKind, LoopMessage, Origin, Refusal, RequestEvent};
 use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
 use bench::rt::thread::{self, Pace};
@@ -330,7 +330,12 @@ fn every_request_is_acknowledged_with_its_number_and_answer() {
             let answer = acknowledged(&bench).last().copied();
             assert_eq!(
                 answer,
-                Some(RequestEvent { id, kind, refusal }),
+                Some(RequestEvent {
+                    id,
+                    origin: Origin::Supervisor,
+                    kind,
+                    refusal
+                }),
                 "in {state:?}"
             );
         }

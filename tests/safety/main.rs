@@ -10,4 +10,5 @@ mod reproducible;
 mod requests_and_faults;
 use bench_test_support::loop_rig as rig;
 mod settling;
+mod supervision;
 mod trips;

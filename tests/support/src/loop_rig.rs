@@ -15,6 +15,7 @@ use bench::rt::publisher::Publisher;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench::rt::request::RequestSender;
 use bench::rt::servo::{Connections, Progress, Request, Servo};
+use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
@@ -261,6 +262,23 @@ impl Bench {
     pub fn with_healthy_ticks(self, ticks: u64) -> Bench {
         Bench {
             servo: self.servo.with_healthy_ticks(ticks),
+            ..self
+        }
+    }
+
+    /// The same loop with flags that stop a run.
+    pub fn with_stop_flags(self, flags: &StopFlags) -> Bench {
+        Bench {
+            servo: self.servo.with_stop_flags(flags.clone()),
+            ..self
+        }
+    }
+
+    /// The same loop with an arm lease that expires after `limit_ticks`.
+    pub fn with_lease(self, lease: &Arc<ArmLease>, limit_ticks: u64) -> Bench {
+        let watch = LeaseWatch::new(Arc::clone(lease), limit_ticks);
+        Bench {
+            servo: self.servo.with_lease(Some(watch)),
             ..self
         }
     }
