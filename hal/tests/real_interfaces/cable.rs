@@ -1,6 +1,5 @@
 //! The interface goes down or is removed while current flows.
 
-use bench_hal::CurrentAmplifier;
 use bench_hal::blocking;
 use bench_hal::can::drive::{fault_text, faults};
 use std::thread::sleep;
