@@ -22,6 +22,9 @@ use super::shared::Shared;
 /// Time between two looks for a request.
 const IDLE: Duration = Duration::from_millis(10);
 
+/// Largest number of frames and errors that are discarded before a reset: more than a connection holds.
+const MAX_DISCARDED: usize = 10_000;
+
 /// The end of a reset.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ResetOutcome {
@@ -83,6 +86,7 @@ impl ResetTask {
     /// Resets the fault. Returns 0, or the code of the fault that remains.
     fn reset(&mut self) -> u32 {
         let before = self.shared.fault();
+        self.discard_received();
         if let Err(code) = self.acknowledge() {
             self.shared.end_reset();
             self.shared.latch(if before == 0 { code } else { before });
@@ -93,6 +97,16 @@ impl ResetTask {
         self.shared.end_reset();
         self.host.sleep(self.settings.times.heartbeat_timeout); // a cause that persists shows within this time
         self.shared.fault()
+    }
+
+    /// Discards what this connection received since the last reset: frames, and the error of an interface that was down meanwhile,
+    /// which the system reports once.
+    fn discard_received(&mut self) {
+        for _ in 0..MAX_DISCARDED {
+            if self.bus.receive(Duration::ZERO) == Ok(None) {
+                return;
+            }
+        }
     }
 
     /// Prepares the drive to be enabled again: it is configured, sends its status, and has left Fault. The error is a fault code.
