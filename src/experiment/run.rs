@@ -343,7 +343,7 @@ pub enum StopCause {
     LeaseExpired,
     /// The recording could not be written.
     RecordingFailed,
-    /// No tick was recorded for [`MAX_UNRECORDED_S`]: the disk is too slow.
+    /// No tick was recorded for one second: the disk is too slow.
     RecordsLost,
     /// The disk of the recording had little free space.
     DiskNearlyFull,
