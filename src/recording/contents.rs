@@ -211,7 +211,7 @@ impl Contents {
             _ if messages == 0 => Ok(()),
             Numbering::CountsMissing => take(Part::Missing { topic, messages }),
             Numbering::Required => {
-                let (first, name) = (u64::from(number) - messages, topic.name());
+                let (first, name) = (number.wrapping_sub(messages as u32), topic.name());
                 Err(format!(
                     "message {first} of {name} is missing, {number} follows"
                 ))
@@ -357,4 +357,38 @@ fn attachment_name(record: &[u8]) -> String {
         text.get(..u32::from_le_bytes(*length) as usize)
     });
     String::from_utf8_lossy(name.unwrap_or_default()).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A channel after 2^32 - 2 messages.
+    fn before_the_wrap() -> ChannelNumbers {
+        ChannelNumbers {
+            next: u64::from(u32::MAX) - 1,
+            is_unused: false,
+        }
+    }
+
+    #[test]
+    fn numbers_of_messages_wrap_without_a_gap() {
+        let mut numbers = before_the_wrap();
+        for number in [u32::MAX - 1, u32::MAX, 0, 1, 2] {
+            assert_eq!(numbers.count(Topic::Loop, number), Ok(0), "{number}");
+        }
+        assert_eq!(numbers.next, u64::from(u32::MAX) + 4);
+    }
+
+    #[test]
+    fn reports_a_gap_across_the_wrap_with_its_first_number() {
+        let mut contents = Contents::default();
+        contents.channel_numbers[Topic::Loop as usize] = before_the_wrap();
+        // 2^32 - 2, 2^32 - 1, 0, 1 and 2 are missing.
+        let missing = contents.channel_numbers[Topic::Loop as usize].count(Topic::Loop, 3);
+        assert_eq!(missing, Ok(5));
+        let error = contents.report_missing(Topic::Loop, 3, 5, &mut |_| Ok(()));
+        let text = "message 4294967294 of /loop is missing, 3 follows";
+        assert_eq!(error, Err(text.to_string()));
+    }
 }
