@@ -9,6 +9,7 @@ mod replay;
 mod reproducible;
 mod requests_and_faults;
 use bench_test_support::loop_rig as rig;
+mod sequence_wrap;
 mod settling;
 mod supervision;
 mod trips;
