@@ -223,4 +223,12 @@ impl Shared {
     pub(super) fn set_emergency(&self, code: u16) {
         self.emergency.store(u32::from(code), Ordering::Release);
     }
+
+    /// The counts of uses, commands and status frames as after `count` of each.
+    #[cfg(test)]
+    pub(super) fn set_counts(&self, count: u32) {
+        for value in [&self.uses, &self.commands, &self.status_count] {
+            value.store(count, Ordering::Release);
+        }
+    }
 }

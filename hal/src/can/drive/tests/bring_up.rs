@@ -362,3 +362,23 @@ fn closing_leaves_the_drive_off_and_without_heartbeat_monitoring() {
     );
     assert_eq!(device.nmt_state(), nmt::State::PreOperational);
 }
+
+#[test]
+fn counts_of_commands_and_status_frames_wrap_without_a_fault() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = rig(exchange);
+        // The third use, command and status frame from here has the number 0.
+        rig.drive.shared.set_counts(u32::MAX - 2);
+        for _ in 0..4 {
+            rig.enable().unwrap();
+            assert_eq!(rig.run_ms(1.0, 50), 50, "{:x?}", rig.drive.status());
+            assert_eq!(rig.device_current_a(), 1.0);
+            rig.drive.disable();
+            rig.sleep_ms(50);
+            assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
+            assert_eq!(rig.device_current_a(), 0.0);
+        }
+        assert!((2..10).contains(&rig.drive.shared.uses()));
+        assert!(rig.drive.shared.commands() > 100, "the count has wrapped");
+    }
+}
