@@ -1,0 +1,59 @@
+//! The soak in real time: the thread of the loop, a recorder thread, and this thread as supervisor.
+
+use std::error::Error;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use bench::config::Config;
+use bench::rt::supervision::ArmLease;
+use bench::rt::thread::{Pace, prepare};
+
+use super::faults::{Period, Schedule};
+use super::recorder::{Report, joined};
+use super::soak_loop::SoakLoop;
+
+/// Period of the supervisor.
+const PAUSE: Duration = Duration::from_millis(5);
+
+/// Runs all periods.
+pub fn run(soak: SoakLoop, config: &Config) -> Result<Report, Box<dyn Error>> {
+    let schedule = soak.schedule;
+    // A trip ends a run before the next period begins. The loop ends when there is no next period.
+    let tail_ticks = (schedule.period_s() * config.servo.rate_hz) as u64;
+    let prepared = prepare(soak.servo, &config.servo, Pace::Realtime, tail_ticks)?;
+    println!("loop: {:?}", prepared.scheduling());
+    let (mut supervisor, lease) = (soak.supervisor, soak.lease);
+    let thread = prepared.begin();
+    let begin = Instant::now();
+    for number in 0..schedule.periods {
+        let period = schedule.period(number);
+        wait_until(&lease, begin, begin_s(&schedule, &period));
+        supervisor.begin_period(&period)?;
+        wait_until(
+            &lease,
+            begin,
+            begin_s(&schedule, &period) + schedule.period_s() / 5.0,
+        );
+        supervisor.begin_second_run(&period)?;
+    }
+    while !thread.is_finished() {
+        lease.renew();
+        sleep(PAUSE);
+    }
+    thread
+        .join()
+        .map_err(|_| "the thread of the loop panicked")?;
+    joined(soak.recorder)
+}
+
+fn begin_s(schedule: &Schedule, period: &Period) -> f64 {
+    period.number as f64 * schedule.period_s()
+}
+
+/// Renews the lease until `time_s` after `begin`.
+fn wait_until(lease: &ArmLease, begin: Instant, time_s: f64) {
+    while begin.elapsed().as_secs_f64() < time_s {
+        lease.renew();
+        sleep(PAUSE);
+    }
+}

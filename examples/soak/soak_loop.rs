@@ -1,0 +1,102 @@
+//! The loop of a soak with everything around it.
+
+use std::error::Error;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+
+use bench::config::Config;
+use bench::experiment::Plan;
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::interlock::Interlocks;
+use bench::rt::publisher::Publisher;
+use bench::rt::request::RequestSender;
+use bench::rt::servo::{Connections, Progress, Servo};
+use bench::rt::supervision::{ArmLease, LeaseWatch};
+use bench::rt::thread::Pace;
+use rtrb::RingBuffer;
+
+use super::faults::Schedule;
+use super::programs::Programs;
+use super::recorder::{Report, SoakRecorder};
+use super::rig::ScheduledRig;
+use super::supervisor::Supervisor;
+
+/// Slots of the ring to the recorder: 13 s at 5 kHz.
+const RING_SLOTS: usize = 1 << 16;
+/// Time for which the readings are judged before the amplifier is enabled, in ticks.
+const HEALTHY_TICKS: u64 = 100;
+
+/// A loop that has not begun, its supervisor, and the running recorder.
+pub struct SoakLoop {
+    pub servo: Servo,
+    pub supervisor: Supervisor,
+    pub recorder: JoinHandle<Report>,
+    pub schedule: Schedule,
+    pub lease: Arc<ArmLease>,
+    /// Length of a tick in seconds.
+    pub tick_s: f64,
+}
+
+impl SoakLoop {
+    /// A loop around the simulated stage.
+    pub fn new(
+        config: &Config,
+        schedule: Schedule,
+        pace: Pace,
+    ) -> Result<SoakLoop, Box<dyn Error>> {
+        let (publisher, records) = RingBuffer::new(RING_SLOTS);
+        let (requests, taken) = RequestSender::ring(16);
+        let (ended, retired) = RingBuffer::new(16);
+        let connections = Connections {
+            requests: taken,
+            retired: ended,
+            publisher: Publisher::new(publisher),
+            progress: Arc::new(Progress::default()),
+        };
+        let lease = Arc::<ArmLease>::default();
+        let watch = lease_watch(config, pace, &lease);
+        let recorder = SoakRecorder::new(config, schedule, pace)?;
+        Ok(SoakLoop {
+            servo: servo(config, schedule, pace, connections)?.with_lease(watch),
+            supervisor: Supervisor {
+                requests,
+                retired,
+                programs: Programs::new(config, &schedule)?,
+            },
+            recorder: std::thread::spawn(move || recorder.run(records)),
+            schedule,
+            lease,
+            tick_s: config.servo.period_s(),
+        })
+    }
+}
+
+fn servo(
+    config: &Config,
+    schedule: Schedule,
+    pace: Pace,
+    connections: Connections,
+) -> Result<Servo, Box<dyn Error>> {
+    let rig = ScheduledRig::new(SimulatedRig::new(config)?, schedule, pace);
+    let interlocks = Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    );
+    let ramp_ticks = Plan::quiet(config.clone()).ramp_ticks()?;
+    Ok(Servo::new(Box::new(rig), interlocks, connections)
+        .with_ramps(ramp_ticks)
+        .with_healthy_ticks(HEALTHY_TICKS))
+}
+
+/// In virtual pace, ticks do not measure the time of the supervisor.
+fn lease_watch(config: &Config, pace: Pace, lease: &Arc<ArmLease>) -> Option<LeaseWatch> {
+    match pace {
+        Pace::Virtual => None,
+        Pace::Realtime => {
+            let limit_ticks = config.servo.arm_lease_ticks();
+            Some(LeaseWatch::new(Arc::clone(lease), limit_ticks))
+        }
+    }
+}
