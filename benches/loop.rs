@@ -15,10 +15,11 @@ use bench::recording::{self, DiskWatch, Header, Recorder};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
+use bench::rt::live_loop::run_to_end;
 use bench::rt::publisher::Publisher;
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Request, Servo};
-use bench::rt::thread::run;
+use bench::rt::servo::{Request, Servo};
+use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench_hal::{Reading, Tick, Validity};
 use criterion::{Criterion, criterion_group, criterion_main};
 use rtrb::RingBuffer;
@@ -118,7 +119,8 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
         &config.motor,
         &config.servo,
     );
-    let servo = Servo::new(rig, interlocks, connections);
+    let run = ServoRun::new(interlocks, connections);
+    let mut servo = Servo::new(rig, Box::new(run), config.servo.period_s());
     for order in [Request::Arm, Request::Start(plan.program().expect("valid"))] {
         assert!(requests.send(order).is_ok());
     }
@@ -126,13 +128,14 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let disk = DiskWatch::of(&path, predicted_bytes).expect("the file of the recording");
     let recorder = recording::spawn(recorder, consumer, disk).expect("a thread");
     let start = Instant::now();
-    let ended = run(
-        servo,
+    run_to_end(
+        &mut servo,
         Virtual {
             period_s: config.servo.period_s(),
         },
-        0,
     );
+    let ended = servo.run().outcome();
+    drop(servo); // the recorder receives its end
     let mut recorder = recorder.join().expect("a whole recording");
     let ticks = recorder.complete().expect("a whole recording").ticks;
     assert!(ended.completed);

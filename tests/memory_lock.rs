@@ -1,15 +1,17 @@
-//! The memory of the process is locked while the loop runs, and only then. This is the only test of its process, because the lock
-//! is that of the whole process.
+//! The memory of the process is locked during a run, and only then. This is the only test of its process, because the lock is that of
+//! the whole process.
 
 use std::sync::Arc;
+use std::time::Duration;
 
-use bench::config::{Source, load};
+use bench::config::{Config, Source, load};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::interlock::Interlocks;
+use bench::rt::live_loop::LiveLoop;
 use bench::rt::publisher::Publisher;
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Servo};
-use bench::rt::thread::{Pace, prepare};
+use bench::rt::servo_run::{Connections, Progress, ServoRun};
+use bench::rt::thread::Pace;
 use rtrb::RingBuffer;
 
 /// `VmLck` of this process in kilobytes.
@@ -20,16 +22,12 @@ fn locked_kb() -> u64 {
     value.expect("a size").trim().parse().expect("a number")
 }
 
-#[test]
-fn memory_is_locked_only_while_the_loop_lives() {
-    let config = load(&Source::default()).expect("the default configuration");
-    let (publisher, _records) = RingBuffer::new(1 << 12);
-    let (_requests, taken) = RequestSender::ring(4);
-    let (retired, _retired) = RingBuffer::new(4);
+/// A run without requests, which ends after `ticks`.
+fn disarmed_run(config: &Config, ticks: u64) -> Box<ServoRun> {
     let connections = Connections {
-        requests: taken,
-        retired,
-        publisher: Publisher::new(publisher),
+        requests: RequestSender::ring(4).1,
+        retired: RingBuffer::new(4).0,
+        publisher: Publisher::new(RingBuffer::new(1 << 10).0),
         progress: Arc::new(Progress::default()),
     };
     let interlocks = Interlocks::new(
@@ -38,17 +36,43 @@ fn memory_is_locked_only_while_the_loop_lives() {
         &config.motor,
         &config.servo,
     );
+    Box::new(ServoRun::new(interlocks, connections).with_tail(ticks))
+}
+
+/// Waits for the end of the run; returns the largest size of the locked memory until then.
+fn largest_locked_kb(live: &mut LiveLoop) -> u64 {
+    let mut largest_kb = 0;
+    while live
+        .poll_end()
+        .map(|run| run.expect("no panic"))
+        .is_pending()
+    {
+        largest_kb = largest_kb.max(locked_kb());
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    largest_kb
+}
+
+#[test]
+fn memory_is_locked_only_during_a_run() {
+    let config = load(&Source::default()).expect("the default configuration");
     let rig = SimulatedRig::new(&config).expect("a rig");
-    let servo = Servo::new(Box::new(rig), interlocks, connections);
-    assert_eq!(locked_kb(), 0);
-    let prepared = prepare(servo, &config.servo, Pace::Realtime, 10).expect("a thread");
-    if !prepared.scheduling().memory_locked {
+    let idle = disarmed_run(&config, 0);
+    let mut live = LiveLoop::open(Box::new(rig), idle, &config.servo, Pace::Realtime)
+        .expect("the thread of the loop");
+    if !live.scheduling().memory_locked {
         eprintln!("skipped: this process may not lock its memory (ulimit -l)");
         return;
     }
-    assert!(locked_kb() > 1000, "program and libraries are locked");
-    prepared.begin().join().expect("no panic");
-    assert_eq!(locked_kb(), 0);
+    for run in 0..2 {
+        assert_eq!(locked_kb(), 0, "before run {run}");
+        assert!(live.begin(disarmed_run(&config, 2000)).is_ok());
+        let locked_kb = largest_locked_kb(&mut live);
+        assert!(
+            locked_kb > 1000,
+            "run {run}: program and libraries are locked, not {locked_kb} kB"
+        );
+    }
     let allocated = vec![1_u8; 64 << 20];
     assert_eq!((locked_kb(), allocated.len()), (0, 64 << 20));
 }

@@ -1,12 +1,15 @@
 //! The soak in real time: the thread of the loop, a recorder thread, and this thread as supervisor.
 
 use std::error::Error;
-use std::thread::sleep;
+use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
-use bench::config::Config;
+use bench::config::{Config, LoopSettings};
+use bench::rt::clock::Realtime;
+use bench::rt::live_loop::run_to_end;
+use bench::rt::servo::Servo;
 use bench::rt::supervision::ArmLease;
-use bench::rt::thread::{Pace, prepare};
+use bench::rt::thread::Pace;
 
 use super::faults::{Period, Schedule};
 use super::recorder::{Report, joined};
@@ -18,12 +21,8 @@ const PAUSE: Duration = Duration::from_millis(5);
 /// Runs all periods.
 pub fn run(soak: SoakLoop, config: &Config) -> Result<Report, Box<dyn Error>> {
     let schedule = soak.schedule;
-    // A trip ends a run before the next period begins. The loop ends when there is no next period.
-    let tail_ticks = (schedule.period_s() * config.servo.rate_hz) as u64;
-    let prepared = prepare(soak.servo, &config.servo, Pace::Realtime, tail_ticks)?;
-    println!("loop: {:?}", prepared.scheduling());
     let (mut supervisor, lease) = (soak.supervisor, soak.lease);
-    let thread = prepared.begin();
+    let thread = loop_thread(soak.servo, config.servo.clone());
     let begin = Instant::now();
     for number in 0..schedule.periods {
         let period = schedule.period(number);
@@ -44,6 +43,17 @@ pub fn run(soak: SoakLoop, config: &Config) -> Result<Report, Box<dyn Error>> {
         .join()
         .map_err(|_| "the thread of the loop panicked")?;
     joined(soak.recorder)
+}
+
+/// The thread of the loop, scheduled as in a run.
+fn loop_thread(mut servo: Servo, settings: LoopSettings) -> JoinHandle<()> {
+    std::thread::spawn(move || {
+        let scheduling = Pace::Realtime.schedule(&settings);
+        println!("loop: {scheduling:?}");
+        let privileges = scheduling.hold();
+        run_to_end(&mut servo, Realtime::new(settings.period_s()));
+        drop(privileges);
+    })
 }
 
 fn begin_s(schedule: &Schedule, period: &Period) -> f64 {

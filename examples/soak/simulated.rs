@@ -45,7 +45,7 @@ fn run_period(
             supervisor.begin_second_run(period)?;
         }
         let missed = missed_ticks(period, next);
-        let mut timing = clock.wait(next + u64::from(missed), servo.publisher());
+        let mut timing = clock.wait(next + u64::from(missed), servo.run().publisher());
         timing.missed = missed;
         servo.tick(&timing, clock);
         next = timing.tick.number + 1;

@@ -10,7 +10,8 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::interlock::Interlocks;
 use bench::rt::publisher::Publisher;
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Servo};
+use bench::rt::servo::Servo;
+use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch};
 use bench::rt::thread::Pace;
 use rtrb::RingBuffer;
@@ -55,9 +56,23 @@ impl SoakLoop {
         };
         let lease = Arc::<ArmLease>::default();
         let watch = lease_watch(config, pace, &lease);
+        // A trip ends a run before the next period begins. The loop ends when there is no next period.
+        let tail_ticks = (schedule.period_s() * config.servo.rate_hz) as u64;
         let recorder = SoakRecorder::new(config, schedule, pace)?;
         Ok(SoakLoop {
-            servo: servo(config, schedule, pace, connections)?.with_lease(watch),
+            servo: Servo::new(
+                Box::new(ScheduledRig::new(
+                    SimulatedRig::new(config)?,
+                    schedule,
+                    pace,
+                )),
+                Box::new(
+                    servo_run(config, connections)?
+                        .with_lease(watch)
+                        .with_tail(tail_ticks),
+                ),
+                config.servo.period_s(),
+            ),
             supervisor: Supervisor {
                 requests,
                 retired,
@@ -71,13 +86,7 @@ impl SoakLoop {
     }
 }
 
-fn servo(
-    config: &Config,
-    schedule: Schedule,
-    pace: Pace,
-    connections: Connections,
-) -> Result<Servo, Box<dyn Error>> {
-    let rig = ScheduledRig::new(SimulatedRig::new(config)?, schedule, pace);
+fn servo_run(config: &Config, connections: Connections) -> Result<ServoRun, Box<dyn Error>> {
     let interlocks = Interlocks::new(
         &config.interlock,
         &config.amplifier,
@@ -85,7 +94,7 @@ fn servo(
         &config.servo,
     );
     let ramp_ticks = Plan::quiet(config.clone()).ramp_ticks()?;
-    Ok(Servo::new(Box::new(rig), interlocks, connections)
+    Ok(ServoRun::new(interlocks, connections)
         .with_ramps(ramp_ticks)
         .with_healthy_ticks(HEALTHY_TICKS))
 }

@@ -230,8 +230,12 @@ fn realtime_text(timing: &TimingSummary) -> String {
         true => "locked",
         false => "not locked",
     };
+    let idle = match scheduling.idle_states_off {
+        true => "off",
+        false => "on",
+    };
     format!(
-        "  schedule   {}, memory {memory}\n  lateness   p50 {:.1} us, p99 {:.1} us, max {:.1} us\n  compute    p50 {:.1} us, max {:.1} us\n",
+        "  schedule   {}, memory {memory}, idle states {idle}\n  lateness   p50 {:.1} us, p99 {:.1} us, max {:.1} us\n  compute    p50 {:.1} us, max {:.1} us\n",
         scheduling.policy,
         us(lateness.p50_ns),
         us(lateness.p99_ns),
@@ -260,6 +264,7 @@ mod tests {
             scheduling: Scheduling {
                 policy: "SCHED_FIFO 80".into(),
                 memory_locked: false,
+                idle_states_off: false,
                 cpu: None,
                 refused: vec!["a real-time priority ".repeat(8)],
             },

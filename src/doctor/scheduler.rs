@@ -139,6 +139,7 @@ mod tests {
             scheduling: Scheduling {
                 policy: "SCHED_FIFO 80".into(),
                 memory_locked: true,
+                idle_states_off: true,
                 cpu: Some(1),
                 refused: vec![],
             },
@@ -155,6 +156,7 @@ mod tests {
         let scheduling = Scheduling {
             policy: "SCHED_OTHER".into(),
             memory_locked: false,
+            idle_states_off: false,
             cpu: None,
             refused: vec![
                 "locking memory: ENOMEM; raise `memlock`".into(),

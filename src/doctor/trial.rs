@@ -46,13 +46,14 @@ pub struct Lateness {
     pub max_s: f64,
 }
 
-/// Runs such a thread for about one second, and unlocks the memory afterwards.
+/// Runs such a thread for about one second, and gives its privileges back afterwards.
 pub fn trial(settings: &LoopSettings) -> std::io::Result<Trial> {
     let settings = settings.clone();
     let work = move || {
         let scheduling = become_realtime(&settings);
+        let privileges = scheduling.hold();
         let lateness = measure(&settings, &scheduling);
-        let _ = nix::sys::mman::munlockall(); // an error means that nothing was locked
+        drop(privileges);
         Trial {
             scheduling,
             lateness,

@@ -8,7 +8,7 @@ use crate::rt::program::Program;
 use crate::rt::publisher::{EVENT_SLOTS, Publisher};
 use crate::rt::record::{LoopMessage, REQUESTS_PER_TICK};
 use crate::rt::request::RequestSender;
-use crate::rt::servo::{Connections, Progress};
+use crate::rt::servo_run::{Connections, Progress};
 
 /// The ends of a loop's [`Connections`] that stay outside the loop.
 pub(super) struct OutsideEnds {

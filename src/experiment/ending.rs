@@ -5,7 +5,7 @@ use serde::{Serialize, Serializer};
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
 use crate::rt::record::{Event, EventKind, RequestKind};
-use crate::rt::thread::LoopOutcome;
+use crate::rt::servo_run::RunOutcome;
 
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,8 +27,8 @@ impl Serialize for Ending {
     }
 }
 
-impl From<&LoopOutcome> for Ending {
-    fn from(ended: &LoopOutcome) -> Ending {
+impl From<&RunOutcome> for Ending {
+    fn from(ended: &RunOutcome) -> Ending {
         Ending::by(ended.trip, ended.completed)
     }
 }

@@ -1,12 +1,12 @@
 //! Runs of the bench, from arming to the complete recording, and the analysis of the recordings.
 //!
 //! ```text
-//!  Plan (config -> program, texts)  ->  run: loop thread + recorder thread, tokio supervising from outside  ->  Run
+//!  Plan (config -> program, texts)  ->  LiveRig: loop thread + recorder thread, a supervisor outside  ->  Run
 //!                                                                                    Recording -> replay, analyse
 //! ```
 //!
-//! tokio cannot delay the loop: it watches counters, signals and the state of the recorder, and sends requests to the loop
-//! through a ring.
+//! The supervisor cannot delay the loop: it watches counters and the state of the recorder, and sends requests to the loop through a
+//! ring. Signals reach the loop directly. The rig stays open for several runs.
 
 mod amplitude_plan;
 mod analysis;
@@ -21,6 +21,7 @@ mod excitation_plan;
 mod external;
 mod file_name;
 pub mod linearity;
+mod live_rig;
 mod loop_check;
 mod motor_error;
 mod motor_forecast;
@@ -36,7 +37,9 @@ mod replay;
 mod response_estimate;
 mod run;
 mod run_error;
+mod run_recording;
 mod run_summary;
+mod run_supervisor;
 mod runner;
 mod segments;
 mod signal_builder;
@@ -51,6 +54,7 @@ pub use ending::Ending;
 pub use error::ExperimentError;
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
 pub use external::{ExternalAnalysis, analyse_external};
+pub use live_rig::{LiveRig, run};
 pub use loop_check::{MarginError, RatedController, Stage, closed_loop, require_margins};
 pub use motor_error::MotorError;
 pub use motor_forecast::{MotorForecast, MotorSummary};
@@ -62,7 +66,7 @@ pub use prediction::{extremes, predicted_extremes, rig_model};
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use response_estimate::{ClosedResponses, MeasuredMargins};
-pub use run::{Run, StopCause, run};
+pub use run::{Run, StopCause};
 pub use run_error::RunError;
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};

@@ -4,11 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use super::error::ExperimentError;
+use super::live_rig::TAIL_S;
 use super::motor_error::MotorError;
 use super::motor_forecast::{MotorForecast, RESERVE, duration_text, predict};
 use super::motor_start::MotorStart;
 use super::plan::Plan;
-use super::run::{Run, TAIL_S};
+use super::run::Run;
 use super::run_error::RunError;
 use super::signals::stop_on_signal;
 use crate::rig::motor::{Moment, MotorMemory};

@@ -11,10 +11,10 @@ use rtrb::Producer;
 use serde::Serialize;
 
 use super::connections::{OutsideEnds, connect};
+use super::live_rig::servo_run;
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
-use super::run::servo;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::{State, Trip};
 use crate::rt::clock::TickTiming;
@@ -130,9 +130,12 @@ impl Replay {
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
         let stop_flags = StopFlags::default();
-        let servo = servo(plan, Box::new(rig), connections, correction).with_ramps(ramp_ticks);
+        let run = servo_run(plan, connections)
+            .with_correction(correction)
+            .with_ramps(ramp_ticks)
+            .with_stop_flags(stop_flags.clone());
         Ok(Replay {
-            servo: servo.with_stop_flags(stop_flags.clone()),
+            servo: Servo::new(Box::new(rig), Box::new(run), plan.config.servo.period_s()),
             stop_flags,
             outside,
             feed,

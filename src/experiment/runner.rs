@@ -1,22 +1,23 @@
 //! Runs plans on a bench: opens the rig, applies the calibration, runs the loop, and reports progress.
 
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::time::SystemTime;
 
-use bench_hal::{Rig, blocking};
+use bench_hal::blocking;
 use serde::Serialize;
 
 use super::error::ExperimentError;
+use super::live_rig::LiveRig;
 use super::loop_check::{Stage, closed_loop_of, require_margins};
 use super::motor_error::MotorError;
 use super::plan::Plan;
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
-use super::run::{Run, run};
+use super::run::Run;
 use super::run_error::RunError;
 use crate::config::Config;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
-use crate::rig::devices::{self, OpenRig};
+use crate::rig::devices;
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
@@ -71,7 +72,7 @@ impl Setup {
         }
     }
 
-    fn open(&self, config: &Config) -> Result<OpenRig, ExperimentError> {
+    fn open(&self, config: &Config) -> Result<OpenBench, ExperimentError> {
         let mut opened = match self.stage(config) {
             Stage::Simulated => devices::simulate(config)?,
             Stage::Devices => devices::open(config)?,
@@ -84,11 +85,45 @@ impl Setup {
                 ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
             })?;
         }
-        Ok(opened)
+        Ok(OpenBench {
+            rig: LiveRig::open(opened.rig, config, self.pace)?,
+            names: DeviceNames {
+                amplifier: opened.amplifier,
+                probe: opened.probe,
+            },
+            config: config.clone(),
+        })
     }
 }
 
-/// Runs plans.
+/// Identities of the devices.
+struct DeviceNames {
+    amplifier: String,
+    probe: String,
+}
+
+/// A rig with its loop, which is kept open for the next run.
+struct OpenBench {
+    rig: LiveRig,
+    names: DeviceNames,
+    config: Config,
+}
+
+impl OpenBench {
+    /// Whether it is the rig of `config`. Excitation, controller, calibration and analysis do not belong to the rig.
+    fn is_of(&self, config: &Config) -> bool {
+        let open = &self.config;
+        open.servo == config.servo
+            && open.plant == config.plant
+            && open.motor == config.motor
+            && open.amplifier == config.amplifier
+            && open.probe == config.probe
+            && open.interlock == config.interlock
+            && open.sim == config.sim
+    }
+}
+
+/// Runs plans. The rig stays open for later runs with the same rig; after a trip it is closed.
 pub struct Runner {
     /// Rig, pace and folder.
     pub setup: Setup,
@@ -96,6 +131,8 @@ pub struct Runner {
     pub progress: Progress,
     /// The thermal state of the motor after the last run, in A^2; `None` before the first.
     motor_a2: Cell<Option<f64>>,
+    /// The rig of the last run, if it is open.
+    open: RefCell<Option<OpenBench>>,
 }
 
 impl Runner {
@@ -110,6 +147,7 @@ impl Runner {
             setup,
             progress,
             motor_a2: Cell::new(None),
+            open: RefCell::new(None),
         }
     }
 
@@ -126,26 +164,37 @@ impl Runner {
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
         require_stable_loop(plan, self.setup.stage(&plan.config))?;
-        let opened = self.setup.open(&plan.config)?;
-        let plan = calibrated(plan, &opened, calibration)?;
+        let mut bench = self.opened(&plan.config)?;
+        let plan = calibrated(plan, &bench.names, calibration)?;
         let run = match self.setup.motor {
-            MotorHandling::Simulated => self.run_simulated_motor(plan, opened, phase),
+            MotorHandling::Simulated => self.run_simulated_motor(plan, &mut bench, phase),
             MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
-                self.run_remembered_motor(plan, opened, phase)
+                self.run_remembered_motor(plan, &mut bench, phase)
             }
         }?;
         self.motor_a2.set(Some(run.ended.thermal_a2));
+        if run.ended.trip.is_none() {
+            self.open.replace(Some(bench));
+        }
         Ok(run)
+    }
+
+    /// The rig that is open already, or the one of `config`. Another rig is closed first, because it may be the same devices.
+    fn opened(&self, config: &Config) -> Result<OpenBench, ExperimentError> {
+        match self.open.take().filter(|open| open.is_of(config)) {
+            Some(open) => Ok(open),
+            None => self.setup.open(config),
+        }
     }
 
     fn run_simulated_motor(
         &self,
         mut plan: Plan,
-        opened: OpenRig,
+        bench: &mut OpenBench,
         phase: &'static str,
     ) -> Result<Run, ExperimentError> {
         plan.motor = rested(&plan, self.motor_a2.get().unwrap_or(0.0))?;
-        Ok(self.run_loop(&plan, opened.rig, phase)?)
+        Ok(self.run_loop(&plan, &mut bench.rig, phase)?)
     }
 
     /// A run whose motor is known by a file. The later runs of a runner wait in any case: a command that has begun is not refused
@@ -153,20 +202,20 @@ impl Runner {
     fn run_remembered_motor(
         &self,
         mut plan: Plan,
-        opened: OpenRig,
+        bench: &mut OpenBench,
         phase: &'static str,
     ) -> Result<Run, ExperimentError> {
         let memory = MotorMemory::of(&plan.config).map_err(MotorError::from)?;
         let motor = RememberedMotor {
             memory,
-            amplifier: &opened.amplifier,
+            amplifier: &bench.names.amplifier,
             now: self.setup.now,
         };
         let is_later = self.motor_a2.get().is_some();
         let waits = is_later || self.setup.motor == MotorHandling::WaitUntilCool;
         plan.motor = motor.ready(&plan, waits, &self.progress)?;
         motor.begin(&plan)?;
-        let result = self.run_loop(&plan, opened.rig, phase);
+        let result = self.run_loop(&plan, &mut bench.rig, phase);
         motor.end(&plan, &result);
         Ok(result?)
     }
@@ -174,13 +223,12 @@ impl Runner {
     fn run_loop(
         &self,
         plan: &Plan,
-        rig: Box<dyn Rig>,
+        rig: &mut LiveRig,
         phase: &'static str,
     ) -> Result<Run, RunError> {
         self.progress.begin(phase, 0);
         let mut update = |done, total| self.progress.set(done, total);
-        let (pace, folder) = (self.setup.pace, &self.setup.folder);
-        run(plan, rig, pace, folder, &mut update)
+        rig.run(plan, &self.setup.folder, &mut update)
     }
 }
 
@@ -196,17 +244,17 @@ fn require_stable_loop(plan: &Plan, stage: Stage) -> Result<(), ExperimentError>
 /// The plan with the devices, and with the given or the configured calibration.
 fn calibrated(
     plan: &Plan,
-    opened: &OpenRig,
+    devices: &DeviceNames,
     given: Option<Calibration>,
 ) -> Result<Plan, ExperimentError> {
     let calibration = match given {
         Some(calibration) => Some(calibration),
-        None => configured_calibration(&plan.config, opened)?,
+        None => configured_calibration(&plan.config, devices)?,
     };
     let mut plan = plan.clone();
     plan.devices = vec![
-        ("amplifier", opened.amplifier.clone()),
-        ("probe", opened.probe.clone()),
+        ("amplifier", devices.amplifier.clone()),
+        ("probe", devices.probe.clone()),
     ];
     plan.calibration = calibration;
     Ok(plan)
@@ -214,11 +262,11 @@ fn calibrated(
 
 fn configured_calibration(
     config: &Config,
-    opened: &OpenRig,
+    devices: &DeviceNames,
 ) -> Result<Option<Calibration>, ExperimentError> {
     let devices = KnownDevices {
-        amplifier: Some(&opened.amplifier),
-        probe: Some(&opened.probe),
+        amplifier: Some(&devices.amplifier),
+        probe: Some(&devices.probe),
     };
     let loaded = load_calibration(config, devices, SystemTime::now())?;
     let Some(loaded) = loaded else {

@@ -7,19 +7,22 @@
 //!            retired programs (ring)
 //! ```
 //!
-//! [`servo`] is the loop itself, [`interlock`] and [`arming`] its safety, [`settling`] the end of a run, [`clock`] its two paces, [`program`] what it
-//! runs, [`record`] what it publishes, [`request`] what it is asked to do,
+//! [`servo`] is the loop itself, [`servo_run`] what belongs to one run of it, [`live_loop`] its thread, which serves runs as long as
+//! the rig is open, [`thread`] how the system schedules it. [`interlock`] and [`arming`] are its safety, [`settling`] the end of a
+//! run, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
 //! [`supervision`] what ends a run without a request.
 
 pub mod arming;
 pub mod clock;
 mod following_error;
 pub mod interlock;
+pub mod live_loop;
 pub mod program;
 pub mod publisher;
 pub mod record;
 pub mod request;
 pub mod servo;
+pub mod servo_run;
 pub mod settling;
 pub mod supervision;
 pub mod thread;

@@ -1,25 +1,20 @@
 //! The loop: read, check, decide, write, publish.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::Ordering;
 use std::task::Poll;
 
 use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Tick, Validity};
-use rtrb::{Consumer, Producer};
 
 use super::arming::{State, Transition, Trip};
-use super::clock::{Clock, TickTiming};
-use super::interlock::Interlocks;
+use super::clock::{Clock, TickTiming, scheduled_ns};
 use super::program::{Decision, Program, ProgramInput};
-use super::publisher::Publisher;
 use super::record::{
     EventKind, Origin, REQUESTS_PER_TICK, Refusal, RequestEvent, RequestKind, TickRecord, flag,
 };
 use super::request::NumberedRequest;
 pub use super::request::Request;
+use super::servo_run::{Connections, Enabling, ServoRun};
 use super::settling::{Settling, SettlingStep};
-use super::supervision::{LeaseWatch, StopFlags, Supervision};
-use crate::rig::calibration::Correction;
 
 /// The current is unknown if the driver returns a value that is not finite.
 const NOT_FINITE: DeviceError = DeviceError {
@@ -31,124 +26,43 @@ const NOT_FINITE: DeviceError = DeviceError {
 /// Period of the events with the clocks of the system.
 const CLOCKS_PERIOD_NS: u64 = 1_000_000_000;
 
-/// Progress of a running loop, for other threads.
-#[derive(Debug, Default)]
-pub struct Progress {
-    /// Ticks of the program done so far.
-    pub run_ticks: AtomicU64,
-    /// Ticks without a record since the last recorded one.
-    pub unrecorded_ticks: AtomicU64,
-}
-
-/// The loop and its state between ticks.
+/// The loop and its state between ticks. It lives as long as the rig; what belongs to one run is in [`ServoRun`].
 pub struct Servo {
     rig: Box<dyn Rig>,
-    correction: Option<Correction>,
-    interlocks: Interlocks,
+    run: Box<ServoRun>,
     state: State,
-    program: Option<Box<dyn Program>>,
-    run_tick: u64,
-    /// Length of each of the two ramps to zero current in ticks; without ramps if 0.
-    ramp_ticks: u64,
-    settling: Settling,
-    supervision: Supervision,
-    /// Who ended the run early without a request of the supervisor.
-    stopped_by: Option<Origin>,
-    /// Current in amperes that the program requested in the last tick.
-    requested_a: f64,
-    /// Current in amperes that the amplifier gives since the last tick.
-    applied_a: f64,
-    /// The same current as set-point of the amplifier, before the correction.
-    raw_command_a: f64,
-    connections: Connections,
-    trip: Option<(Trip, u64)>,
-    completed: bool,
-    /// When the clocks are published next, in nanoseconds since the loop started.
-    clocks_due_ns: u64,
-    enabling: Enabling,
     /// Whether a reset of the amplifier has begun and not ended.
     is_clearing: bool,
-}
-
-/// Progress of [`State::Enabling`].
-#[derive(Clone, Copy, Debug, Default)]
-struct Enabling {
-    /// Healthy ticks that are required before the amplifier is enabled.
-    required_ticks: u64,
-    /// Healthy ticks since the request to arm.
-    healthy_ticks: u64,
-    /// Whether the amplifier is being enabled.
-    has_begun: bool,
-}
-
-/// The loop's ends of the rings.
-pub struct Connections {
-    /// Requests of the supervisor.
-    pub requests: Consumer<NumberedRequest>,
-    /// Programs that ended, to be freed outside the loop.
-    pub retired: Producer<Box<dyn Program>>,
-    /// Publishes records and events to the recorder.
-    pub publisher: Publisher,
-    /// Progress for other threads.
-    pub progress: Arc<Progress>,
+    /// Ticks of the rig so far. Each run counts its own ticks from 0.
+    rig_ticks: u64,
+    /// Ticks of the rig before this run.
+    rig_ticks_before: u64,
+    period_s: f64,
 }
 
 impl Servo {
-    /// A disarmed loop around a rig.
-    pub fn new(rig: Box<dyn Rig>, interlocks: Interlocks, connections: Connections) -> Self {
+    /// A disarmed loop around a rig, with ticks of `period_s`.
+    pub fn new(rig: Box<dyn Rig>, run: Box<ServoRun>, period_s: f64) -> Self {
         Servo {
             rig,
-            correction: None,
-            interlocks,
+            run,
             state: State::Disarmed,
-            program: None,
-            run_tick: 0,
-            ramp_ticks: 0,
-            settling: Settling::new(0),
-            supervision: Supervision::default(),
-            stopped_by: None,
-            requested_a: 0.0,
-            applied_a: 0.0,
-            raw_command_a: 0.0,
-            connections,
-            trip: None,
-            completed: false,
-            clocks_due_ns: 0,
-            enabling: Enabling::default(),
             is_clearing: false,
+            rig_ticks: 0,
+            rig_ticks_before: 0,
+            period_s,
         }
     }
 
-    /// The loop with the correction of a calibration. The interlocks judge readings and set-points before and after it.
-    pub fn with_correction(mut self, correction: Option<Correction>) -> Self {
-        self.correction = correction;
-        self
-    }
-
-    /// The loop with ramps of `ramp_ticks` at the end of a run (see [`settling`](super::settling)). Without them the current
-    /// goes to zero in one step.
-    pub fn with_ramps(mut self, ramp_ticks: u64) -> Self {
-        self.ramp_ticks = ramp_ticks;
-        self
-    }
-
-    /// The loop with `ticks` healthy ticks between the request to arm and the enabling of the amplifier. A tick is healthy if no
-    /// interlock would trip in it. The first tick is always judged before the amplifier is enabled.
-    pub fn with_healthy_ticks(mut self, ticks: u64) -> Self {
-        self.enabling.required_ticks = ticks;
-        self
-    }
-
-    /// The loop with the flags that signals set.
-    pub fn with_stop_flags(mut self, flags: StopFlags) -> Self {
-        self.supervision.flags = flags;
-        self
-    }
-
-    /// The loop with an arm lease, if there is one. When it expires, the loop ends the run along a ramp.
-    pub fn with_lease(mut self, lease: Option<LeaseWatch>) -> Self {
-        self.supervision.lease = lease;
-        self
+    /// Begins another run, and returns the one before. An amplifier that is not off is disabled first. A trip remains until it is
+    /// cleared. Must not allocate or block.
+    pub fn exchange(&mut self, run: Box<ServoRun>) -> Box<ServoRun> {
+        if !self.is_off() {
+            self.rig.disable();
+            self.state = State::Disarmed;
+        }
+        self.rig_ticks_before = self.rig_ticks;
+        std::mem::replace(&mut self.run, run)
     }
 
     /// Executes one tick. It does not allocate, lock or print; its only system calls are those of the clock and of
@@ -160,7 +74,8 @@ impl Servo {
         self.take_requests(now.number);
         self.take_signals(now.number);
         self.check_lease(timing);
-        let raw = self.rig.latest(now); // read
+        let rig_tick = self.rig_tick(now);
+        let raw = self.rig.latest(rig_tick); // read
         let reading = self.corrected(raw);
         let checked = self.check(&raw, &reading, timing); // check
         self.advance_enabling(checked, now.number);
@@ -172,12 +87,22 @@ impl Servo {
         self.finish_run(now.number);
     }
 
+    /// A tick of the run as tick of the rig.
+    fn rig_tick(&mut self, now: Tick) -> Tick {
+        let number = self.rig_ticks_before + now.number;
+        self.rig_ticks = number + 1;
+        Tick {
+            number,
+            scheduled_ns: scheduled_ns(number, self.period_s),
+        }
+    }
+
     fn publish(&mut self, record: TickRecord) {
         let Connections {
             publisher,
             progress,
             ..
-        } = &mut self.connections;
+        } = &mut self.run.connections;
         publisher.record(record);
         let unrecorded = publisher.lost_in_a_row();
         progress
@@ -187,17 +112,17 @@ impl Servo {
 
     /// Publishes the clocks of the system at the first tick and once per second.
     fn publish_clocks(&mut self, now: Tick, clock: &impl Clock) {
-        if now.scheduled_ns < self.clocks_due_ns {
+        if now.scheduled_ns < self.run.clocks_due_ns {
             return;
         }
-        self.clocks_due_ns = now.scheduled_ns.saturating_add(CLOCKS_PERIOD_NS);
+        self.run.clocks_due_ns = now.scheduled_ns.saturating_add(CLOCKS_PERIOD_NS);
         if let Some(times) = clock.times() {
             self.event(now.number, EventKind::Clock(times));
         }
     }
 
     fn corrected(&self, raw: Reading) -> Reading {
-        match self.correction {
+        match self.run.correction {
             None => raw,
             Some(correction) => Reading {
                 position_m: correction.position_m(raw.position_m),
@@ -208,11 +133,11 @@ impl Servo {
 
     /// Judges the reading of the probe as it is, and its corrected position: the stricter of both decides.
     fn check(&mut self, raw: &Reading, reading: &Reading, timing: &TickTiming) -> Result<(), Trip> {
-        let missed = self.interlocks.check_timing(timing.missed, timing.tick);
-        let raw = self.interlocks.check_reading(raw, timing.tick);
-        let corrected = self.interlocks.check_travel(reading.position_m);
+        let missed = self.run.interlocks.check_timing(timing.missed, timing.tick);
+        let raw = self.run.interlocks.check_reading(raw, timing.tick);
+        let corrected = self.run.interlocks.check_travel(reading.position_m);
         let actual_a = self.rig.actual_current_a().filter(|_| !self.is_off());
-        let current = self.interlocks.check_current(actual_a, timing.tick);
+        let current = self.run.interlocks.check_current(actual_a, timing.tick);
         match self.rig.status() {
             AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
                 code: i64::from(code),
@@ -230,40 +155,44 @@ impl Servo {
             self.trip(trip, tick);
         }
         let input = ProgramInput {
-            tick: self.run_tick,
+            tick: self.run.program_tick,
             position_m: reading.position_m,
-            applied_a: self.applied_a,
+            applied_a: self.run.applied_a,
         };
-        match (self.state, &mut self.program) {
+        match (self.state, &mut self.run.program) {
             (State::Running, Some(program)) => program.decide(&input),
-            (State::Settling, Some(program)) => {
-                settle(&mut self.settling, program, &input, self.requested_a)
-            }
+            (State::Settling, Some(program)) => settle(
+                &mut self.run.settling,
+                program,
+                &input,
+                self.run.requested_a,
+            ),
             _ => Decision::default(),
         }
     }
 
     /// Commands the requested current if the interlocks allow it; otherwise switches everything off.
     fn write(&mut self, requested_a: f64, tick: u64) {
-        self.requested_a = requested_a;
-        (self.applied_a, self.raw_command_a) = (0.0, 0.0);
+        self.run.requested_a = requested_a;
+        (self.run.applied_a, self.run.raw_command_a) = (0.0, 0.0);
         if self.is_on()
             && let Err(trip) = self.command(requested_a)
         {
             self.trip(trip, tick);
         }
-        self.interlocks
-            .record_current(self.applied_a, self.raw_command_a);
+        self.run
+            .interlocks
+            .record_current(self.run.applied_a, self.run.raw_command_a);
     }
 
     /// Commands a current. The interlocks judge the current, the set-point that gives it, and what the amplifier accepts.
     fn command(&mut self, requested_a: f64) -> Result<(), Trip> {
-        self.interlocks.check_command(requested_a)?;
-        let set_point_a = match self.correction {
+        self.run.interlocks.check_command(requested_a)?;
+        let set_point_a = match self.run.correction {
             None => requested_a,
             Some(correction) => {
                 let set_point_a = correction.set_point_a(requested_a);
-                self.interlocks.check_command(set_point_a)?;
+                self.run.interlocks.check_command(set_point_a)?;
                 set_point_a
             }
         };
@@ -271,9 +200,11 @@ impl Servo {
         if !accepted_a.is_finite() {
             return Err(NOT_FINITE.into());
         }
-        self.interlocks.check_accepted(set_point_a, accepted_a)?;
-        self.raw_command_a = accepted_a;
-        self.applied_a = match self.correction {
+        self.run
+            .interlocks
+            .check_accepted(set_point_a, accepted_a)?;
+        self.run.raw_command_a = accepted_a;
+        self.run.applied_a = match self.run.correction {
             None => accepted_a,
             Some(correction) => correction.current_a(accepted_a),
         };
@@ -296,9 +227,9 @@ impl Servo {
             reference_m: decision.reference_m,
             position_m: reading.position_m,
             requested_a: decision.requested_a,
-            command_a: self.applied_a,
-            raw_position_m: self.correction.map(|_| raw.position_m),
-            raw_command_a: self.correction.map(|_| self.raw_command_a),
+            command_a: self.run.applied_a,
+            raw_position_m: self.run.correction.map(|_| raw.position_m),
+            raw_command_a: self.run.correction.map(|_| self.run.raw_command_a),
             actual_a: self.rig.actual_current_a(),
             probe_sequence: reading.sequence,
             probe_age_ns: reading.age_ns,
@@ -310,8 +241,9 @@ impl Servo {
     }
 
     fn flags(&self, timing: &TickTiming, reading: &Reading, decision: &Decision) -> u32 {
-        let limited = self.applied_a.to_bits() != decision.requested_a.to_bits();
+        let limited = self.run.applied_a.to_bits() != decision.requested_a.to_bits();
         let tripped = self
+            .run
             .trip
             .is_some_and(|(_, tick)| tick == timing.tick.number);
         (flag::ACTIVE * u32::from(decision.active))
@@ -322,24 +254,32 @@ impl Servo {
     }
 
     fn finish_run(&mut self, tick: u64) {
-        let ticks = self.program.as_ref().map_or(0, |program| program.ticks());
+        let ticks = self
+            .run
+            .program
+            .as_ref()
+            .map_or(0, |program| program.ticks());
         match self.state {
             State::Running => self.count_tick(tick, ticks),
-            State::Settling if self.settling.is_done() => self.switch_off(Transition::Stop, tick),
-            State::Settling => self.run_tick = (self.run_tick + 1).min(ticks.saturating_sub(1)),
+            State::Settling if self.run.settling.is_done() => {
+                self.switch_off(Transition::Stop, tick)
+            }
+            State::Settling => {
+                self.run.program_tick = (self.run.program_tick + 1).min(ticks.saturating_sub(1))
+            }
             State::Disarmed | State::Enabling | State::Armed | State::Tripped => {}
         }
     }
 
     /// Counts a tick of the program; after the last one the run ends.
     fn count_tick(&mut self, tick: u64, ticks: u64) {
-        self.run_tick += 1;
-        let progress = &self.connections.progress.run_ticks;
-        progress.store(self.run_tick, Ordering::Relaxed);
-        if self.run_tick >= ticks {
-            self.completed = true;
+        self.run.program_tick += 1;
+        let progress = &self.run.connections.progress.run_ticks;
+        progress.store(self.run.program_tick, Ordering::Relaxed);
+        if self.run.program_tick >= ticks {
+            self.run.completed = true;
             self.event(tick, EventKind::Completed);
-            self.run_tick = ticks.saturating_sub(1);
+            self.run.program_tick = ticks.saturating_sub(1);
             self.finish(tick);
         }
     }
@@ -348,8 +288,8 @@ impl Servo {
     /// once.
     fn finish(&mut self, tick: u64) {
         match self.state {
-            State::Running if self.ramp_ticks > 0 && self.requested_a != 0.0 => {
-                self.settling = Settling::new(self.ramp_ticks);
+            State::Running if self.run.ramp_ticks > 0 && self.run.requested_a != 0.0 => {
+                self.run.settling = Settling::new(self.run.ramp_ticks);
                 self.change(Transition::Finish, tick);
             }
             State::Running | State::Armed | State::Enabling => {
@@ -361,7 +301,7 @@ impl Servo {
 
     fn take_requests(&mut self, tick: u64) {
         for _ in 0..REQUESTS_PER_TICK {
-            let Ok(NumberedRequest { id, request }) = self.connections.requests.pop() else {
+            let Ok(NumberedRequest { id, request }) = self.run.connections.requests.pop() else {
                 return;
             };
             self.answer(id, Origin::Supervisor, request.kind(), tick);
@@ -371,7 +311,7 @@ impl Servo {
 
     /// Why a request is refused; `None` if it is accepted.
     fn refusal(&self, kind: RequestKind) -> Option<Refusal> {
-        let waits = self.state == State::Enabling && self.program.is_some();
+        let waits = self.state == State::Enabling && self.run.program.is_some();
         match kind {
             RequestKind::Start if waits => Some(Refusal::NotArmed),
             _ => kind.refusal(self.state),
@@ -390,14 +330,14 @@ impl Servo {
     }
 
     fn take_signals(&mut self, tick: u64) {
-        for request in self.supervision.signalled() {
+        for request in self.run.supervision.signalled() {
             self.end(request, Origin::Signal, tick);
         }
     }
 
     /// An expired arm lease ends a run, and disarms an armed loop.
     fn check_lease(&mut self, timing: &TickTiming) {
-        let expired = self.supervision.lease_expired(timing.missed);
+        let expired = self.run.supervision.lease_expired(timing.missed);
         if expired && RequestKind::Finish.refusal(self.state).is_none() {
             self.end(Request::Finish, Origin::Lease, timing.tick.number);
         }
@@ -406,7 +346,7 @@ impl Servo {
     /// Ends the run without a request of the supervisor.
     fn end(&mut self, request: Request, origin: Origin, tick: u64) {
         self.answer(0, origin, request.kind(), tick);
-        self.stopped_by.get_or_insert(origin);
+        self.run.stopped_by.get_or_insert(origin);
         self.take(request, tick);
     }
 
@@ -423,8 +363,8 @@ impl Servo {
     /// Begins to enable: [`Servo::advance_enabling`] continues in this tick and in the next ones.
     fn arm(&mut self, tick: u64) {
         if self.state.after(Transition::Arm).is_some() {
-            self.enabling = Enabling {
-                required_ticks: self.enabling.required_ticks,
+            self.run.enabling = Enabling {
+                required_ticks: self.run.enabling.required_ticks,
                 ..Enabling::default()
             };
             self.change(Transition::Arm, tick);
@@ -436,13 +376,13 @@ impl Servo {
         if self.state != State::Enabling || checked.is_err() {
             return;
         }
-        self.enabling.healthy_ticks += 1;
+        self.run.enabling.healthy_ticks += 1;
         match self.enable_amplifier() {
             Poll::Pending => {}
             Poll::Ready(Err(error)) => self.trip(Trip::from(error), tick),
             Poll::Ready(Ok(())) => {
                 self.change(Transition::Enabled, tick);
-                if self.program.is_some() {
+                if self.run.program.is_some() {
                     self.begin_run(tick);
                 }
             }
@@ -450,11 +390,11 @@ impl Servo {
     }
 
     fn enable_amplifier(&mut self) -> Poll<Result<(), DeviceError>> {
-        if self.enabling.healthy_ticks < self.enabling.required_ticks {
+        if self.run.enabling.healthy_ticks < self.run.enabling.required_ticks {
             return Poll::Pending;
         }
-        if !self.enabling.has_begun {
-            self.enabling.has_begun = true;
+        if !self.run.enabling.has_begun {
+            self.run.enabling.has_begun = true;
             self.rig.begin_enable()?;
         }
         self.rig.poll_enable()
@@ -485,9 +425,9 @@ impl Servo {
     /// returned.
     fn start(&mut self, program: Box<dyn Program>, tick: u64) {
         match self.state {
-            State::Enabling if self.program.is_none() => self.program = Some(program),
+            State::Enabling if self.run.program.is_none() => self.run.program = Some(program),
             State::Armed => {
-                let old = self.program.replace(program);
+                let old = self.run.program.replace(program);
                 self.retire(old);
                 self.begin_run(tick);
             }
@@ -503,13 +443,13 @@ impl Servo {
 
     fn begin_run(&mut self, tick: u64) {
         self.change(Transition::Start, tick);
-        (self.run_tick, self.completed, self.trip) = (0, false, None);
+        (self.run.program_tick, self.run.completed, self.run.trip) = (0, false, None);
     }
 
     /// Zero current in this tick, amplifier disabled, the reason published.
     fn trip(&mut self, trip: Trip, tick: u64) {
         if self.state.after(Transition::Trip).is_some() {
-            self.trip = Some((trip, tick));
+            self.run.trip = Some((trip, tick));
             self.event(tick, EventKind::Trip(trip));
             self.switch_off(Transition::Trip, tick);
         }
@@ -518,7 +458,7 @@ impl Servo {
     fn switch_off(&mut self, transition: Transition, tick: u64) {
         self.rig.disable();
         self.change(transition, tick);
-        let program = self.program.take();
+        let program = self.run.program.take();
         self.retire(program);
     }
 
@@ -531,13 +471,13 @@ impl Servo {
     }
 
     fn event(&mut self, tick: u64, kind: EventKind) {
-        self.connections.publisher.event(tick, kind);
+        self.run.connections.publisher.event(tick, kind);
     }
 
     /// Passes a program on to be freed outside the loop. Without room in the ring its memory is leaked, not freed here.
     fn retire(&mut self, program: Option<Box<dyn Program>>) {
         let Some(program) = program else { return };
-        if let Err(rtrb::PushError::Full(program)) = self.connections.retired.push(program) {
+        if let Err(rtrb::PushError::Full(program)) = self.run.connections.retired.push(program) {
             std::mem::forget(program);
         }
     }
@@ -557,29 +497,9 @@ impl Servo {
         matches!(self.state, State::Disarmed | State::Tripped)
     }
 
-    /// The trip since the last start, if there was one, and its tick.
-    pub fn last_trip(&self) -> Option<(Trip, u64)> {
-        self.trip
-    }
-
-    /// Whether the program ran to its end.
-    pub fn completed(&self) -> bool {
-        self.completed
-    }
-
-    /// Who ended the run early without a request of the supervisor: a signal or the arm lease.
-    pub fn stopped_by(&self) -> Option<Origin> {
-        self.stopped_by
-    }
-
-    /// The thermal state of the motor in A^2.
-    pub fn thermal_a2(&self) -> f64 {
-        self.interlocks.thermal_a2()
-    }
-
-    /// The connection to the recorder.
-    pub fn publisher(&self) -> &Publisher {
-        &self.connections.publisher
+    /// The run.
+    pub fn run(&self) -> &ServoRun {
+        &self.run
     }
 }
 

@@ -1,16 +1,13 @@
 //! The thread of the loop: locked memory, a real-time scheduler and its own processor. If the system refuses one of
 //! these, the loop still runs, and the refusal is reported with its remedy.
 
-use std::sync::mpsc::{Sender, channel};
-use std::thread::JoinHandle;
+use std::fmt::Display;
+use std::fs::{File, OpenOptions};
+use std::io::Write;
 
 use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
 use serde::{Deserialize, Serialize};
 
-use super::arming::Trip;
-use super::clock::{Clock, Realtime, Virtual};
-use super::record::Origin;
-use super::servo::Servo;
 use crate::config::LoopSettings;
 use crate::util::thread_priority::set_fifo;
 
@@ -39,82 +36,25 @@ impl Pace {
 pub struct Scheduling {
     /// `SCHED_FIFO 80`, `SCHED_OTHER`.
     pub policy: String,
-    /// Whether the memory is locked.
+    /// Whether the memory is locked during runs.
     pub memory_locked: bool,
+    /// Whether the processors stay out of power-saving idle states during runs.
+    #[serde(default)]
+    pub idle_states_off: bool,
     /// The processor it is bound to.
     pub cpu: Option<usize>,
     /// The refused requests, with the remedy.
     pub refused: Vec<String>,
 }
 
-/// How a loop ended.
-#[derive(Clone, Debug, Default)]
-pub struct LoopOutcome {
-    /// The trip, if there was one, and its tick.
-    pub trip: Option<(Trip, u64)>,
-    /// Whether the program ran to its end.
-    pub completed: bool,
-    /// Who ended the run early without a request of the supervisor: a signal or the arm lease.
-    pub stopped_by: Option<Origin>,
-    /// Records that did not fit into the ring.
-    pub lost_records: u64,
-    /// The thermal state of the motor at the end, in A^2.
-    pub thermal_a2: f64,
+/// What the process holds while a run goes on, as far as it was granted. Dropping it gives it back, also in a panic: the analysis
+/// after the run would otherwise allocate locked memory, and the processors would not save power.
+pub struct RunPrivileges {
+    _memory: Option<MemoryLock>,
+    _latency: Option<File>,
 }
 
-/// A loop on its own thread, scheduled but waiting for [`PreparedLoop::begin`].
-pub struct PreparedLoop {
-    thread: JoinHandle<LoopOutcome>,
-    start: Sender<()>,
-    scheduling: Scheduling,
-}
-
-impl PreparedLoop {
-    /// How it is scheduled.
-    pub fn scheduling(&self) -> &Scheduling {
-        &self.scheduling
-    }
-
-    /// Starts the loop. Without this call it ends before its first tick.
-    pub fn begin(self) -> JoinHandle<LoopOutcome> {
-        // If the thread has panicked, joining it returns the reason.
-        let _ = self.start.send(());
-        self.thread
-    }
-}
-
-/// Makes a thread for the loop. Once begun it runs until the loop has been off for `tail_ticks`.
-pub fn prepare(
-    servo: Servo,
-    settings: &LoopSettings,
-    pace: Pace,
-    tail_ticks: u64,
-) -> std::io::Result<PreparedLoop> {
-    let settings = settings.clone();
-    let (start, started) = channel();
-    let (report, reported) = channel();
-    let builder = std::thread::Builder::new().name("bench-loop".into());
-    let thread = builder.spawn(move || {
-        let scheduling = pace.schedule(&settings);
-        let _lock = scheduling.memory_locked.then_some(MemoryLock);
-        let _ = report.send(scheduling); // without a receiver the loop is not started
-        match started.recv() {
-            Ok(()) => pace.run(servo, settings.period_s(), tail_ticks),
-            Err(_) => LoopOutcome::default(),
-        }
-    })?;
-    let ended =
-        |_| std::io::Error::other("the thread of the loop ended before it reported its scheduling");
-    let scheduling = reported.recv().map_err(ended)?;
-    Ok(PreparedLoop {
-        thread,
-        start,
-        scheduling,
-    })
-}
-
-/// The locked memory of the process. It is unlocked at the end of the loop, also by a panic: the memory that the analysis allocates
-/// afterwards would be locked as well.
+/// The locked memory of the process.
 struct MemoryLock;
 
 impl Drop for MemoryLock {
@@ -123,9 +63,20 @@ impl Drop for MemoryLock {
     }
 }
 
+impl Scheduling {
+    /// Holds for a run what the system granted when the thread was scheduled.
+    pub fn hold(&self) -> RunPrivileges {
+        let locked = self.memory_locked && lock_memory().is_ok();
+        RunPrivileges {
+            _memory: locked.then_some(MemoryLock),
+            _latency: (self.idle_states_off.then(switch_idle_states_off)).and_then(Result::ok),
+        }
+    }
+}
+
 impl Pace {
     /// Schedules the calling thread.
-    fn schedule(self, settings: &LoopSettings) -> Scheduling {
+    pub fn schedule(self, settings: &LoopSettings) -> Scheduling {
         match self {
             Pace::Virtual => Scheduling {
                 policy: "SCHED_OTHER".into(),
@@ -134,48 +85,31 @@ impl Pace {
             Pace::Realtime => become_realtime(settings),
         }
     }
-
-    fn run(self, servo: Servo, period_s: f64, tail_ticks: u64) -> LoopOutcome {
-        match self {
-            Pace::Virtual => run(servo, Virtual { period_s }, tail_ticks),
-            Pace::Realtime => run(servo, Realtime::new(period_s), tail_ticks),
-        }
-    }
 }
 
-/// Ticks until the loop has been off for `tail_ticks`.
-pub fn run(mut servo: Servo, mut clock: impl Clock, tail_ticks: u64) -> LoopOutcome {
-    let (mut number, mut off_ticks) = (0, 0);
-    while off_ticks <= tail_ticks {
-        let timing = clock.wait(number, servo.publisher());
-        servo.tick(&timing, &clock);
-        number = timing.tick.number + 1;
-        off_ticks = if servo.is_off() { off_ticks + 1 } else { 0 };
-    }
-    LoopOutcome {
-        trip: servo.last_trip(),
-        completed: servo.completed(),
-        stopped_by: servo.stopped_by(),
-        lost_records: servo.publisher().lost(),
-        thermal_a2: servo.thermal_a2(),
-    }
-}
-
-/// Requests all system settings that prevent interruptions of the calling thread, which is the thread of the loop.
+/// Requests all system settings that prevent interruptions of the calling thread, which is the thread of the loop. Those of
+/// [`RunPrivileges`] are only tried, and given back.
 pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
     let mut scheduling = Scheduling::default();
-    scheduling.lock_memory();
+    scheduling.try_memory();
+    scheduling.try_idle_states();
     scheduling.set_policy(settings.priority);
     scheduling.set_cpu(settings.cpu);
     scheduling
 }
 
 impl Scheduling {
-    fn lock_memory(&mut self) {
-        let locked = mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE);
+    fn try_memory(&mut self) {
         let remedy =
             "raise `memlock` in /etc/security/limits.conf or give the program CAP_IPC_LOCK";
-        self.memory_locked = self.granted("locking memory", locked, remedy);
+        let lock = lock_memory().map(|()| MemoryLock);
+        self.memory_locked = self.granted("locking memory", lock.map(drop), remedy);
+    }
+
+    fn try_idle_states(&mut self) {
+        let remedy = "give this user write access to /dev/cpu_dma_latency by a udev rule (docs/real-time.md)";
+        let file = switch_idle_states_off();
+        self.idle_states_off = self.granted("switching idle states off", file.map(drop), remedy);
     }
 
     fn set_policy(&mut self, priority: i32) {
@@ -192,12 +126,26 @@ impl Scheduling {
     }
 
     /// Whether the system granted a request; a refusal is recorded with its remedy.
-    fn granted(&mut self, what: &str, result: nix::Result<()>, remedy: &str) -> bool {
+    fn granted(&mut self, what: &str, result: Result<(), impl Display>, remedy: &str) -> bool {
         let refused = result.map_err(|error| format!("{what}: {error}; {remedy}"));
         let granted = refused.is_ok();
         self.refused.extend(refused.err());
         granted
     }
+}
+
+fn lock_memory() -> nix::Result<()> {
+    mlockall(MlockAllFlags::MCL_CURRENT | MlockAllFlags::MCL_FUTURE)
+}
+
+/// Keeps all processors out of power-saving idle states, from which they wake late, while the file is open: the largest latency
+/// that the system may cause is set to 0 us [Linux, admin-guide/pm/cpuidle, "PM QoS"].
+fn switch_idle_states_off() -> std::io::Result<File> {
+    let mut file = OpenOptions::new()
+        .write(true)
+        .open("/dev/cpu_dma_latency")?;
+    file.write_all(&0_i32.to_ne_bytes())?;
+    Ok(file)
 }
 
 fn bind(cpu: usize) -> nix::Result<()> {

@@ -6,12 +6,14 @@ use std::time::Duration;
 use bench::experiment::{self, Plan};
 use bench::rt::arming::{State, Transition};
 use bench::rt::clock::Virtual;
+use bench::rt::live_loop::run_to_end;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage, Origin, Refusal, RequestEvent};
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Request, Servo};
-use bench::rt::thread::{self, Pace};
+use bench::rt::servo::{Request, Servo};
+use bench::rt::servo_run::{Connections, Progress, ServoRun};
+use bench::rt::thread::Pace;
 use bench_hal::{Rig, Validity};
 use rtrb::{Consumer, RingBuffer};
 
@@ -173,7 +175,7 @@ fn completed_program_disarms_in_the_tick_after_its_last_command() {
             .iter()
             .any(|e| e.tick == 9 && e.kind == EventKind::Completed)
     );
-    assert!(bench.servo().completed());
+    assert!(bench.outcome().completed);
 }
 
 #[test]
@@ -191,7 +193,7 @@ fn start_request_does_not_replace_the_running_program() {
 #[test]
 fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
     let mut bench = bench_in(State::Tripped, None);
-    let trip = bench.servo().last_trip().expect("tripped");
+    let trip = bench.outcome().trip.expect("tripped");
     let before = bench.amplifier_calls().len();
     for _ in 0..50 {
         bench.request(Request::Arm);
@@ -206,7 +208,7 @@ fn only_clear_leaves_the_tripped_state_and_a_new_run_needs_arm_and_start() {
         "the amplifier is only disabled"
     );
     assert_eq!(
-        (bench.servo().last_trip(), bench.returned_programs),
+        (bench.outcome().trip, bench.returned_programs),
         (Some(trip), 50)
     );
 
@@ -267,10 +269,10 @@ fn new_run_resets_the_last_trip() {
     ] {
         bench.request(request);
     }
-    assert!(bench.servo().last_trip().is_some());
+    assert!(bench.outcome().trip.is_some());
     bench.run(10);
     assert_eq!(
-        (bench.servo().last_trip(), bench.servo().completed()),
+        (bench.outcome().trip, bench.outcome().completed),
         (None, true)
     );
 }
@@ -379,8 +381,9 @@ fn loop_around(rig: impl Rig + 'static) -> (Servo, RequestSender, Consumer<LoopM
         publisher: Publisher::new(publisher),
         progress: Arc::new(Progress::default()),
     };
+    let run = ServoRun::new(interlocks(&stage()), connections).with_tail(5);
     (
-        Servo::new(Box::new(rig), interlocks(&stage()), connections),
+        Servo::new(Box::new(rig), Box::new(run), 2e-4),
         requests,
         records,
     )
@@ -408,7 +411,7 @@ impl Program for PanickingProgram {
 fn panic_in_the_loop_disables_the_amplifier() {
     let rig = LoggedRig::new(StillRig::default());
     let log = Arc::clone(&rig.log);
-    let (servo, mut requests, _records) = loop_around(rig);
+    let (mut servo, mut requests, _records) = loop_around(rig);
     assert!(
         requests.send(Request::Arm).is_ok()
             && requests
@@ -416,7 +419,7 @@ fn panic_in_the_loop_disables_the_amplifier() {
                 .is_ok()
     );
     let ended =
-        std::thread::spawn(move || thread::run(servo, Virtual { period_s: 2e-4 }, 5)).join();
+        std::thread::spawn(move || run_to_end(&mut servo, Virtual { period_s: 2e-4 })).join();
     assert!(ended.is_err(), "the program panics after ten ticks");
     let calls = log.lock().expect("not poisoned").clone();
     let currents = calls.iter().filter(

@@ -5,12 +5,13 @@ use std::time::Duration;
 
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Realtime, TickTiming};
+use bench::rt::live_loop::run_to_end;
 use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Request, Servo};
-use bench::rt::thread::{self, LoopOutcome};
+use bench::rt::servo::{Request, Servo};
+use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };
@@ -54,7 +55,7 @@ fn run(
     clock: impl Clock,
     overruns_per_s: u32,
     tail: u64,
-) -> (LoopOutcome, Vec<TickRecord>) {
+) -> (RunOutcome, Vec<TickRecord>) {
     let mut config = stage();
     config.interlock.overruns_per_s = overruns_per_s;
     let (publisher, mut records) = RingBuffer::new(1 << 14);
@@ -67,8 +68,11 @@ fn run(
         publisher: Publisher::new(publisher),
         progress: Arc::new(Progress::default()),
     };
-    let servo = Servo::new(Box::new(rig), interlocks(&config), connections);
-    let ended = thread::run(servo, clock, tail);
+    let run = ServoRun::new(interlocks(&config), connections).with_tail(tail);
+    let mut servo = Servo::new(Box::new(rig), Box::new(run), config.servo.period_s());
+    run_to_end(&mut servo, clock);
+    let ended = servo.run().outcome();
+    drop(servo);
     let messages = std::iter::from_fn(move || records.pop().ok());
     let ticks = messages.filter_map(|message| match message {
         LoopMessage::Tick(record) => Some(record),

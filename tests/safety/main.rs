@@ -5,6 +5,7 @@ mod calibrated;
 use bench_test_support::faulty_rig;
 mod enabling;
 mod late_ticks;
+mod live_rig;
 mod replay;
 mod reproducible;
 mod requests_and_faults;

@@ -167,7 +167,7 @@ fn finish_request_fades_an_excitation_without_a_step() {
     let (before_a, after_a) = (largest_step_a(&before), largest_step_a(after));
     assert!(after_a <= before_a + 1e-3, "{after_a} after {before_a}");
     assert_eq!(bench.state(), State::Disarmed);
-    assert!(!bench.servo().completed());
+    assert!(!bench.outcome().completed);
 }
 
 #[test]

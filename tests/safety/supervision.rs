@@ -62,7 +62,7 @@ fn first_signal_settles_and_second_signal_cuts_in_the_tick_that_sees_it() {
             (24, RequestKind::Stop, None)
         ]
     );
-    assert_eq!(bench.servo().stopped_by(), Some(Origin::Signal));
+    assert_eq!(bench.outcome().stopped_by, Some(Origin::Signal));
     assert!(!bench.amplifier_is_on());
 }
 
@@ -107,7 +107,7 @@ fn lease_without_renewal_ends_the_run_along_a_ramp_at_its_tick() {
     assert_eq!(bench.state(), State::Disarmed);
     let requests = requests_of(&bench, Origin::Lease);
     assert_eq!(requests, [(7 + LEASE_TICKS, RequestKind::Finish, None)]);
-    assert_eq!(bench.servo().stopped_by(), Some(Origin::Lease));
+    assert_eq!(bench.outcome().stopped_by, Some(Origin::Lease));
 }
 
 #[test]
@@ -119,7 +119,7 @@ fn renewed_lease_does_not_end_the_run() {
         bench.run(LEASE_TICKS);
     }
     assert_eq!(bench.state(), State::Running);
-    assert_eq!(bench.servo().stopped_by(), None);
+    assert_eq!(bench.outcome().stopped_by, None);
 }
 
 #[test]

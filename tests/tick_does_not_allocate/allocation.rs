@@ -97,5 +97,5 @@ fn full_recorder_ring_does_not_allocate_or_block() {
         assert_no_alloc(|| test_loop.servo.tick(&moment, &test_loop.clock));
     }
     // 1024 slots: five events and 955 records; the last 64 slots are for events.
-    assert_eq!(test_loop.servo.publisher().lost(), 5000 - 955);
+    assert_eq!(test_loop.servo.run().publisher().lost(), 5000 - 955);
 }

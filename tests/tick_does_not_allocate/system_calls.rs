@@ -202,7 +202,7 @@ fn real_time_loop_makes_only_clock_system_calls() {
     let termination = in_child_process(|| {
         allow_only(&[libc::SYS_clock_nanosleep, libc::SYS_clock_gettime]);
         for number in 0..50 {
-            let moment = clock.wait(number, test_loop.servo.publisher());
+            let moment = clock.wait(number, test_loop.servo.run().publisher());
             test_loop.servo.tick(
                 &TickTiming {
                     missed: 0,

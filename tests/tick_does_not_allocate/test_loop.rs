@@ -11,7 +11,8 @@ use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Request, Servo};
+use bench::rt::servo::{Request, Servo};
+use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};
@@ -49,7 +50,11 @@ impl TestLoop {
             &config.servo,
         );
         TestLoop {
-            servo: Servo::new(Box::new(rig), interlocks, connections),
+            servo: Servo::new(
+                Box::new(rig),
+                Box::new(ServoRun::new(interlocks, connections)),
+                config.servo.period_s(),
+            ),
             requests,
             records,
             retired,
@@ -82,7 +87,7 @@ impl TestLoop {
     pub fn bare_tick(&mut self, missed: u32) {
         let moment = self
             .clock
-            .wait(self.next + u64::from(missed), self.servo.publisher());
+            .wait(self.next + u64::from(missed), self.servo.run().publisher());
         self.servo
             .tick(&TickTiming { missed, ..moment }, &self.clock);
         self.next = moment.tick.number + 1;

@@ -15,13 +15,14 @@ use crate::report::number::angular_frequency;
 use crate::report::{DistortionLevels, ReportError, Trace, bode_svg, distortion_svg};
 
 /// Entries of the recording's metadata that the page shows.
-const METADATA: [&str; 10] = [
+const METADATA: [&str; 11] = [
     "program",
     "host",
     "kernel",
     "pace",
     "policy",
     "memory_locked",
+    "idle_states_off",
     "cpu",
     "refused",
     "amplifier",

@@ -322,6 +322,6 @@ impl Lab {
             .request(Request::Start(program(&config, Run::Control)));
         self.bench.run(450);
         assert_eq!(self.bench.trips().len(), trips, "{:x?}", self.trip());
-        assert!(self.bench.servo().completed() && self.is_off());
+        assert!(self.bench.outcome().completed && self.is_off());
     }
 }

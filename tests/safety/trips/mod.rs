@@ -110,7 +110,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
             )
     };
     assert_eq!(bench.events().iter().filter(|e| tripped(e)).count(), 1);
-    assert_eq!(bench.servo().last_trip(), Some((trip, at)));
+    assert_eq!(bench.outcome().trip, Some((trip, at)));
     bench.assert_recording_complete(at, reason);
     trip
 }

@@ -14,7 +14,8 @@ use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench::rt::request::RequestSender;
-use bench::rt::servo::{Connections, Progress, Request, Servo};
+use bench::rt::servo::{Request, Servo};
+use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
@@ -199,7 +200,9 @@ pub fn interlocks(config: &Config) -> Interlocks {
 
 /// The loop, its rings, and everything it has published.
 pub struct Bench {
-    servo: Servo,
+    /// Rig and run before the first tick.
+    run: Option<(Box<dyn Rig>, ServoRun)>,
+    servo: Option<Servo>,
     requests: RequestSender,
     published: Consumer<LoopMessage>,
     retired: Consumer<Box<dyn Program>>,
@@ -227,7 +230,11 @@ impl Bench {
             progress: Arc::new(Progress::default()),
         };
         Bench {
-            servo: Servo::new(Box::new(logged), interlocks(config), connections),
+            run: Some((
+                Box::new(logged),
+                ServoRun::new(interlocks(config), connections),
+            )),
+            servo: None,
             requests,
             published,
             retired,
@@ -242,45 +249,39 @@ impl Bench {
         }
     }
 
-    /// The same loop with a correction between its program and the rig.
-    pub fn with_correction(self, correction: Correction) -> Bench {
+    /// The same loop with a changed run. Only before the first tick.
+    fn with_run(self, change: impl FnOnce(ServoRun) -> ServoRun) -> Bench {
+        let (rig, run) = self.run.expect("before the first tick");
         Bench {
-            servo: self.servo.with_correction(Some(correction)),
+            run: Some((rig, change(run))),
             ..self
         }
+    }
+
+    /// The same loop with a correction between its program and the rig.
+    pub fn with_correction(self, correction: Correction) -> Bench {
+        self.with_run(|run| run.with_correction(Some(correction)))
     }
 
     /// The same loop with ramps to zero current at the end of a run.
     pub fn with_ramps(self, ramp_ticks: u64) -> Bench {
-        Bench {
-            servo: self.servo.with_ramps(ramp_ticks),
-            ..self
-        }
+        self.with_run(|run| run.with_ramps(ramp_ticks))
     }
 
     /// The same loop with `ticks` healthy ticks before the amplifier is enabled.
     pub fn with_healthy_ticks(self, ticks: u64) -> Bench {
-        Bench {
-            servo: self.servo.with_healthy_ticks(ticks),
-            ..self
-        }
+        self.with_run(|run| run.with_healthy_ticks(ticks))
     }
 
     /// The same loop with flags that stop a run.
     pub fn with_stop_flags(self, flags: &StopFlags) -> Bench {
-        Bench {
-            servo: self.servo.with_stop_flags(flags.clone()),
-            ..self
-        }
+        self.with_run(|run| run.with_stop_flags(flags.clone()))
     }
 
     /// The same loop with an arm lease that expires after `limit_ticks`.
     pub fn with_lease(self, lease: &Arc<ArmLease>, limit_ticks: u64) -> Bench {
         let watch = LeaseWatch::new(Arc::clone(lease), limit_ticks);
-        Bench {
-            servo: self.servo.with_lease(Some(watch)),
-            ..self
-        }
+        self.with_run(|run| run.with_lease(Some(watch)))
     }
 
     /// A stage at rest, disarmed.
@@ -321,7 +322,12 @@ impl Bench {
             scheduled_ns,
         };
         self.now.store(number, Ordering::Relaxed);
-        self.servo.tick(
+        let period_s = self.clock.period_s;
+        if let Some((rig, run)) = self.run.take() {
+            self.servo = Some(Servo::new(rig, Box::new(run), period_s));
+        }
+        let servo = self.servo.as_mut().expect("made before the first tick");
+        servo.tick(
             &TickTiming {
                 tick,
                 woke_ns: scheduled_ns,
@@ -442,8 +448,12 @@ impl Bench {
         );
     }
 
-    pub fn servo(&self) -> &Servo {
-        &self.servo
+    pub fn outcome(&self) -> RunOutcome {
+        self.servo
+            .as_ref()
+            .expect("after the first tick")
+            .run()
+            .outcome()
     }
 }
 

@@ -5,10 +5,11 @@ use bench::config::Config;
 use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
-use bench::rt::thread::{LoopOutcome, Pace};
+use bench::rt::servo_run::RunOutcome;
+use bench::rt::thread::Pace;
 
 /// The recording of a run by `plan`, and how the run ended.
-pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, LoopOutcome) {
+pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let ended = (run.path.clone(), run.ended.clone());

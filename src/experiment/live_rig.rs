@@ -1,0 +1,212 @@
+//! A rig with its loop, open for several runs. Each run has its own recording, which is open before the run starts.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use bench_hal::Rig;
+
+use super::connections::{OutsideEnds, connect};
+use super::plan::{Plan, RAMP_TICKS};
+use super::run::{Run, StopCause};
+use super::run_error::RunError;
+use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
+use super::run_supervisor::Supervisor;
+use crate::config::{Config, LoopSettings};
+use crate::recording::{self, DiskWatch, Recorder, free_bytes};
+use crate::rt::interlock::Interlocks;
+use crate::rt::live_loop::LiveLoop;
+use crate::rt::program::Program;
+use crate::rt::request::{Request, RequestSender};
+use crate::rt::servo_run::{Connections, ServoRun};
+use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
+use crate::rt::thread::Pace;
+
+/// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
+const RING_SLOTS: usize = 1 << 16;
+/// Seconds that are recorded after the motor was switched off.
+pub(super) const TAIL_S: f64 = 0.1;
+/// Longest time in seconds during which a run goes on although its ticks are not recorded.
+const MAX_UNRECORDED_S: f64 = 1.0;
+/// Time for which the readings are judged before a device is enabled, unless `loop.healthy_s` is set.
+const HEALTHY_S: f64 = 0.02;
+
+/// An open rig on which plans run, one after the other. Dropping it closes the rig.
+pub struct LiveRig {
+    live: LiveLoop,
+    pace: Pace,
+}
+
+impl LiveRig {
+    /// Starts the loop of a rig, disarmed.
+    ///
+    /// # Errors
+    /// When the system refuses the thread of the loop.
+    pub fn open(rig: Box<dyn Rig>, config: &Config, pace: Pace) -> Result<LiveRig, RunError> {
+        // Nothing of what happens between runs is recorded.
+        let (unrecorded, _) = connect(0);
+        let idle = ServoRun::new(interlocks(config), unrecorded);
+        let live = LiveLoop::open(rig, Box::new(idle), &config.servo, pace);
+        let live = live.map_err(RunError::system("start the thread of the loop"))?;
+        Ok(LiveRig { live, pace })
+    }
+
+    /// Runs `plan` and records it in `folder`. `watch` is called periodically with the number of completed ticks and of all ticks.
+    ///
+    /// The configuration of the rig in `plan` must be the one with which the rig was opened.
+    pub fn run(
+        &mut self,
+        plan: &Plan,
+        folder: &Path,
+        watch: &mut dyn FnMut(u64, u64),
+    ) -> Result<Run, RunError> {
+        let prepared = self.prepare(plan, folder)?;
+        prepared.supervise(self, watch)
+    }
+
+    /// Everything that a run needs, before its first tick.
+    fn prepare<'a>(&self, plan: &'a Plan, folder: &Path) -> Result<PreparedRun<'a>, RunError> {
+        let program = plan.program()?;
+        let total_ticks = program.ticks();
+        let ramp_ticks = plan.ramp_ticks()?;
+        let recording_bytes = recording_bytes(total_ticks, ramp_ticks, tail_ticks(plan));
+        require_space(folder, recording_bytes, free_bytes(folder))?;
+        let (connections, mut outside) = connect(RING_SLOTS);
+        queue_start(&mut outside.requests, program);
+        let (stop_flags, lease) = (StopFlags::default(), Arc::<ArmLease>::default());
+        let run = servo_run(plan, connections)
+            .with_correction(plan.correction())
+            .with_ramps(ramp_ticks)
+            .with_tail(tail_ticks(plan))
+            .with_healthy_ticks(healthy_ticks(&plan.config.servo, self.pace))
+            .with_stop_flags(stop_flags.clone())
+            .with_lease(lease_watch(plan, self.pace, &lease));
+        let mut metadata = metadata(plan, self.pace, self.live.scheduling());
+        metadata.insert(RAMP_TICKS.into(), ramp_ticks.to_string());
+        Ok(PreparedRun {
+            run: Box::new(run),
+            recorder: create_recording(plan, metadata, folder)?,
+            outside,
+            total_ticks,
+            recording_bytes,
+            max_unrecorded_ticks: (MAX_UNRECORDED_S * plan.config.servo.rate_hz) as u64,
+            plan,
+            stop_flags,
+            lease,
+        })
+    }
+}
+
+/// Opens the loop of `rig`, runs `plan` once and closes it (see [`LiveRig`]).
+pub fn run(
+    plan: &Plan,
+    rig: Box<dyn Rig>,
+    pace: Pace,
+    folder: &Path,
+    watch: &mut dyn FnMut(u64, u64),
+) -> Result<Run, RunError> {
+    LiveRig::open(rig, &plan.config, pace)?.run(plan, folder, watch)
+}
+
+/// A run with its file, before the first tick.
+struct PreparedRun<'a> {
+    run: Box<ServoRun>,
+    recorder: Recorder,
+    outside: OutsideEnds,
+    total_ticks: u64,
+    recording_bytes: u64,
+    max_unrecorded_ticks: u64,
+    plan: &'a Plan,
+    stop_flags: StopFlags,
+    lease: Arc<ArmLease>,
+}
+
+impl PreparedRun<'_> {
+    /// Runs to the end, or until the run is stopped.
+    fn supervise(
+        self,
+        rig: &mut LiveRig,
+        watch: &mut dyn FnMut(u64, u64),
+    ) -> Result<Run, RunError> {
+        let OutsideEnds {
+            requests,
+            records,
+            progress,
+            retired: _until_the_end,
+        } = self.outside;
+        let path = self.recorder.path().to_path_buf();
+        let disk = DiskWatch::of(&path, self.recording_bytes).map_err(RunError::Create)?;
+        let recorder = recording::spawn(self.recorder, records, disk).map_err(RunError::Create)?;
+        let mut supervisor = Supervisor {
+            requests,
+            lease: self.lease,
+            health: recorder.health(),
+            progress: Arc::clone(&progress),
+            max_unrecorded_ticks: self.max_unrecorded_ticks,
+            cause: None,
+        };
+        let total_ticks = self.total_ticks;
+        let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
+        let ended = supervisor.run_to_end(&mut rig.live, self.run, &self.stop_flags, report)?;
+        let recorder = recorder.join()?;
+        let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
+        Ok(Run {
+            path,
+            pace: rig.pace,
+            scheduling: rig.live.scheduling().clone(),
+            stop_cause: supervisor
+                .cause
+                .or(ended.stopped_by.and_then(StopCause::by)),
+            ended,
+            motor: self.plan.motor.clone(),
+            recorder,
+        })
+    }
+}
+
+/// Requests to arm and to start, queued before the loop begins: they take effect at tick 0.
+fn queue_start(requests: &mut RequestSender, program: Box<dyn Program>) {
+    for request in [Request::Arm, Request::Start(program)] {
+        // The ring is empty and holds more than two requests.
+        let _ = requests.send(request);
+    }
+}
+
+/// A run of a plan, with its interlocks and the heat of the motor.
+pub(super) fn servo_run(plan: &Plan, connections: Connections) -> ServoRun {
+    let interlocks = interlocks(&plan.config).with_thermal_state(plan.motor.thermal_a2);
+    ServoRun::new(interlocks, connections)
+}
+
+fn interlocks(config: &Config) -> Interlocks {
+    Interlocks::new(
+        &config.interlock,
+        &config.amplifier,
+        &config.motor,
+        &config.servo,
+    )
+}
+
+/// The arm lease of a run. In virtual pace, ticks do not measure the time of the supervisor.
+fn lease_watch(plan: &Plan, pace: Pace, lease: &Arc<ArmLease>) -> Option<LeaseWatch> {
+    match pace {
+        Pace::Virtual => None,
+        Pace::Realtime => {
+            let limit_ticks = plan.config.servo.arm_lease_ticks();
+            Some(LeaseWatch::new(Arc::clone(lease), limit_ticks))
+        }
+    }
+}
+
+/// Ticks for which the readings are judged before the amplifier is enabled. A simulated stage has its readings from the first tick.
+fn healthy_ticks(servo: &LoopSettings, pace: Pace) -> u64 {
+    let default_s = match pace {
+        Pace::Realtime => HEALTHY_S,
+        Pace::Virtual => 0.0,
+    };
+    libm::round(servo.healthy_s.unwrap_or(default_s) * servo.rate_hz) as u64
+}
+
+fn tail_ticks(plan: &Plan) -> u64 {
+    (TAIL_S * plan.config.servo.rate_hz) as u64
+}
