@@ -43,6 +43,17 @@ impl ClosedLoop {
         })
     }
 
+    /// The loop of another control law around the same plant.
+    ///
+    /// # Errors
+    /// The law offers no [`LinearLaw`].
+    pub fn with_design(
+        self,
+        design: Box<dyn ControlDesign>,
+    ) -> Result<ClosedLoop, ControllerError> {
+        ClosedLoop::new(self.plant, self.modes, self.force_constant_n_per_a, design)
+    }
+
     /// Hold, amplifier, modes, delays and the probe's rate.
     pub fn plant(&self) -> &LoopPlant {
         &self.plant

@@ -17,6 +17,20 @@ pub struct LawInput {
     pub applied_a: f64,
 }
 
+impl LawInput {
+    /// The input with which a law gives `gain` times the loop gain: y' = r - gain (r - y). A law of the error alone receives gain
+    /// times the error; the input of a law at rest, r = y, does not change.
+    pub fn with_gain(self, gain: f64) -> LawInput {
+        if gain == 1.0 {
+            return self; // without rounding
+        }
+        LawInput {
+            position_m: self.reference_m - gain * (self.reference_m - self.position_m),
+            ..self
+        }
+    }
+}
+
 /// A control law in the loop: one command per tick.
 ///
 /// Sign convention: positive current moves the stage in the positive direction, so that u = C (r - y) has a positive gain.

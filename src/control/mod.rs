@@ -28,6 +28,7 @@ mod section;
 mod state_space;
 mod step_metrics;
 mod swept;
+mod tuned;
 
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::ClosedLoop;
@@ -42,3 +43,4 @@ pub use section::{Section, SectionError};
 pub use state_space::StateSpace;
 pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};
+pub use tuned::TunedDesign;

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, Sender, channel};
 
 use bench_hal::Rig;
 
@@ -21,6 +22,7 @@ use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo_run::{Connections, ServoRun};
 use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use crate::rt::thread::Pace;
+use crate::rt::tuning::Tune;
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
@@ -35,6 +37,7 @@ const HEALTHY_S: f64 = 0.02;
 pub struct LiveRig {
     live: LiveLoop,
     pace: Pace,
+    tunes: (Sender<Tune>, Receiver<Tune>),
 }
 
 impl LiveRig {
@@ -48,7 +51,14 @@ impl LiveRig {
         let idle = ServoRun::new(interlocks(config), unrecorded);
         let live = LiveLoop::open(rig, Box::new(idle), &config.servo, pace);
         let live = live.map_err(RunError::system("start the thread of the loop"))?;
-        Ok(LiveRig { live, pace })
+        let tunes = channel();
+        Ok(LiveRig { live, pace, tunes })
+    }
+
+    /// Changes the reference or the loop gain of the run in progress. Whoever sends a change must have checked it with
+    /// [`check_tune`](super::check_tune). What is sent between runs is discarded.
+    pub fn tuner(&self) -> Sender<Tune> {
+        self.tunes.0.clone()
     }
 
     /// Runs `plan` and records it in `folder`. `watch` is called periodically with the number of completed ticks and of all ticks.
@@ -144,7 +154,9 @@ impl PreparedRun<'_> {
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: self.max_unrecorded_ticks,
             cause: None,
+            tunes: &rig.tunes.1,
         };
+        supervisor.discard_tunes();
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
         let ended = supervisor.run_to_end(&mut rig.live, self.run, &self.stop_flags, report)?;

@@ -46,6 +46,7 @@ mod signal_builder;
 mod signals;
 mod swept_reference;
 mod tracking;
+mod tune_check;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 pub use analysis::{Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress};
@@ -72,3 +73,4 @@ pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};
 pub use signals::{StopSignals, abandon_on_signal, stop_on_signal, survive_file_size_limit};
 pub use tracking::{TrackingMetrics, tracking_metrics};
+pub use tune_check::{TuneRefusal, check_tune};

@@ -12,6 +12,7 @@ use crate::rig::motor::{
 };
 use crate::rig::simulated;
 use crate::rt::program::ProgramInput;
+use crate::rt::tuning::Factors;
 
 /// A waiting run starts when the state is this ratio of the largest allowed one: the currents of a run differ slightly from the
 /// predicted ones.
@@ -189,6 +190,7 @@ pub(super) fn predict(plan: &Plan, start_a2: f64) -> Result<HeatPrediction, Expe
             tick,
             position_m: plant.reading_m(&state),
             applied_a,
+            factors: Factors::default(),
         };
         applied_a = program.decide(&input).requested_a;
         plant.step(&mut state, applied_a);

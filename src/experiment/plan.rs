@@ -156,6 +156,11 @@ impl Plan {
         })
     }
 
+    /// Text of the file of the reference, if it has one.
+    pub(super) fn reference_file(&self) -> Option<&str> {
+        self.reference.as_deref()
+    }
+
     /// The run as described in the file name of its recording: `chirp`, `prbs`, `control-fast-step`.
     pub fn label(&self) -> String {
         let config = &self.config;

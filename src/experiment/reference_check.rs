@@ -30,7 +30,25 @@ pub(super) fn check(
         return Ok(());
     }
     let ticks = context.ticks(config.control.duration_s);
-    check_loop(config, &closed_loop, &*design.build(&context)?, ticks)
+    let reference = design.build(&context)?;
+    check_loop(config, &closed_loop, &*reference, ticks, 1.0)
+}
+
+/// Refuses the reference of `config`, scaled by a factor, in a given loop. The whole reference is predicted, from rest.
+pub(super) fn check_tuned(
+    config: &Config,
+    closed_loop: &ClosedLoop,
+    file: Option<&str>,
+    reference_factor: f64,
+) -> Result<(), PlanError> {
+    let context = ReferenceContext {
+        chirp: &config.chirp,
+        period_s: config.servo.period_s(),
+        file,
+    };
+    let reference = config.control.reference.design().build(&context)?;
+    let ticks = context.ticks(config.control.duration_s);
+    check_loop(config, closed_loop, &*reference, ticks, reference_factor)
 }
 
 /// Refuses a reference with which the loop would trip an interlock within `ticks`.
@@ -39,9 +57,10 @@ fn check_loop(
     closed_loop: &ClosedLoop,
     reference: &dyn Reference,
     ticks: u64,
+    reference_factor: f64,
 ) -> Result<(), PlanError> {
     let ticks = ticks.min(PREDICTED_TICKS) as usize;
-    let signals = closed_loop.signals(ticks, |tick| reference.at_m(tick as u64));
+    let signals = closed_loop.signals(ticks, |tick| reference_factor * reference.at_m(tick as u64));
     let limits = without_slew(config.excitation_limits());
     let extremes = Extremes::over(signals, &limits);
     let setting = "the values of the reference, or its slope";

@@ -179,6 +179,7 @@ impl Replay {
             RequestKind::Finish => Some(Request::Finish),
             RequestKind::Stop => Some(Request::Stop),
             RequestKind::Clear => Some(Request::Clear),
+            RequestKind::Tune(tune) => Some(Request::Tune(tune)),
         };
         if let Some(request) = request {
             // The loop empties the ring in every tick.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::mpsc::Receiver;
 use std::task::Poll;
 use std::time::Duration;
 
@@ -14,12 +15,13 @@ use crate::rt::record::Origin;
 use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo_run::{Progress, RunOutcome, ServoRun};
 use crate::rt::supervision::{ArmLease, StopFlags};
+use crate::rt::tuning::Tune;
 
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
 /// Watches the loop from outside: progress and the state of the recorder. It renews the arm lease.
-pub(super) struct Supervisor {
+pub(super) struct Supervisor<'a> {
     pub(super) requests: RequestSender,
     pub(super) lease: Arc<ArmLease>,
     pub(super) health: Arc<Health>,
@@ -27,9 +29,11 @@ pub(super) struct Supervisor {
     pub(super) max_unrecorded_ticks: u64,
     /// Why it has requested the end of the run, if it has.
     pub(super) cause: Option<StopCause>,
+    /// Changes of the run, to be passed on to the loop.
+    pub(super) tunes: &'a Receiver<Tune>,
 }
 
-impl Supervisor {
+impl Supervisor<'_> {
     /// Begins a run and waits for its end. Signals reach the loop without this thread. Afterwards the run is freed, so that the
     /// recorder receives its end.
     ///
@@ -51,10 +55,27 @@ impl Supervisor {
             self.lease.renew();
             watch();
             self.watch_recording();
+            self.pass_on_tunes();
             if let Poll::Ready(ended) = live.poll_end() {
                 return Ok(ended.map(|run| outcome(&run)));
             }
             std::thread::sleep(SUPERVISION_PERIOD);
+        }
+    }
+
+    /// Discards the changes that were sent before the run.
+    pub(super) fn discard_tunes(&self) {
+        while self.tunes.try_recv().is_ok() {}
+    }
+
+    /// Passes changes on to the loop. Without room for the request it is discarded: a later change replaces it in any case.
+    fn pass_on_tunes(&mut self) {
+        while let Ok(tune) = self.tunes.try_recv() {
+            if self.requests.send(Request::Tune(tune)).is_err() {
+                tracing::warn!(
+                    "a change of the run was discarded, because the loop has too many requests; send it again"
+                );
+            }
         }
     }
 
@@ -114,6 +135,7 @@ mod tests {
                 max_unrecorded_ticks: 5000,
                 lease: Arc::default(),
                 cause: None,
+                tunes: &std::sync::mpsc::channel().1,
             };
             supervisor.watch_recording();
             assert!(
@@ -166,6 +188,7 @@ mod tests {
             max_unrecorded_ticks: 5000,
             lease: Arc::default(),
             cause: None,
+            tunes: &std::sync::mpsc::channel().1,
         };
         progress.unrecorded_ticks.store(4999, Ordering::Relaxed);
         supervisor.watch_recording();

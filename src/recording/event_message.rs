@@ -4,6 +4,7 @@
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
 use crate::rt::record::{ClockTimes, Event, EventKind, Origin, Refusal, RequestEvent, RequestKind};
+use crate::rt::tuning::{Factors, Tune};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {
@@ -31,14 +32,46 @@ fn message(kind: &str, text: String) -> Message {
 }
 
 fn of_request(request: RequestEvent) -> Message {
-    let found = REQUESTS.into_iter().find(|(kind, _)| *kind == request.kind);
-    let name = found.map_or("", |(_, name)| name);
-    Message {
+    let name = request_name(request.kind);
+    let message = Message {
         order: name.into(),
         id: request.id,
         refusal: request.refusal.map_or("", Refusal::name).into(),
         origin: origin_name(request.origin).into(),
         ..message("order", format!("order: {name}"))
+    };
+    match request.kind {
+        RequestKind::Tune(tune) => with_tune(message, &tune),
+        RequestKind::Arm
+        | RequestKind::Start
+        | RequestKind::Finish
+        | RequestKind::Stop
+        | RequestKind::Clear => message,
+    }
+}
+
+fn with_tune(message: Message, tune: &Tune) -> Message {
+    let Factors { reference, gain } = tune.factors();
+    let ramp_ticks = tune.ramp_ticks();
+    Message {
+        text: format!(
+            "order: tune the reference to {reference} and the gain to {gain} times within {ramp_ticks} ticks"
+        ),
+        reference_factor: Some(reference),
+        gain_factor: Some(gain),
+        ramp_ticks,
+        ..message
+    }
+}
+
+fn request_name(kind: RequestKind) -> &'static str {
+    match kind {
+        RequestKind::Arm => "arm",
+        RequestKind::Start => "start",
+        RequestKind::Finish => "finish",
+        RequestKind::Stop => "stop",
+        RequestKind::Clear => "clear",
+        RequestKind::Tune(_) => "tune",
     }
 }
 
@@ -89,14 +122,6 @@ fn of_clock(times: ClockTimes) -> Message {
     }
 }
 
-const REQUESTS: [(RequestKind, &str); 5] = [
-    (RequestKind::Arm, "arm"),
-    (RequestKind::Start, "start"),
-    (RequestKind::Finish, "finish"),
-    (RequestKind::Stop, "stop"),
-    (RequestKind::Clear, "clear"),
-];
-
 impl TryFrom<&Message> for Event {
     type Error = UnknownValue;
 
@@ -127,15 +152,33 @@ impl TryFrom<&Message> for Event {
 }
 
 fn request(message: &Message) -> Result<RequestEvent, UnknownValue> {
-    let name = message.order.as_str();
-    let found = REQUESTS.into_iter().find(|(_, other)| *other == name);
-    let kind = found.map(|(kind, _)| kind);
     Ok(RequestEvent {
         id: message.id,
-        kind: kind.ok_or_else(|| unknown("order", name))?,
+        kind: request_kind(message)?,
         refusal: refusal(&message.refusal)?,
         origin: origin(&message.origin)?,
     })
+}
+
+fn request_kind(message: &Message) -> Result<RequestKind, UnknownValue> {
+    match message.order.as_str() {
+        "arm" => Ok(RequestKind::Arm),
+        "start" => Ok(RequestKind::Start),
+        "finish" => Ok(RequestKind::Finish),
+        "stop" => Ok(RequestKind::Stop),
+        "clear" => Ok(RequestKind::Clear),
+        "tune" => Ok(RequestKind::Tune(tune(message)?)),
+        other => Err(unknown("order", other)),
+    }
+}
+
+fn tune(message: &Message) -> Result<Tune, UnknownValue> {
+    let factors = Factors {
+        reference: message.reference_factor.unwrap_or(f64::NAN),
+        gain: message.gain_factor.unwrap_or(f64::NAN),
+    };
+    let tune = Tune::new(factors, message.ramp_ticks);
+    tune.map_err(|error| unknown("order", error))
 }
 
 /// Empty for the supervisor, as in recordings of older versions.

@@ -119,7 +119,7 @@ messages! {
         field "2" (string) kind,
         /// Readable text, for every kind.
         field "3" (string) text,
-        /// Of an order: `arm`, `start`, `finish`, `stop` or `clear`.
+        /// Of an order: `arm`, `start`, `finish`, `stop`, `clear` or `tune`.
         field "4" (string) order,
         /// Of a state: the state before.
         field "5" (string) from,
@@ -149,6 +149,12 @@ messages! {
         field "17" (uint64) wall_ns,
         /// Of an order: who gave it, if it was not the supervisor: `signal` or `lease`.
         field "18" (string) origin,
+        /// Of the order `tune`: the factor of the reference.
+        field "19" (double, optional) reference_factor,
+        /// Of the order `tune`: the factor of the loop gain.
+        field "20" (double, optional) gain_factor,
+        /// Of the order `tune`: length of the ramp in ticks.
+        field "21" (uint64) ramp_ticks,
     }
     /// A summary of up to one second of scheduled time, on channel `/timing`.
     Timing {

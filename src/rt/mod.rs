@@ -10,7 +10,7 @@
 //! [`servo`] is the loop itself, [`servo_run`] what belongs to one run of it, [`live_loop`] its thread, which serves runs as long as
 //! the rig is open, [`thread`] how the system schedules it. [`interlock`] and [`arming`] are its safety, [`settling`] the end of a
 //! run, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
-//! [`supervision`] what ends a run without a request.
+//! [`supervision`] what ends a run without a request, [`tuning`] what changes a run in progress.
 
 pub mod arming;
 pub mod clock;
@@ -27,3 +27,4 @@ pub mod settling;
 pub mod supervision;
 pub mod thread;
 mod trip;
+pub mod tuning;

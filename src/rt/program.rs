@@ -3,6 +3,7 @@
 //! A program is made before the run and passed to the loop as a whole. Its decisions depend on the tick of its run and
 //! the signals of [`ProgramInput`] alone, so that a recording can be replayed.
 
+use super::tuning::Factors;
 use crate::control::{ControlLaw, LawInput};
 use crate::excitation::{Excitation, Reference};
 
@@ -15,6 +16,8 @@ pub struct ProgramInput {
     pub position_m: f64,
     /// Current in amperes that the amplifier gave for the previous tick.
     pub applied_a: f64,
+    /// Factors of reference and loop gain.
+    pub factors: Factors,
 }
 
 /// Output of a program in a tick.
@@ -46,6 +49,11 @@ pub trait Program: Send {
 
     /// Length of the run in ticks. Called in the tick: must not allocate or block.
     fn ticks(&self) -> u64;
+
+    /// Whether the program applies [`ProgramInput::factors`]. Called in the tick: must not allocate or block.
+    fn is_tunable(&self) -> bool {
+        false
+    }
 }
 
 /// Drives the motor with an excitation, independently of the position.
@@ -110,14 +118,15 @@ impl Control {
 
     /// A tick in closed loop. `relative_m`: the reference in metres from the rest position.
     fn closed(&mut self, input: &ProgramInput, relative_m: f64) -> Decision {
+        let factors = input.factors;
         let law_input = LawInput {
-            reference_m: self.rest_m + relative_m,
+            reference_m: self.rest_m + factors.reference * relative_m,
             position_m: input.position_m,
             applied_a: input.applied_a,
         };
         Decision {
             reference_m: law_input.reference_m,
-            requested_a: self.law.update(&law_input),
+            requested_a: self.law.update(&law_input.with_gain(factors.gain)),
             active: true,
         }
     }
@@ -145,5 +154,9 @@ impl Program for Control {
 
     fn ticks(&self) -> u64 {
         self.settle_ticks + self.closed_ticks
+    }
+
+    fn is_tunable(&self) -> bool {
+        true
     }
 }

@@ -4,6 +4,7 @@
 use bench_hal::Validity;
 
 use super::arming::{State, Trip};
+use super::tuning::Tune;
 
 /// All signals of one tick, taken together.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -109,7 +110,7 @@ pub struct ClockTimes {
 pub const REQUESTS_PER_TICK: usize = 16;
 
 /// Requests, as they appear in a recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RequestKind {
     /// Enable the amplifier.
     Arm,
@@ -121,10 +122,12 @@ pub enum RequestKind {
     Stop,
     /// The operator clears a trip.
     Clear,
+    /// Change reference or loop gain of the run along a ramp.
+    Tune(Tune),
 }
 
 /// The answer of the loop to a request.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestEvent {
     /// Number of a request of the supervisor, from 1; 0 for another origin, and in recordings of older versions.
     pub id: u64,
@@ -161,16 +164,19 @@ pub enum Refusal {
     NoTrip,
     /// The loop has tripped; the trip must be cleared first.
     Tripped,
+    /// The program has no reference and no loop gain.
+    NotTunable,
 }
 
 impl Refusal {
     /// All refusals.
-    pub const ALL: [Refusal; 5] = [
+    pub const ALL: [Refusal; 6] = [
         Refusal::NotDisarmed,
         Refusal::NotArmed,
         Refusal::NoRun,
         Refusal::NoTrip,
         Refusal::Tripped,
+        Refusal::NotTunable,
     ];
 
     /// The name used in recordings.
@@ -181,6 +187,7 @@ impl Refusal {
             Refusal::NoRun => "no_run",
             Refusal::NoTrip => "no_trip",
             Refusal::Tripped => "tripped",
+            Refusal::NotTunable => "not_tunable",
         }
     }
 }

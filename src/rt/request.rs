@@ -6,6 +6,7 @@ use rtrb::{Consumer, Producer, PushError, RingBuffer};
 use super::arming::{State, Transition};
 use super::program::Program;
 use super::record::{Refusal, RequestKind};
+use super::tuning::Tune;
 
 /// A request to the loop, taken at the start of a tick. Its content is complete and immutable.
 pub enum Request {
@@ -19,6 +20,8 @@ pub enum Request {
     Stop,
     /// The operator clears a trip.
     Clear,
+    /// Change reference or loop gain of the run along a ramp.
+    Tune(Tune),
 }
 
 impl Request {
@@ -30,6 +33,7 @@ impl Request {
             Request::Finish => RequestKind::Finish,
             Request::Stop => RequestKind::Stop,
             Request::Clear => RequestKind::Clear,
+            Request::Tune(tune) => RequestKind::Tune(*tune),
         }
     }
 }
@@ -88,6 +92,7 @@ impl RequestKind {
             ),
             RequestKind::Stop => return None,
             RequestKind::Clear => (allows(Transition::Clear), Refusal::NoTrip),
+            RequestKind::Tune(_) => (state == State::Running, Refusal::NoRun),
         };
         match (is_accepted, state) {
             (true, _) => None,

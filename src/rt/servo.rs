@@ -15,6 +15,7 @@ use super::request::NumberedRequest;
 pub use super::request::Request;
 use super::servo_run::{Connections, Enabling, ServoRun};
 use super::settling::{Settling, SettlingStep};
+use super::tuning::{Factors, Tune, Tuning};
 
 /// The current is unknown if the driver returns a value that is not finite.
 const NOT_FINITE: DeviceError = DeviceError {
@@ -158,6 +159,7 @@ impl Servo {
             tick: self.run.program_tick,
             position_m: reading.position_m,
             applied_a: self.run.applied_a,
+            factors: self.factors(),
         };
         match (self.state, &mut self.run.program) {
             (State::Running, Some(program)) => program.decide(&input),
@@ -168,6 +170,14 @@ impl Servo {
                 self.run.requested_a,
             ),
             _ => Decision::default(),
+        }
+    }
+
+    /// The factors of reference and loop gain in this tick.
+    fn factors(&mut self) -> Factors {
+        match self.runs() {
+            true => self.run.tuning.next(),
+            false => Factors::default(),
         }
     }
 
@@ -314,6 +324,9 @@ impl Servo {
         let waits = self.state == State::Enabling && self.run.program.is_some();
         match kind {
             RequestKind::Start if waits => Some(Refusal::NotArmed),
+            RequestKind::Tune(_) if self.state == State::Running && !self.is_tunable() => {
+                Some(Refusal::NotTunable)
+            }
             _ => kind.refusal(self.state),
         }
     }
@@ -357,6 +370,18 @@ impl Servo {
             Request::Finish => self.finish(tick),
             Request::Stop => self.switch_off(Transition::Stop, tick),
             Request::Clear => self.clear(tick),
+            Request::Tune(tune) => self.tune(tune),
+        }
+    }
+
+    fn is_tunable(&self) -> bool {
+        let program = self.run.program.as_ref();
+        program.is_some_and(|program| program.is_tunable())
+    }
+
+    fn tune(&mut self, tune: Tune) {
+        if self.state == State::Running && self.is_tunable() {
+            self.run.tuning.begin(tune);
         }
     }
 
@@ -444,6 +469,7 @@ impl Servo {
     fn begin_run(&mut self, tick: u64) {
         self.change(Transition::Start, tick);
         (self.run.program_tick, self.run.completed, self.run.trip) = (0, false, None);
+        self.run.tuning = Tuning::default();
     }
 
     /// Zero current in this tick, amplifier disabled, the reason published.

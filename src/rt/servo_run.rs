@@ -14,6 +14,7 @@ use super::record::Origin;
 use super::request::NumberedRequest;
 use super::settling::Settling;
 use super::supervision::{LeaseWatch, StopFlags, Supervision};
+use super::tuning::Tuning;
 use crate::rig::calibration::Correction;
 
 /// Progress of a running loop, for other threads.
@@ -47,6 +48,7 @@ pub struct ServoRun {
     /// Length of each of the two ramps to zero current in ticks; without ramps if 0.
     pub(super) ramp_ticks: u64,
     pub(super) settling: Settling,
+    pub(super) tuning: Tuning,
     pub(super) supervision: Supervision,
     pub(super) stopped_by: Option<Origin>,
     /// Current in amperes that the program requested in the last tick.
@@ -101,6 +103,7 @@ impl ServoRun {
             program_tick: 0,
             ramp_ticks: 0,
             settling: Settling::new(0),
+            tuning: Tuning::default(),
             supervision: Supervision::default(),
             stopped_by: None,
             requested_a: 0.0,

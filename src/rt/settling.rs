@@ -75,7 +75,7 @@ impl Settling {
 }
 
 /// The factor after `tick` of `ticks` ticks: near 1 at first, 0 at the end.
-fn ramp(tick: u64, ticks: u64) -> f64 {
+pub(super) fn ramp(tick: u64, ticks: u64) -> f64 {
     if tick >= ticks {
         return 0.0;
     }

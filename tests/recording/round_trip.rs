@@ -7,6 +7,7 @@ use bench::rt::record::{
     ClockTimes, Event, EventKind, LoopMessage, Origin, Refusal, RequestEvent, RequestKind,
     TickRecord,
 };
+use bench::rt::tuning::{Factors, Tune};
 use bench_hal::Validity;
 
 use crate::common::{
@@ -135,12 +136,17 @@ fn events_of_every_kind_round_trip_in_order() {
         State::Running,
         State::Tripped,
     ];
+    let factors = Factors {
+        reference: -0.1,
+        gain: 1.0 / 3.0,
+    };
     let orders = [
         RequestKind::Arm,
         RequestKind::Start,
         RequestKind::Finish,
         RequestKind::Stop,
         RequestKind::Clear,
+        RequestKind::Tune(Tune::new(factors, 500).expect("within the limits")),
     ];
     let refusals = [
         None,
@@ -149,6 +155,7 @@ fn events_of_every_kind_round_trip_in_order() {
         Some(Refusal::NoRun),
         Some(Refusal::NoTrip),
         Some(Refusal::Tripped),
+        Some(Refusal::NotTunable),
     ];
     let origins = [Origin::Supervisor, Origin::Signal, Origin::Lease];
     let answers = orders.iter().flat_map(|&kind| {

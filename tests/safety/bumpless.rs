@@ -70,7 +70,7 @@ fn input(tick: u64, position_m: f64) -> ProgramInput {
     ProgramInput {
         tick,
         position_m,
-        applied_a: 0.0,
+        ..ProgramInput::default()
     }
 }
 

@@ -14,3 +14,4 @@ mod sequence_wrap;
 mod settling;
 mod supervision;
 mod trips;
+mod tune;

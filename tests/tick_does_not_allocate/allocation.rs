@@ -1,7 +1,9 @@
 //! No tick allocates.
 use assert_no_alloc::assert_no_alloc;
+use bench::experiment::Plan;
 use bench::rt::clock::TickTiming;
 use bench::rt::servo::Request;
+use bench::rt::tuning::{Factors, Tune};
 use bench_hal::Tick;
 
 use crate::programs::programs;
@@ -79,6 +81,26 @@ fn requests_do_not_allocate_and_programs_are_freed_outside_the_tick() {
         test_loop.collect();
     }
     assert!(test_loop.commands >= 20, "{}", test_loop.commands);
+}
+
+#[test]
+fn a_change_of_reference_and_gain_does_not_allocate() {
+    let plan = Plan::control(stage()).expect("a plan");
+    let program = plan.program().expect("a program");
+    let mut test_loop = TestLoop::running(&plan.config, &[], program);
+    for number in 0..6000_u32 {
+        if number % 500 == 499 {
+            let factors = Factors {
+                reference: 0.5,
+                gain: 1.0 + 1e-4 * f64::from(number),
+            };
+            let tune = Tune::new(factors, 300).expect("within the limits");
+            test_loop.request(Request::Tune(tune));
+        }
+        assert_no_alloc(|| test_loop.bare_tick(0));
+        test_loop.collect();
+    }
+    assert!(test_loop.commands > 1000, "{}", test_loop.commands);
 }
 
 #[test]
