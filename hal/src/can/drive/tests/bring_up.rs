@@ -1,6 +1,7 @@
 //! Tests: from power-on to current and back, and the drives and settings that are rejected.
 
 use super::super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
+use super::super::super::emulator::DeviceFault;
 use super::super::super::scale::Reference;
 use super::*;
 
@@ -361,6 +362,26 @@ fn closing_leaves_the_drive_off_and_without_heartbeat_monitoring() {
         "it does not miss us"
     );
     assert_eq!(device.nmt_state(), nmt::State::PreOperational);
+}
+
+#[test]
+fn closing_keeps_the_heartbeat_monitoring_of_a_drive_that_does_not_confirm() {
+    let Rig {
+        mut drive,
+        world,
+        device,
+        _running,
+    } = rig(ASYNCHRONOUS);
+    crate::blocking::enable(&mut drive, |time| world.sleep(time)).unwrap();
+    drive.command(1.0).unwrap();
+    world.sleep(Duration::from_millis(1));
+    device.lock().unwrap().inject(DeviceFault::CommandsIgnored);
+    drop(drive);
+    // 70 ms of 0x1016 are the last means: without them the current would remain.
+    let monitored = device.lock().unwrap().read(Address::new(0x1016, 1));
+    assert_eq!(monitored, 0x7F << 16 | 70);
+    world.sleep(Duration::from_millis(75));
+    assert_eq!(device.lock().unwrap().current_a(), 0.0);
 }
 
 #[test]

@@ -1,7 +1,8 @@
 //! Every fault: detected within the time in the settings, current zero, and usable again after the operator clears it.
 
-use super::super::super::bus::{BusError, Condition};
+use super::super::super::bus::{BusError, Condition, Port};
 use super::super::super::emulator::DeviceFault;
+use super::super::super::frame::Id;
 use super::*;
 
 /// A rig that is enabled and has commanded 1 A for 50 ms.
@@ -369,6 +370,31 @@ fn a_fault_that_persists_is_not_cleared() {
         "the cause, not the attempt"
     );
     assert_recovers(&mut rig);
+}
+
+#[test]
+fn a_drive_that_restarted_is_configured_again_although_it_is_operational() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Reset);
+    rig.sleep_ms(5);
+    rig.device().inject(DeviceFault::None);
+    let mut other_master = rig.world.endpoint(&[Id::standard(0x7FF)]).unwrap();
+    other_master.send(&nmt::Command::Start.frame(5)).unwrap();
+    rig.sleep_ms(50);
+    assert_eq!(rig.device().nmt_state(), nmt::State::Operational);
+    assert_eq!(rig.device().read(HEARTBEAT_CONSUMER), 0);
+    assert_recovers(&mut rig);
+    assert_eq!(rig.device().read(HEARTBEAT_CONSUMER), 0x7F << 16 | 70);
+}
+
+#[test]
+fn a_drive_that_did_not_restart_is_not_configured_again() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Drive(0x2310));
+    rig.sleep_ms(5);
+    let mut listener = rig.world.endpoint(&[Id::standard(0x605)]).unwrap();
+    assert_recovers(&mut rig);
+    assert_eq!(listener.receive(Duration::ZERO), Ok(None), "an SDO request");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod any_frames;
 mod bring_up;
 mod failing;
+mod monitor;
 
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
