@@ -258,6 +258,39 @@ mod tests {
     }
 
     #[test]
+    fn bits_of_the_statusword_match_cia_402() {
+        assert_eq!((REMOTE, FOLLOWS_TARGET), (0x0200, 0x1000));
+    }
+
+    #[test]
+    fn power_stage_may_give_current_in_three_states_only() {
+        let may_give = |state: &State| !state.is_off();
+        let states: Vec<State> = ALL.into_iter().filter(may_give).collect();
+        let [enabled, quick_stop, reaction] = states[..] else {
+            panic!("{states:?}")
+        };
+        assert_eq!(enabled, State::OperationEnabled);
+        assert_eq!(quick_stop, State::QuickStopActive);
+        assert_eq!(reaction, State::FaultReactionActive);
+    }
+
+    #[test]
+    fn states_have_the_names_of_cia_402() {
+        let names = ALL.map(|state| (state.bits(), state.name()));
+        let expected = [
+            (0x00, "not ready to switch on"),
+            (0x40, "switch on disabled"),
+            (0x21, "ready to switch on"),
+            (0x23, "switched on"),
+            (0x27, "operation enabled"),
+            (0x07, "quick stop active"),
+            (0x0F, "fault reaction active"),
+            (0x08, "fault"),
+        ];
+        assert_eq!(names, expected);
+    }
+
+    #[test]
     fn enabling_and_disabling_never_reset_a_fault() {
         assert_eq!(State::Fault.towards_enabled(), None);
         assert!(
