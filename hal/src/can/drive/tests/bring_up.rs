@@ -1,7 +1,9 @@
 //! Tests: from power-on to current and back, and the drives and settings that are rejected.
 
+use super::super::super::bus::Port;
 use super::super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
 use super::super::super::emulator::DeviceFault;
+use super::super::super::frame::Id;
 use super::super::super::scale::Reference;
 use super::*;
 
@@ -67,6 +69,22 @@ fn enabling_and_resetting_do_not_wait_in_the_calls_of_the_loop() {
         rig.sleep_ms(1); // the simulated thread of the reset runs to its end
         assert_eq!(rig.drive.poll_reset(), Poll::Ready(Ok(())));
         rig.enable().unwrap();
+    }
+}
+
+#[test]
+fn controlwords_are_sent_every_two_milliseconds_while_the_drive_is_enabled() {
+    let mut rig = rig(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::SetPointsIgnored);
+    let mut listener = rig.world.endpoint(&[Id::standard(0x205)]).unwrap();
+    rig.drive.begin_enable().unwrap();
+    // Two calls at each time, in ms.
+    for (pause_ms, sent) in [(0, 1), (1, 0), (1, 1), (1, 0), (4, 1), (1, 0)] {
+        rig.sleep_ms(pause_ms);
+        assert!(rig.drive.poll_enable().is_pending());
+        assert!(rig.drive.poll_enable().is_pending());
+        let frames = std::iter::from_fn(|| listener.receive(Duration::ZERO).unwrap());
+        assert_eq!(frames.count(), sent, "after {pause_ms} ms");
     }
 }
 
@@ -165,6 +183,18 @@ fn scales_a_target_in_per_mille_of_the_maximum() {
     assert!(
         (given_a - 167.0 * 6e-3).abs() < 1e-12 && (rig.device_current_a() - given_a).abs() < 1e-12
     );
+}
+
+#[test]
+fn states_identity_resolution_and_meaning_of_faults() {
+    let rig = rig(ASYNCHRONOUS);
+    let objects: [u32; 4] =
+        std::array::from_fn(|n| rig.device().read(Address::new(0x1018, n as u8 + 1)));
+    assert_eq!(objects[0], 0x402, "different from 0 and 1");
+    assert_eq!(rig.drive.identity(), objects.map(Some));
+    assert_eq!(rig.drive.step_a(), 0.004, "4 A in 1000 counts");
+    let lost = faults::HEARTBEAT_LOST;
+    assert_eq!(rig.drive.explain(lost), Some(fault_text(lost)));
 }
 
 #[test]

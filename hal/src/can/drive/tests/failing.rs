@@ -2,7 +2,7 @@
 
 use super::super::super::bus::{BusError, Condition, Port};
 use super::super::super::emulator::DeviceFault;
-use super::super::super::frame::Id;
+use super::super::super::frame::{CanFrame, Id};
 use super::*;
 
 /// A rig that is enabled and has commanded 1 A for 50 ms.
@@ -395,6 +395,61 @@ fn a_drive_that_did_not_restart_is_not_configured_again() {
     let mut listener = rig.world.endpoint(&[Id::standard(0x605)]).unwrap();
     assert_recovers(&mut rig);
     assert_eq!(listener.receive(Duration::ZERO), Ok(None), "an SDO request");
+}
+
+#[test]
+fn poll_without_a_reset_is_ready_with_the_fault() {
+    let mut rig = rig(ASYNCHRONOUS);
+    assert_eq!(rig.drive.poll_reset(), Poll::Ready(Ok(())));
+    rig.world.bus().inject_condition(Condition::BusOff);
+    rig.sleep_ms(1);
+    let bus_off = faults::device_error(faults::BUS_OFF);
+    assert_eq!(rig.drive.poll_reset(), Poll::Ready(Err(bus_off)));
+}
+
+#[test]
+fn a_reset_that_fails_is_a_fault_also_if_there_was_none() {
+    let mut rig = rig(ASYNCHRONOUS);
+    assert_eq!(rig.drive.last_error(), None);
+    let mut other_master = rig.world.endpoint(&[Id::standard(0x7FF)]).unwrap();
+    let leave = nmt::Command::EnterPreOperational.frame(5);
+    other_master.send(&leave).unwrap();
+    rig.sleep_ms(50);
+    assert_eq!(rig.drive.status(), AmplifierStatus::Disabled);
+    rig.device().inject(DeviceFault::CommandsIgnored);
+    let code = faults::NOT_CONFIGURED;
+    assert_eq!(rig.reset_fault().unwrap_err().code, i64::from(code));
+    assert_eq!(rig.drive.status(), AmplifierStatus::Fault(code));
+    let error = rig.drive.last_error().unwrap();
+    assert!(error.contains("node 5"), "{error}");
+    assert_recovers(&mut rig);
+}
+
+#[test]
+fn a_reset_needs_a_status_that_is_newer_than_its_beginning() {
+    let mut rig = rig(ASYNCHRONOUS);
+    rig.sleep_ms(20);
+    assert!(rig.drive.shared.statusword().is_some(), "an old status");
+    rig.device().inject(DeviceFault::ShortFrames);
+    let error = rig.reset_fault().unwrap_err();
+    assert_eq!(error.code, i64::from(faults::STATUS_LOST));
+    assert_recovers(&mut rig);
+}
+
+#[test]
+fn old_answers_do_not_disturb_a_reset() {
+    let mut rig = running(ASYNCHRONOUS);
+    rig.device().inject(DeviceFault::Reset);
+    rig.sleep_ms(5);
+    let mut other = rig.world.endpoint(&[Id::standard(0x7FF)]).unwrap();
+    // An abort for the first object that the configuration reads: 0x1018, sub 1 does not exist.
+    let abort = [0x80, 0x18, 0x10, 0x01, 0x00, 0x00, 0x02, 0x06];
+    for _ in 0..20 {
+        let answer = CanFrame::from_slice(Id::standard(0x585), &abort).unwrap();
+        other.send(&answer).unwrap();
+    }
+    rig.sleep_ms(5);
+    assert_recovers(&mut rig);
 }
 
 #[test]
