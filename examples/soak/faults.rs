@@ -37,6 +37,10 @@ pub struct Case {
 /// Time for a trip by the first bad reading, command or status, in seconds. A program starts 100 ticks after its request.
 const AT_ONCE_S: f64 = 0.05;
 
+/// A fault while the amplifier is enabled begins this time before the request to arm, in seconds. In real time the supervisor begins
+/// earlier than the first tick, by the time in which the thread of the loop is scheduled.
+const ENABLING_LEAD_S: f64 = 1.0;
+
 const fn case(injection: Injection, reason: &'static str, within_s: f64) -> Case {
     Case {
         injection,
@@ -77,12 +81,12 @@ pub const CASES: [Case; 21] = [
     case(
         Injection::Enabling(Fault::RefusedEnable(7)),
         "amplifier",
-        AT_ONCE_S,
+        ENABLING_LEAD_S + AT_ONCE_S,
     ),
     case(
         Injection::Enabling(Fault::FailedEnable(6)),
         "amplifier",
-        AT_ONCE_S,
+        ENABLING_LEAD_S + AT_ONCE_S,
     ),
     case(
         Injection::Program(|_| f64::NAN),
@@ -161,7 +165,7 @@ impl Schedule {
         let index = (self.seed.wrapping_add(number)) % CASES.len() as u64;
         let case = &CASES[index as usize];
         let at = match case.injection {
-            Injection::Enabling(_) => second_run,
+            Injection::Enabling(_) => second_run - (ENABLING_LEAD_S * self.rate_hz) as u64,
             Injection::Rig(_)
             | Injection::Program(_)
             | Injection::Both(..)

@@ -9,7 +9,7 @@ use std::time::Duration;
 use bench::config::Config;
 use bench::recording::{Header, Recorder, RecordingError};
 use bench::rt::arming::State;
-use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench::rt::record::{Event, EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
 use bench::rt::thread::Pace;
 use rtrb::Consumer;
 use tempfile::TempDir;
@@ -31,6 +31,8 @@ struct Observed {
     ticks_with_current: u64,
     ticks_with_wrong_current: u64,
     trips: Vec<(u64, &'static str)>,
+    /// Requests that were refused, or that the loop made itself.
+    unusual: Vec<(u64, RequestEvent)>,
 }
 
 /// The results of a soak.
@@ -184,6 +186,11 @@ impl Observed {
         match event.kind {
             EventKind::Completed => self.completed += 1,
             EventKind::Trip(trip) => self.trips.push((event.tick, trip.reason())),
+            EventKind::Request(request)
+                if request.refusal.is_some() || request.origin != Origin::Supervisor =>
+            {
+                self.unusual.push((event.tick, request));
+            }
             EventKind::Request(_)
             | EventKind::State { .. }
             | EventKind::Lost { .. }
@@ -199,8 +206,8 @@ impl Observed {
         if self.trips.len() != 1 || !self.trips.iter().all(is_expected) {
             let (reason, ticks) = (period.case.reason, &period.trip);
             return Some(format!(
-                "trips {:?} instead of one by {reason} in the ticks {ticks:?}",
-                self.trips
+                "trips {:?} instead of one by {reason} in the ticks {ticks:?}; requests {:?}",
+                self.trips, self.unusual
             ));
         }
         if self.completed != 1 || self.ticks_with_current == 0 {
