@@ -14,6 +14,7 @@
 //! | failure of | detected by | by |
 //! |---|---|---|
 //! | the loop (no more set-points) | the service thread | [`drive::DriveTimes::command_timeout`], [`vesc::VescSettings::command_timeout`] |
+//! | the service thread | the loop | the age of its last pass, 20 ms |
 //! | this process | the drive | its heartbeat consumer (0x1016) and abort connection option (0x6007) |
 //! | the drive's processor, its power | the service thread | heartbeat, boot-up message |
 //! | the drive's power stage | the service thread | EMCY, statusword |
@@ -30,6 +31,7 @@ pub mod emcy;
 pub mod emulator;
 pub mod frame;
 pub mod heartbeat;
+mod last_pass;
 pub mod nmt;
 mod objects;
 pub mod pdo;

@@ -17,6 +17,7 @@ use std::time::Duration;
 
 use super::bus::{BusError, BusEvent, CanBus, Claim, Condition, Host, Task, TaskHandle};
 use super::frame::{CanFrame, Id};
+use super::last_pass::LastPass;
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
 /// SET_CURRENT to `node`, in milliamperes.
@@ -68,9 +69,10 @@ const BUS_FAILED: u32 = 3;
 const NOT_ARMED: u32 = 4;
 const NOT_SENT: u32 = 5;
 const COMMANDS_STOPPED: u32 = 6;
+const THREAD_HUNG: u32 = 7;
 
 /// Code, meaning and remedy of each fault.
-const FAULTS: [(u32, &str, &str); 6] = [
+const FAULTS: [(u32, &str, &str); 7] = [
     (
         SILENT,
         "the VESC sends no STATUS",
@@ -96,6 +98,11 @@ const FAULTS: [(u32, &str, &str); 6] = [
         COMMANDS_STOPPED,
         "the loop sent no more commands and the current was switched off",
         "look for overruns, then clear the fault",
+    ),
+    (
+        THREAD_HUNG,
+        "the thread that monitors the VESC has not run for 20 ms",
+        "stop programs that use all processors, then clear the fault; if it remains, start the program again",
     ),
 ];
 
@@ -139,6 +146,8 @@ struct Shared {
     /// Number of STATUS frames.
     status_count: AtomicU32,
     current_tenths: AtomicI32,
+    /// Written by the thread. Without a recent pass its fields are outdated.
+    last_pass: LastPass,
 }
 
 impl Shared {
@@ -189,6 +198,7 @@ impl Vesc {
         let status = [status_id(settings.node)];
         let bus = host.endpoint(&status).map_err(|e| e.to_string())?;
         let shared = Arc::new(Shared::default());
+        shared.last_pass.set(host.now_ns());
         let watch = Watch {
             bus: host.endpoint(&status).map_err(|e| e.to_string())?,
             shared: Arc::clone(&shared),
@@ -225,8 +235,17 @@ impl Vesc {
         self.shared.is_on.load(Ordering::Acquire)
     }
 
-    fn no_fault(&self) -> Result<(), DeviceError> {
+    /// Code of the fault, 0 if there is none. If the thread of the driver hangs, the stored state is outdated, which is a fault as
+    /// well. Called in the tick: must not allocate or block.
+    fn fault(&self) -> u32 {
         match self.shared.fault.load(Ordering::Acquire) {
+            0 if self.shared.last_pass.is_overdue(self.host.now_ns()) => THREAD_HUNG,
+            code => code,
+        }
+    }
+
+    fn no_fault(&self) -> Result<(), DeviceError> {
+        match self.fault() {
             0 => Ok(()),
             code => Err(error(code)),
         }
@@ -281,7 +300,7 @@ impl CurrentAmplifier for Vesc {
     }
 
     fn status(&self) -> AmplifierStatus {
-        match self.shared.fault.load(Ordering::Acquire) {
+        match self.fault() {
             0 if self.is_on() => AmplifierStatus::Enabled,
             0 => AmplifierStatus::Disabled,
             code => AmplifierStatus::Fault(code),
@@ -491,6 +510,7 @@ impl Task for Watch {
         self.check_commands(now_ns);
         self.follow_use(now_ns); // a new fault ends the use at once
         self.ensure_zero(now_ns);
+        self.shared.last_pass.set(now_ns);
         received.map(|_| ())
     }
 }

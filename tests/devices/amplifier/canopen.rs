@@ -261,3 +261,40 @@ fn dropped_loop_leaves_the_drive_without_current() {
         drive.state()
     );
 }
+
+#[test]
+fn hung_service_thread_trips_the_loop_within_20_ms_in_every_state() {
+    // The limit is 20 ms, a step of the bus 0.1 ms; one more tick until the loop looks.
+    const HUNG: u64 = 22;
+    for run in [None, Some(Run::Chirp), Some(Run::Control)] {
+        let mut lab = Lab::new();
+        match run {
+            Some(run) => lab.run_until_current_flows(run),
+            None => lab.arm(),
+        }
+        let begin = lab.last_tick();
+        lab.host.set_hung("can-service", true);
+        let zero = lab.ticks_with_current(AFTER);
+        assert!(zero <= HUNG + SWITCH_OFF, "current for {zero} ticks");
+        assert!(!lab.drive.is_enabled(), "{}", lab.drive.state());
+        lab.assert_trip_with_code(SERVICE_HUNG, begin + 20..=begin + HUNG);
+        lab.host.set_hung("can-service", false);
+        lab.assert_next_run_completes();
+    }
+}
+
+#[test]
+fn hung_service_thread_prevents_arming() {
+    let mut lab = Lab::new();
+    lab.bench.run(50);
+    lab.host.set_hung("can-service", true);
+    lab.bench.run(50);
+    assert_eq!(lab.bench.state(), State::Disarmed);
+    lab.bench.request(Request::Arm);
+    lab.bench.run(1);
+    let at = lab.last_tick();
+    lab.assert_trip_with_code(SERVICE_HUNG, at..=at);
+    assert!(!lab.drive.is_enabled());
+    lab.host.set_hung("can-service", false);
+    lab.assert_next_run_completes();
+}

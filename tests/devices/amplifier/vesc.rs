@@ -37,3 +37,21 @@ fn every_vesc_fault_ends_the_current_in_time_and_the_next_run_completes() {
         }
     }
 }
+
+#[test]
+fn hung_thread_of_the_driver_trips_the_loop_within_20_ms() {
+    for run in [None, Some(Run::Chirp), Some(Run::Control)] {
+        let mut lab = Lab::of(config(&[VESC]));
+        match run {
+            Some(run) => lab.run_until_current_flows(run),
+            None => lab.arm(),
+        }
+        let begin = lab.last_tick();
+        lab.host.set_hung("can-vesc", true);
+        let zero = lab.ticks_with_current(100);
+        assert!(zero <= 22 + SWITCH_OFF, "current for {zero} ticks");
+        lab.assert_trip_with_code(7, begin + 20..=begin + 22);
+        lab.host.set_hung("can-vesc", false);
+        lab.assert_next_run_completes();
+    }
+}

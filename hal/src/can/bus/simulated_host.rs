@@ -14,8 +14,15 @@ use super::{
 
 const STEP_NS: u64 = 100_000;
 
-/// Each task with its stop flag. A task that is running, or has ended, is not in its slot.
-type Tasks = Vec<(Arc<AtomicBool>, Option<Box<dyn Task>>)>;
+/// A started task.
+struct Slot {
+    name: String,
+    stop: Arc<AtomicBool>,
+    /// Whether the task is skipped.
+    hangs: bool,
+    /// `None` while the task runs, and after its end.
+    task: Option<Box<dyn Task>>,
+}
 
 /// A host with a simulated clock; clones share bus and clock.
 #[derive(Clone, Default)]
@@ -27,13 +34,20 @@ pub struct SimulatedHost {
 struct Shared {
     bus: MemoryBus,
     now_ns: AtomicU64,
-    tasks: Mutex<Tasks>,
+    tasks: Mutex<Vec<Slot>>,
 }
 
 impl SimulatedHost {
     /// The bus.
     pub fn bus(&self) -> &MemoryBus {
         &self.shared.bus
+    }
+
+    /// Lets all tasks with this name hang, as if their threads were blocked, or continue.
+    pub fn set_hung(&self, name: &str, hangs: bool) {
+        let mut tasks = self.tasks();
+        let named = tasks.iter_mut().filter(|slot| slot.name == name);
+        named.for_each(|slot| slot.hangs = hangs);
     }
 
     /// Advances the time by one step, then each task. A task may sleep: the other tasks advance meanwhile.
@@ -51,23 +65,23 @@ impl SimulatedHost {
         }
     }
 
-    /// The task in a slot, unless it is running. A task that was stopped is dropped, after the list is unlocked.
+    /// The task in a slot, unless it is running or hangs. A task that was stopped is dropped, after the list is unlocked.
     fn take_task(&self, index: usize) -> Option<Box<dyn Task>> {
         let (is_stopped, task) = {
             let mut tasks = self.tasks();
-            let (stop, task) = tasks.get_mut(index)?;
-            (stop.load(Ordering::Acquire), task.take())
+            let slot = tasks.get_mut(index).filter(|slot| !slot.hangs)?;
+            (slot.stop.load(Ordering::Acquire), slot.task.take())
         };
         task.filter(|_| !is_stopped)
     }
 
     fn put_back(&self, index: usize, task: Box<dyn Task>) {
-        if let Some((_, slot)) = self.tasks().get_mut(index) {
-            *slot = Some(task);
+        if let Some(slot) = self.tasks().get_mut(index) {
+            slot.task = Some(task);
         }
     }
 
-    fn tasks(&self) -> std::sync::MutexGuard<'_, Tasks> {
+    fn tasks(&self) -> std::sync::MutexGuard<'_, Vec<Slot>> {
         self.shared
             .tasks
             .lock()
@@ -100,9 +114,14 @@ impl Host for SimulatedHost {
         }
     }
 
-    fn start(&self, _name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
+    fn start(&self, name: &str, task: Box<dyn Task>) -> std::io::Result<TaskHandle> {
         let running = TaskHandle::default();
-        self.tasks().push((Arc::clone(&running.stop), Some(task)));
+        self.tasks().push(Slot {
+            name: name.into(),
+            stop: Arc::clone(&running.stop),
+            hangs: false,
+            task: Some(task),
+        });
         Ok(running)
     }
 }

@@ -62,9 +62,11 @@ pub const NOT_ARMED: u32 = 0x0005_0003;
 pub const NOT_FINITE: u32 = 0x0005_0004;
 /// The drive cannot be enabled during a reset.
 pub const RESETTING: u32 = 0x0005_0005;
+/// The thread that monitors the drive hangs or has ended.
+pub const SERVICE_HUNG: u32 = 0x0005_0006;
 
 /// Code, meaning and remedy of every fault except emergency messages.
-const FAULTS: [(u32, &str, &str); 24] = [
+const FAULTS: [(u32, &str, &str); 25] = [
     // Communication with the drive.
     (
         HEARTBEAT_LOST,
@@ -185,6 +187,11 @@ const FAULTS: [(u32, &str, &str); 24] = [
         "the fault of the drive is still being reset",
         "arm again after the reset",
     ),
+    (
+        SERVICE_HUNG,
+        "the thread that monitors the drive has not run for 20 ms",
+        "stop programs that use all processors, then clear the fault; if it remains, start the program again",
+    ),
 ];
 
 /// Meaning and remedy of a code.
@@ -249,7 +256,7 @@ mod tests {
     use super::*;
 
     /// The constants above by their names, so that one without a row in [`FAULTS`] is found.
-    const CODES: [u32; 24] = [
+    const CODES: [u32; 25] = [
         HEARTBEAT_LOST,
         RESTARTED,
         NOT_OPERATIONAL,
@@ -274,6 +281,7 @@ mod tests {
         NOT_ARMED,
         NOT_FINITE,
         RESETTING,
+        SERVICE_HUNG,
     ];
 
     #[test]

@@ -150,8 +150,17 @@ impl CanopenDrive {
         Some(code)
     }
 
-    fn no_fault(&self) -> Result<(), DeviceError> {
+    /// Code of the fault, 0 if there is none. If the service thread hangs, the stored state is outdated, which is a fault as well.
+    /// Called in the tick: must not allocate or block.
+    fn fault(&self) -> u32 {
         match self.shared.fault() {
+            0 if self.shared.last_pass.is_overdue(self.host.now_ns()) => faults::SERVICE_HUNG,
+            code => code,
+        }
+    }
+
+    fn no_fault(&self) -> Result<(), DeviceError> {
+        match self.fault() {
             0 => Ok(()),
             code => Err(faults::device_error(code)),
         }
@@ -177,7 +186,9 @@ fn start_service(
     shared: &Arc<Shared>,
     host: &dyn Host,
 ) -> Result<TaskHandle, OpenError> {
-    let monitor = Monitor::new(settings, Arc::clone(shared), host.now_ns());
+    let now_ns = host.now_ns();
+    shared.last_pass.set(now_ns);
+    let monitor = Monitor::new(settings, Arc::clone(shared), now_ns);
     let service = Service { bus, monitor };
     host.start("can-service", Box::new(service))
         .map_err(OpenError::Thread)
@@ -227,7 +238,7 @@ impl CurrentAmplifier for CanopenDrive {
     }
 
     fn status(&self) -> AmplifierStatus {
-        match (self.shared.fault(), self.shared.intent()) {
+        match (self.fault(), self.shared.intent()) {
             (0, Intent::On) => AmplifierStatus::Enabled,
             (0, _) => AmplifierStatus::Disabled,
             (code, _) => AmplifierStatus::Fault(code),

@@ -228,6 +228,7 @@ impl Monitor {
         self.ensure_off(now_ns, send);
         self.sync_while_idle(now_ns, send);
         self.send_heartbeat(now_ns, send);
+        self.shared.last_pass.set(now_ns);
     }
 
     /// Follows the intent of the caller; a fault has priority.

@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicBool, AtomicI32, AtomicU8, AtomicU32, Ordering};
 
 use super::super::cia402::{FOLLOWS_TARGET, State};
+use super::super::last_pass::LastPass;
 use super::super::nmt;
 
 /// Intent of the caller.
@@ -56,6 +57,8 @@ pub(super) struct Shared {
     must_follow: AtomicBool,
     /// Code of the last emergency message, 0 if its cause is removed.
     emergency: AtomicU32,
+    /// Written by the service. Without a recent pass the fields above are outdated.
+    pub(super) last_pass: LastPass,
 }
 
 impl Default for Shared {
@@ -73,6 +76,7 @@ impl Default for Shared {
             restarted: AtomicBool::new(false),
             must_follow: AtomicBool::new(false),
             emergency: AtomicU32::new(0),
+            last_pass: LastPass::default(),
         }
     }
 }

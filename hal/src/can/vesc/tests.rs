@@ -210,6 +210,29 @@ fn current_ends_20_ms_after_the_last_command_of_a_hung_loop() {
 }
 
 #[test]
+fn hung_thread_of_the_driver_is_a_fault_after_20_ms() {
+    let mut rig = rig();
+    rig.enable().unwrap();
+    rig.drive(2.0, 50);
+    rig.world.set_hung("can-vesc", true);
+    rig.drive(2.0, 19);
+    assert_eq!(rig.vesc.status(), AmplifierStatus::Enabled);
+    rig.sleep_ms(2); // the limit is 20 ms, a step of the bus 0.1 ms
+    assert_eq!(rig.vesc.status(), AmplifierStatus::Fault(THREAD_HUNG));
+    let refused = rig.vesc.command(2.0).unwrap_err();
+    assert_eq!(refused.code, i64::from(THREAD_HUNG));
+    rig.sleep_ms(1);
+    assert_eq!(rig.current_a(), 0.0, "the refused command disables");
+    assert_eq!(rig.reset_fault().unwrap_err().code, i64::from(THREAD_HUNG));
+    rig.world.set_hung("can-vesc", false);
+    rig.sleep_ms(1);
+    rig.reset_fault().unwrap();
+    rig.enable().unwrap();
+    rig.drive(1.0, 50);
+    assert_eq!(rig.current_a(), 1.0);
+}
+
+#[test]
 fn enabled_vesc_waits_for_its_first_command() {
     let mut rig = rig();
     rig.enable().unwrap();

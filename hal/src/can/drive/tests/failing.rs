@@ -272,6 +272,44 @@ fn switches_off_when_the_loop_sends_no_commands() {
 }
 
 #[test]
+fn detects_a_hung_service_thread_by_the_age_of_its_last_pass() {
+    for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
+        let mut rig = running(exchange);
+        rig.world.set_hung("can-service", true);
+        // The limit is 20 ms; the pass before the fault is at most 0.1 ms old, and the loop looks every millisecond.
+        let found_ms = rig.run_ms(1.0, 100);
+        assert!((20..=21).contains(&found_ms), "{found_ms} ms");
+        let hung = i64::from(faults::SERVICE_HUNG);
+        let fault = AmplifierStatus::Fault(faults::SERVICE_HUNG);
+        assert_eq!(rig.drive.status(), fault);
+        assert_eq!(rig.drive.command(1.0).unwrap_err().code, hung);
+        rig.drive.disable();
+        rig.sleep_ms(1);
+        assert_eq!(rig.device_current_a(), 0.0, "{exchange:?}");
+        assert_eq!(rig.drive.begin_enable().unwrap_err().code, hung);
+        rig.world.set_hung("can-service", false);
+        assert_recovers(&mut rig);
+    }
+}
+
+#[test]
+fn service_thread_that_hangs_while_the_drive_is_being_enabled_ends_the_enabling() {
+    let mut rig = rig(ASYNCHRONOUS);
+    rig.world.set_hung("can-service", true);
+    rig.drive.begin_enable().unwrap();
+    let polls = (0..100).find_map(|ms| {
+        let progress = rig.drive.poll_enable();
+        rig.sleep_ms(1);
+        progress.is_ready().then_some((ms, progress))
+    });
+    let (found_ms, progress) = polls.expect("it ends");
+    assert!((20..=21).contains(&found_ms), "{found_ms} ms");
+    let error = Err(faults::device_error(faults::SERVICE_HUNG));
+    assert_eq!(progress, Poll::Ready(error));
+    assert_eq!(rig.drive.shared.intent(), Intent::Off);
+}
+
+#[test]
 fn disable_acts_immediately_and_without_the_service() {
     for exchange in [ASYNCHRONOUS, SYNCHRONOUS] {
         let mut rig = running(exchange);
