@@ -194,6 +194,7 @@ impl Observed {
             EventKind::Request(_)
             | EventKind::State { .. }
             | EventKind::Lost { .. }
+            | EventKind::ResetFailed { .. }
             | EventKind::Clock(_) => {}
         }
     }

@@ -1,6 +1,8 @@
 //! Conversion of the events of the loop to messages of `/event` and back, without loss. The digest of a run includes the texts:
 //! they must not change between versions.
 
+use bench_hal::FaultText;
+
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
 use crate::rt::arming::{State, Trip};
 use crate::rt::record::{ClockTimes, Event, EventKind, Origin, Refusal, RequestEvent, RequestKind};
@@ -12,6 +14,7 @@ impl From<&Event> for Message {
             EventKind::Request(request) => of_request(request),
             EventKind::State { from, to } => of_state(from, to),
             EventKind::Trip(trip) => of_trip(trip),
+            EventKind::ResetFailed { code, text } => of_failed_reset(code, text),
             EventKind::Completed => message("completed", "the program came to its end".into()),
             EventKind::Lost { records } => of_lost(records),
             EventKind::Clock(times) => of_clock(times),
@@ -100,6 +103,18 @@ fn of_trip(trip: Trip) -> Message {
     }
 }
 
+fn of_failed_reset(code: i64, text: Option<FaultText>) -> Message {
+    let what = text.map_or("the amplifier keeps its fault", |text| text.what);
+    Message {
+        code,
+        remedy: text.map_or("", |text| text.remedy).into(),
+        ..message(
+            "reset_failed",
+            format!("reset failed: {what} (code {code})"),
+        )
+    }
+}
+
 fn of_lost(records: u64) -> Message {
     let text = format!("{records} records did not fit into the ring");
     Message {
@@ -133,6 +148,10 @@ impl TryFrom<&Message> for Event {
                 to: state("to", &message.to)?,
             },
             "trip" => EventKind::Trip(trip(message)?),
+            "reset_failed" => EventKind::ResetFailed {
+                code: message.code,
+                text: None,
+            },
             "completed" => EventKind::Completed,
             "lost" => EventKind::Lost {
                 records: message.records,

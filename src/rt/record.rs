@@ -1,7 +1,7 @@
 //! What the loop publishes: one [`TickRecord`] per tick and an [`Event`] at every change. Plain copies without
 //! allocation, so that they can leave the tick through a wait-free ring.
 
-use bench_hal::Validity;
+use bench_hal::{DeviceError, FaultText, Validity};
 
 use super::arming::{State, Trip};
 use super::tuning::Tune;
@@ -84,6 +84,13 @@ pub enum EventKind {
     },
     /// The interlocks tripped.
     Trip(Trip),
+    /// The amplifier did not reset its fault after the operator's request to clear the trip; the trip remains.
+    ResetFailed {
+        /// The device's number.
+        code: i64,
+        /// Meaning and remedy. A recording stores them as text.
+        text: Option<FaultText>,
+    },
     /// The program came to its end.
     Completed,
     /// Records did not fit into the ring since the last event of this kind.
@@ -93,6 +100,17 @@ pub enum EventKind {
     },
     /// The clocks at one moment in the tick; only in real time, at the start and once per second.
     Clock(ClockTimes),
+}
+
+impl EventKind {
+    /// The event of a reset that failed with `error`.
+    pub(super) fn reset_failed(error: DeviceError) -> EventKind {
+        let DeviceError { what, remedy, code } = error;
+        EventKind::ResetFailed {
+            code,
+            text: Some(FaultText { what, remedy }),
+        }
+    }
 }
 
 /// Three clocks at one moment.

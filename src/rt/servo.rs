@@ -425,11 +425,18 @@ impl Servo {
         self.rig.poll_enable()
     }
 
-    /// Begins to reset the fault of the amplifier. If the amplifier keeps its fault, the trip remains.
+    /// Begins to reset the fault of the amplifier. If the amplifier keeps its fault, the trip remains and an event says so. An Arm
+    /// before the end of the reset is refused, because the state is still Tripped.
     fn clear(&mut self, tick: u64) {
-        if self.state.after(Transition::Clear).is_some() && !self.is_clearing {
-            self.is_clearing = self.rig.begin_reset().is_ok();
-            self.poll_clearing(tick);
+        if self.state.after(Transition::Clear).is_none() || self.is_clearing {
+            return;
+        }
+        match self.rig.begin_reset() {
+            Ok(()) => {
+                self.is_clearing = true;
+                self.poll_clearing(tick);
+            }
+            Err(error) => self.event(tick, EventKind::reset_failed(error)),
         }
     }
 
@@ -438,11 +445,13 @@ impl Servo {
         if !self.is_clearing {
             return;
         }
-        if let Poll::Ready(result) = self.rig.poll_reset() {
-            self.is_clearing = false;
-            if result.is_ok() {
-                self.change(Transition::Clear, tick);
-            }
+        let Poll::Ready(result) = self.rig.poll_reset() else {
+            return;
+        };
+        self.is_clearing = false;
+        match result {
+            Ok(()) => self.change(Transition::Clear, tick),
+            Err(error) => self.event(tick, EventKind::reset_failed(error)),
         }
     }
 

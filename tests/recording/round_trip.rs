@@ -176,6 +176,10 @@ fn events_of_every_kind_round_trip_in_order() {
             .flat_map(|from| states.map(|to| EventKind::State { from: *from, to })),
     );
     kinds.extend(trips.map(EventKind::Trip));
+    kinds.push(EventKind::ResetFailed {
+        code: i64::MIN,
+        text: None,
+    });
     kinds.extend([EventKind::Completed, EventKind::Lost { records: u64::MAX }]);
     kinds.push(EventKind::Clock(ClockTimes {
         loop_ns: u64::MAX,

@@ -250,6 +250,7 @@ fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
         State::Tripped,
         "the amplifier refuses to clear its fault"
     );
+    assert_eq!(failed_resets(&bench), [(150, 5)]);
     bench.run(100);
     bench.request(Request::Clear);
     bench.tick();
@@ -257,6 +258,22 @@ fn loop_stays_tripped_when_the_amplifier_refuses_clear() {
         (bench.state(), bench.amplifier_is_on()),
         (State::Disarmed, false)
     );
+    assert_eq!(failed_resets(&bench).len(), 1);
+}
+
+/// Tick and code of each reset that failed.
+fn failed_resets(bench: &Bench) -> Vec<(u64, i64)> {
+    let events = bench.events();
+    let failed = events.iter().filter_map(|event| match event.kind {
+        EventKind::ResetFailed { code, .. } => Some((event.tick, code)),
+        EventKind::Request(_)
+        | EventKind::State { .. }
+        | EventKind::Trip(_)
+        | EventKind::Completed
+        | EventKind::Lost { .. }
+        | EventKind::Clock(_) => None,
+    });
+    failed.collect()
 }
 
 #[test]

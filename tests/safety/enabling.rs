@@ -1,6 +1,6 @@
 //! The state Enabling: no amplifier is enabled blind, nothing waits, and a stop or a trip ends it at once.
 use bench::rt::arming::State;
-use bench::rt::record::EventKind;
+use bench::rt::record::{EventKind, Refusal, RequestKind};
 use bench::rt::servo::Request;
 use bench_hal::Validity;
 
@@ -162,6 +162,16 @@ fn a_second_program_does_not_replace_the_one_that_waits() {
     assert!(bench.ticks().iter().all(|record| record.command_a <= 0.1));
 }
 
+/// Why each refused request to arm was refused.
+fn refused_arms(bench: &Bench) -> Vec<Refusal> {
+    let events = bench.events();
+    let arms = events.iter().filter_map(|event| match event.kind {
+        EventKind::Request(request) if request.kind == RequestKind::Arm => request.refusal,
+        _ => None,
+    });
+    arms.collect()
+}
+
 #[test]
 fn the_loop_stays_tripped_until_the_amplifier_has_reset_its_fault() {
     for (end, expected) in [
@@ -196,6 +206,18 @@ fn the_loop_stays_tripped_until_the_amplifier_has_reset_its_fault() {
             .filter(|event| cleared(&event.kind))
             .count();
         assert_eq!(clears, usize::from(expected == State::Disarmed));
+        let failed = |kind: &EventKind| matches!(kind, EventKind::ResetFailed { code: 6, .. });
+        let failures = bench
+            .events()
+            .iter()
+            .filter(|event| failed(&event.kind))
+            .count();
+        assert_eq!(failures, usize::from(expected == State::Tripped));
+        assert_eq!(
+            refused_arms(&bench),
+            [Refusal::Tripped],
+            "Arm in the tick of Clear"
+        );
         assert_eq!(enable_ticks(&bench), [BEGIN]);
     }
 }

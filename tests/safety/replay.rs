@@ -196,6 +196,7 @@ fn tripped_runs_replay_bit_for_bit() {
                 EventKind::Request(_)
                 | EventKind::State { .. }
                 | EventKind::Completed
+                | EventKind::ResetFailed { .. }
                 | EventKind::Clock(_)
                 | EventKind::Lost { .. } => None,
             });

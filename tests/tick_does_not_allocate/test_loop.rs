@@ -103,6 +103,7 @@ impl TestLoop {
                     EventKind::Completed => self.completed = true,
                     EventKind::Request(_)
                     | EventKind::State { .. }
+                    | EventKind::ResetFailed { .. }
                     | EventKind::Lost { .. }
                     | EventKind::Clock(_) => {}
                 },
