@@ -10,6 +10,7 @@
 //! | [`actual_current_a`](CurrentAmplifier::actual_current_a) | every tick, twice | no | no |
 //! | [`explain`](CurrentAmplifier::explain) | every tick in which `status` is a fault | no | no |
 //! | [`command`](CurrentAmplifier::command) | every tick while armed, after the interlocks and the control law | no | no |
+//! | [`rounded_a`](CurrentAmplifier::rounded_a) | after a command, if the next one is sent a tick later | no | no |
 //! | [`disable`](CurrentAmplifier::disable) | in the tick at a stop or a trip, and when the loop ends | no | no |
 //! | [`begin_enable`](CurrentAmplifier::begin_enable) | once, after the request to arm | no | no |
 //! | [`poll_enable`](CurrentAmplifier::poll_enable) | every tick from then on, until the result | no | no |
@@ -147,6 +148,14 @@ pub trait CurrentAmplifier: Send {
     /// first.
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError>;
 
+    /// The current in amperes that the next [`command`](Self::command) returns for `current_a`, after rounding and limits. Without
+    /// an implementation of its own, an amplifier gives every current unchanged.
+    ///
+    /// Called in the tick, if commands are sent one tick after they were computed. Must not allocate or block.
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        current_a
+    }
+
     /// Sets the current to zero immediately; further commands are refused.
     ///
     /// Called in the tick at a stop or a trip, and when the loop ends; in any state, and repeatedly. Must not allocate or
@@ -206,6 +215,9 @@ impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         (**self).command(current_a)
     }
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        (**self).rounded_a(current_a)
+    }
     fn disable(&mut self) {
         (**self).disable();
     }
@@ -223,6 +235,12 @@ impl<A: CurrentAmplifier + ?Sized> CurrentAmplifier for Box<A> {
     }
     fn explain(&self, code: u32) -> Option<FaultText> {
         (**self).explain(code)
+    }
+}
+
+impl<P: DisplacementProbe + ?Sized> DisplacementProbe for Box<P> {
+    fn latest(&mut self, now: Tick) -> Reading {
+        (**self).latest(now)
     }
 }
 
@@ -248,6 +266,9 @@ impl<A: CurrentAmplifier, P: Send> CurrentAmplifier for Devices<A, P> {
     }
     fn command(&mut self, current_a: f64) -> Result<f64, DeviceError> {
         self.amplifier.command(current_a)
+    }
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        self.amplifier.rounded_a(current_a)
     }
     fn disable(&mut self) {
         self.amplifier.disable();

@@ -13,7 +13,8 @@ pub struct LoopSettings {
     /// Servo rate in ticks per second.
     #[schemars(range(min = 1.0, max = 100000.0))]
     pub rate_hz: f64,
-    /// Whole periods from a measurement to the time at which its command takes effect.
+    /// Whole periods from a measurement to the time at which its command takes effect. With real devices 0 or 1: at 0 a command
+    /// is sent in the tick in which it is computed, at 1 in the next one.
     #[schemars(range(min = 0, max = 8))]
     pub computing_delay_periods: u32,
     /// SCHED_FIFO priority of the thread of the loop, at real-time pace.

@@ -23,7 +23,8 @@ pub struct TickRecord {
     pub position_m: f64,
     /// Request of the program in amperes, before the interlocks.
     pub requested_a: f64,
-    /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited.
+    /// Command u in amperes as the amplifier gives it: after the interlocks, quantised and limited. It takes effect after the
+    /// configured computing delay; a trip or a stop in the meantime cancels it.
     pub command_a: f64,
     /// Reading of the probe in metres before the correction by a calibration; `None` if no calibration is in use.
     pub raw_position_m: Option<f64>,

@@ -3,5 +3,6 @@
 //! run with the devices of `bench emulate`. Each test has been seen to fail with the guarded line broken.
 mod amplifier;
 mod command;
+mod deferred;
 mod probe;
 use bench_test_support::loop_rig as rig;

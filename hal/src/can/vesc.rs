@@ -130,6 +130,10 @@ fn error(code: u32) -> DeviceError {
     }
 }
 
+fn amperes(current_ma: i32) -> f64 {
+    f64::from(current_ma) * 1e-3
+}
+
 /// State that the tick and the thread of the driver share.
 #[derive(Debug, Default)]
 struct Shared {
@@ -231,6 +235,12 @@ impl Vesc {
         }
     }
 
+    /// A limited current in milliamperes, rounded towards zero; 0 for NaN.
+    fn current_ma(&self, current_a: f64) -> i32 {
+        let limit_a = self.settings.current_limit_a;
+        (current_a.clamp(-limit_a, limit_a) * 1e3) as i32
+    }
+
     fn is_on(&self) -> bool {
         self.shared.is_on.load(Ordering::Acquire)
     }
@@ -284,13 +294,16 @@ impl CurrentAmplifier for Vesc {
         if !self.is_on() {
             return Err(error(NOT_ARMED));
         }
-        let limit_a = self.settings.current_limit_a;
-        let current_ma = (current_a.clamp(-limit_a, limit_a) * 1e3) as i32; // rounded towards zero; NaN becomes 0
+        let current_ma = self.current_ma(current_a);
         self.bus
             .send(&set_current(self.settings.node, current_ma))
             .map_err(|_| error(NOT_SENT))?;
         self.shared.commands.fetch_add(1, Ordering::Release);
-        Ok(f64::from(current_ma) * 1e-3)
+        Ok(amperes(current_ma))
+    }
+
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        amperes(self.current_ma(current_a))
     }
 
     fn disable(&mut self) {

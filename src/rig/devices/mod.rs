@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  [amplifier.device] --> amplifier.rs --> CanopenDrive | Vesc  --\
-//!                                                                  Devices = Rig --> the loop
+//!                                                                  Devices = Rig (--> Deferred) --> the loop
 //!  [probe.device]     --> probe.rs     --> SerialProbe          --/
 //! ```
 //!
@@ -10,6 +10,7 @@
 
 pub mod amplifier;
 pub mod canopen;
+pub mod deferred;
 pub mod probe;
 pub mod vesc;
 
@@ -21,6 +22,8 @@ use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 use crate::config::{AmplifierDevice, Config, ProbeDevice};
 use crate::model::plant::PlantError;
 use crate::rig::simulated::SimulatedRig;
+
+use deferred::OutputTiming;
 
 pub use amplifier::{AmplifierError, CanAmplifier, Requirements};
 pub use probe::ProbeError;
@@ -51,6 +54,14 @@ pub enum DevicesError {
         amplifier: &'static str,
         /// Kind of the probe.
         probe: &'static str,
+    },
+    /// The delay between computation and output cannot be enforced.
+    #[error(
+        "loop.computing_delay_periods is {periods}, but with real devices a command is sent in its tick (0) or in the next one (1); set it to 0 or 1"
+    )]
+    ComputingDelay {
+        /// As configured.
+        periods: u32,
     },
     /// The probe is open, but gives no valid reading.
     #[error(
@@ -104,9 +115,12 @@ pub fn check_kinds(config: &Config) -> Result<(), DevicesError> {
     })
 }
 
-/// Refuses what the configured devices cannot do, before anything is opened: a bus load above the limit, invalid settings, a
+/// Refuses what the configured devices cannot do, before anything is opened: a computing delay of several periods, a bus load above the limit, invalid settings, a
 /// serial line slower than `probe.transport_s`.
 pub fn check(config: &Config) -> Result<(), DevicesError> {
+    if !is_simulated(config) {
+        OutputTiming::of(&config.servo)?;
+    }
     amplifier::check(&config.amplifier, &config.servo)?;
     Ok(probe::check(&config.probe)?)
 }
@@ -117,6 +131,7 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
         return simulate(config);
     }
     check_kinds(config)?;
+    let timing = OutputTiming::of(&config.servo)?;
     let mut probe = probe::open(&config.probe, config.servo.priority)?;
     let (amplifier, amplifier_identity) = amplifier::open(&config.amplifier, &config.servo)?;
     wait_for_reading(&mut probe)?;
@@ -125,7 +140,7 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
         probe: probe::identity(&config.probe.device),
         notes: probe.notes().iter().map(Note::to_string).collect(),
         watch: Some(probe.statistics_handle()),
-        rig: Box::new(Devices { amplifier, probe }),
+        rig: timing.apply(Devices { amplifier, probe }),
     })
 }
 

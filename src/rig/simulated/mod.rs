@@ -135,6 +135,10 @@ impl CurrentAmplifier for SimulatedRig {
         Ok(self.accepted_a)
     }
 
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        self.accept(current_a)
+    }
+
     fn disable(&mut self) {
         self.status = AmplifierStatus::Disabled;
         self.trajectory.clear();

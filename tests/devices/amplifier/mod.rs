@@ -9,6 +9,7 @@ use std::time::Duration;
 use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
 use bench::rig::devices::Requirements;
+use bench::rig::devices::deferred::OutputTiming;
 use bench::rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
@@ -35,7 +36,7 @@ const FRAME: u64 = 2;
 /// Not a fault of the device: the cable of the adapter.
 const INTERFACE_DOWN: &str = "the interface is down";
 
-fn config(more: &[&str]) -> Config {
+pub fn config(more: &[&str]) -> Config {
     let sets = [
         "chirp.quiet_before_s=0.05",
         "chirp.fade_in_s=0.05",
@@ -95,7 +96,7 @@ impl DisplacementProbe for IdealProbe {
 }
 
 /// The loop with the driver on one end of a bus, drive and stage on the other.
-struct Lab {
+pub struct Lab {
     bench: Bench,
     drive: AmplifierServer,
     stage: Stage,
@@ -113,6 +114,15 @@ fn driver(config: &Config, host: &SimulatedHost) -> Box<dyn CurrentAmplifier> {
 
 /// The driver in a loop that is disarmed.
 fn open(config: &Config, host: &SimulatedHost, stage: &Stage) -> Bench {
+    open_with_timing(config, host, stage, OutputTiming::SameTick)
+}
+
+fn open_with_timing(
+    config: &Config,
+    host: &SimulatedHost,
+    stage: &Stage,
+    timing: OutputTiming,
+) -> Bench {
     let amplifier = driver(config, host);
     let probe = IdealProbe {
         host: host.clone(),
@@ -120,7 +130,7 @@ fn open(config: &Config, host: &SimulatedHost, stage: &Stage) -> Bench {
         due_ns: host.now_ns(),
         sequence: 0,
     };
-    Bench::around(config, Devices { amplifier, probe })
+    Bench::around(config, timing.apply(Devices { amplifier, probe }))
 }
 
 impl Lab {
@@ -129,6 +139,10 @@ impl Lab {
     }
 
     fn of(config: Config) -> Lab {
+        Lab::with_timing(config, OutputTiming::SameTick)
+    }
+
+    pub fn with_timing(config: Config, timing: OutputTiming) -> Lab {
         let host = SimulatedHost::default();
         let stage = Stage::new(&config).expect("a stage");
         let (log, _) = EventLog::new();
@@ -139,7 +153,7 @@ impl Lab {
             log,
         )
         .expect("a drive");
-        let bench = open(&config, &host, &stage);
+        let bench = open_with_timing(&config, &host, &stage, timing);
         Lab {
             bench,
             drive,
@@ -149,8 +163,16 @@ impl Lab {
         }
     }
 
+    pub fn bench(&mut self) -> &mut Bench {
+        &mut self.bench
+    }
+
+    pub fn host(&self) -> &SimulatedHost {
+        &self.host
+    }
+
     /// Armed, nothing running.
-    fn arm(&mut self) {
+    pub fn arm(&mut self) {
         self.bench.request(Request::Arm);
         self.bench.run(50);
         assert_eq!(

@@ -232,6 +232,11 @@ impl CurrentAmplifier for CanopenDrive {
         Ok(self.configured.scale.amperes(counts))
     }
 
+    fn rounded_a(&self, current_a: f64) -> f64 {
+        let scale = &self.configured.scale;
+        scale.amperes(scale.counts(current_a))
+    }
+
     fn disable(&mut self) {
         self.shared.set_intent(Intent::Off);
         let _ = self.exchange(DISABLE_VOLTAGE, 0); // the service repeats it until the drive confirms
