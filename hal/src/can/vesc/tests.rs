@@ -2,8 +2,10 @@ use std::sync::Mutex;
 
 use proptest::prelude::*;
 
-use super::super::bus::{Port, SimulatedHost};
+use super::super::bus::{BusEvent, Condition, Port, SimulatedHost};
 use super::super::emulator::{AmplifierTask, DeviceFault, EmulatedAmplifier, EmulatedVesc};
+use super::super::frame::{CanFrame, Id};
+use super::faults::{BUS_OFF, COMMANDS_STOPPED};
 use super::*;
 
 const SETTINGS: VescSettings = VescSettings {
