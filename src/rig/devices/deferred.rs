@@ -16,8 +16,17 @@ use bench_hal::{
     Tick,
 };
 
-use super::DevicesError;
 use crate::config::LoopSettings;
+
+/// The delay between computation and output cannot be enforced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "loop.computing_delay_periods is {periods}, but with real devices a command is sent in its tick (0) or in the next one (1); set it to 0 or 1"
+)]
+pub struct ComputingDelayError {
+    /// As configured.
+    pub periods: u32,
+}
 
 /// When a set-point is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,11 +39,11 @@ pub enum OutputTiming {
 
 impl OutputTiming {
     /// The timing of the configured computing delay. A delay of two or more periods is refused.
-    pub fn of(servo: &LoopSettings) -> Result<OutputTiming, DevicesError> {
+    pub fn of(servo: &LoopSettings) -> Result<OutputTiming, ComputingDelayError> {
         match servo.computing_delay_periods {
             0 => Ok(OutputTiming::SameTick),
             1 => Ok(OutputTiming::NextTick),
-            periods => Err(DevicesError::ComputingDelay { periods }),
+            periods => Err(ComputingDelayError { periods }),
         }
     }
 

@@ -23,7 +23,7 @@ use crate::config::{AmplifierDevice, Config, ProbeDevice};
 use crate::model::plant::PlantError;
 use crate::rig::simulated::SimulatedRig;
 
-use deferred::OutputTiming;
+use deferred::{ComputingDelayError, OutputTiming};
 
 pub use amplifier::{AmplifierError, CanAmplifier, Requirements};
 pub use probe::ProbeError;
@@ -55,14 +55,9 @@ pub enum DevicesError {
         /// Kind of the probe.
         probe: &'static str,
     },
-    /// The delay between computation and output cannot be enforced.
-    #[error(
-        "loop.computing_delay_periods is {periods}, but with real devices a command is sent in its tick (0) or in the next one (1); set it to 0 or 1"
-    )]
-    ComputingDelay {
-        /// As configured.
-        periods: u32,
-    },
+    /// The computing delay.
+    #[error(transparent)]
+    ComputingDelay(#[from] ComputingDelayError),
     /// The probe is open, but gives no valid reading.
     #[error(
         "probe: {what} within {} s of opening ({bytes} bytes, {values} values, {damaged} damaged bytes, {timeouts} missing answers received); examine it with `bench doctor`; nothing was moved",
