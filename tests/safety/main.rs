@@ -6,6 +6,7 @@ use bench_test_support::faulty_rig;
 mod enabling;
 mod late_ticks;
 mod live_rig;
+mod matrix;
 mod replay;
 mod reproducible;
 mod requests_and_faults;
