@@ -8,16 +8,18 @@ use std::process::Command;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bench::config::{Config, Source, load};
+use bench::config::{Config, ControlSettings, Source, load};
 use bench::control::{Controller, ControllerText};
-use bench::experiment::Plan;
+use bench::experiment::{Plan, residuals};
 use bench::recording::{self, DiskWatch, Header, Recorder};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
 use bench::rt::live_loop::run_to_end;
+use bench::rt::program::Decision;
 use bench::rt::publisher::Publisher;
 use bench::rt::request::RequestSender;
+use bench::rt::residual::Residuals;
 use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench_hal::{Reading, Tick, Validity};
@@ -30,6 +32,24 @@ fn stage() -> Config {
 
 /// Reading and command past the interlocks, error through the fast controller.
 fn check_and_control(c: &mut Criterion) {
+    time_checks(c, "tick: check + fast controller", None);
+    let plan = Plan::control(Config {
+        control: fast(),
+        ..stage()
+    });
+    let residuals = residuals(&plan.expect("embedded")).expect("a model");
+    assert!(residuals.is_some(), "the monitor is on by default");
+    time_checks(c, "tick: check + residuals + fast controller", residuals);
+}
+
+fn fast() -> ControlSettings {
+    ControlSettings {
+        controller: "fast".into(),
+        ..stage().control
+    }
+}
+
+fn time_checks(c: &mut Criterion, name: &str, residuals: Option<Residuals>) {
     let config = stage();
     let sections = ControllerText::find("fast")
         .and_then(|text| text.sections(5000.0))
@@ -41,9 +61,11 @@ fn check_and_control(c: &mut Criterion) {
         &config.amplifier,
         &config.motor,
         &config.servo,
-    );
+    )
+    .with_residuals(residuals);
+    interlocks.begin_run();
     let mut number = 0;
-    c.bench_function("tick: check + fast controller", |b| {
+    c.bench_function(name, |b| {
         b.iter(|| {
             number += 1;
             let position_m = if number % 2 == 0 { 30e-9 } else { -30e-9 };
@@ -58,10 +80,17 @@ fn check_and_control(c: &mut Criterion) {
                 scheduled_ns: number * 200_000,
             };
             let checked = interlocks.check_reading(black_box(&reading), now);
+            let moves = interlocks.check_motion(position_m, 0);
             let command_a = controller.update(&mut state, -reading.position_m);
             let passed = interlocks.check_command(command_a);
             interlocks.record_current(command_a, command_a);
-            black_box((checked.is_ok(), passed.is_ok(), command_a))
+            let decision = Decision {
+                reference_m: 0.0,
+                requested_a: command_a,
+                active: true,
+            };
+            interlocks.record_motion(&decision, 1.0, command_a);
+            black_box((checked.is_ok(), moves.is_ok(), passed.is_ok(), command_a))
         });
     });
 }

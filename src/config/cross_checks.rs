@@ -18,6 +18,7 @@ pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     travel(config, &mut errors);
     force(&config.motor, &mut errors);
     staleness(config, &mut errors);
+    reason_without_monitor(config, &mut errors);
     if purpose != Purpose::Recorded {
         confirming_name(&config.calibration, &mut errors);
     }
@@ -81,6 +82,14 @@ fn staleness(config: &Config, errors: &mut Errors) {
         format!(
             "is {stale_s} s, but in normal operation a reading is up to {oldest_s} s old (probe.latency_s + transport_s + 1/rate_hz); set a larger value"
         )
+    });
+}
+
+fn reason_without_monitor(config: &Config, errors: &mut Errors) {
+    let reason = config.interlock.model_error_off.as_ref();
+    let is_blank = reason.is_some_and(|reason| reason.trim().is_empty());
+    errors.require(!is_blank, "interlock.model_error_off", || {
+        "is blank; give the reason for which the monitor is off, or leave it out".into()
     });
 }
 

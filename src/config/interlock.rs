@@ -26,6 +26,14 @@ pub struct InterlockSettings {
     /// amplifier's status.
     #[schemars(range(min = 1e-4, max = 100.0))]
     pub current_error_s: f64,
+    /// Residual between measured and modelled position that is always allowed, as a ratio of `soft_limit_m`; half of the modelled
+    /// position is added to it. Without it the monitor of the residuals is off, as in recordings of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1e-6, max = 1.0))]
+    pub model_error_ratio: Option<f64>,
+    /// Reason for which the monitor of the residuals is switched off, for example a stage whose model is not known yet.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model_error_off: Option<String>,
     /// Largest number of missed ticks within one second.
     #[schemars(range(min = 0, max = 1000000))]
     pub overruns_per_s: u32,

@@ -8,7 +8,9 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
+use super::motion_model::{residuals, warn_if_off};
 use super::plan::{Plan, RAMP_TICKS};
+use super::plan_error::PlanError;
 use super::run::{Run, StopCause};
 use super::run_error::RunError;
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
@@ -76,6 +78,7 @@ impl LiveRig {
 
     /// Everything that a run needs, before its first tick.
     fn prepare<'a>(&self, plan: &'a Plan, folder: &Path) -> Result<PreparedRun<'a>, RunError> {
+        warn_if_off(plan);
         let program = plan.program()?;
         let total_ticks = program.ticks();
         let ramp_ticks = plan.ramp_ticks()?;
@@ -84,7 +87,7 @@ impl LiveRig {
         let (connections, mut outside) = connect(RING_SLOTS);
         queue_start(&mut outside.requests, program);
         let (stop_flags, lease) = (StopFlags::default(), Arc::<ArmLease>::default());
-        let run = servo_run(plan, connections)
+        let run = servo_run(plan, connections)?
             .with_correction(plan.correction())
             .with_ramps(ramp_ticks)
             .with_tail(tail_ticks(plan))
@@ -185,9 +188,11 @@ fn queue_start(requests: &mut RequestSender, program: Box<dyn Program>) {
 }
 
 /// A run of a plan, with its interlocks and the heat of the motor.
-pub(super) fn servo_run(plan: &Plan, connections: Connections) -> ServoRun {
-    let interlocks = interlocks(&plan.config).with_thermal_state(plan.motor.thermal_a2);
-    ServoRun::new(interlocks, connections)
+pub(super) fn servo_run(plan: &Plan, connections: Connections) -> Result<ServoRun, PlanError> {
+    let interlocks = interlocks(&plan.config)
+        .with_thermal_state(plan.motor.thermal_a2)
+        .with_residuals(residuals(plan)?);
+    Ok(ServoRun::new(interlocks, connections))
 }
 
 fn interlocks(config: &Config) -> Interlocks {

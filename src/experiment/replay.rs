@@ -130,7 +130,7 @@ impl Replay {
         let correction = plan.correction().filter(|_| has_raw);
         let (rig, feed) = RecordedRig::new(correction);
         let stop_flags = StopFlags::default();
-        let run = servo_run(plan, connections)
+        let run = servo_run(plan, connections)?
             .with_correction(correction)
             .with_ramps(ramp_ticks)
             .with_stop_flags(stop_flags.clone());

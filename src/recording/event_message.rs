@@ -93,10 +93,15 @@ fn of_trip(trip: Trip) -> Message {
         Trip::Amplifier { code, .. } => code,
         _ => 0,
     };
+    let modelled_m = match trip {
+        Trip::ModelError { modelled_m, .. } => Some(modelled_m),
+        _ => None,
+    };
     Message {
         reason: trip.reason().into(),
         value,
         limit,
+        modelled_m,
         code,
         remedy: trip.remedy().into(),
         ..message("trip", trip.to_string())
@@ -264,6 +269,13 @@ fn trip(message: &Message) -> Result<Trip, UnknownValue> {
         "current_not_followed" => Trip::CurrentNotFollowed {
             actual_a: value,
             command_a: limit,
+        },
+        "model_error" => Trip::ModelError {
+            measured_m: value,
+            modelled_m: message
+                .modelled_m
+                .ok_or_else(|| unknown("modelled_m", "nothing"))?,
+            limit_m: limit,
         },
         // Exact: every u32 is a double.
         "overruns" => Trip::Overruns {

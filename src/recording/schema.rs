@@ -48,10 +48,10 @@ mod tests {
         // Length and CRC-32 of the descriptor in recordings: a change needs a reason and new numbers. Version 0.1.0: 1001,
         // 0xab158d29. Since then: fields 16 and 17 of `Loop`, readings and set-points before a calibration; states 4 and 5, settling
         // and enabling; fields 13, 14 and 18 of `Event`, number, refusal and origin of a request, 15 to 17, the clocks,
-        // and 19 to 21, the values of `tune`.
+        // 19 to 21, the values of `tune`, and 22, the modelled position of a trip.
         let schema = descriptor_set();
-        assert_eq!(schema.len(), 1338);
-        assert_eq!(crc32fast::hash(&schema), 0x4226_edce);
+        assert_eq!(schema.len(), 1378);
+        assert_eq!(crc32fast::hash(&schema), 0x065c_e785);
     }
 
     /// A message with every field set, by its field numbers on the wire: (number, wire type), with an independent reader.
@@ -131,6 +131,7 @@ mod tests {
             reference_factor: Some(1.0),
             gain_factor: Some(1.0),
             ramp_ticks: 1,
+            modelled_m: Some(1.0),
         };
         let timing = Timing {
             first_tick: 1,

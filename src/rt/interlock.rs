@@ -9,11 +9,12 @@ use bench_hal::{Reading, Tick, Validity};
 
 use super::arming::Trip;
 use super::following_error::FollowingError;
+use super::program::Decision;
+use super::residual::Residuals;
 use crate::config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
 use crate::util::numeric::is_within;
 
 /// The limits, and the state that their checks need.
-#[derive(Clone, Debug)]
 pub struct Interlocks {
     limits: Limits,
     thermal_a2: f64,
@@ -25,6 +26,7 @@ pub struct Interlocks {
     fresh: Freshness,
     overruns: Overruns,
     following: FollowingError,
+    residuals: Option<Residuals>,
 }
 
 /// The limits of the configuration.
@@ -92,6 +94,7 @@ impl Interlocks {
             fresh: Freshness::default(),
             following: FollowingError::new(settings.current_error_a, window_ns),
             overruns: Overruns::new(settings.overruns_per_s, servo.rate_hz),
+            residuals: None,
         }
     }
 
@@ -99,6 +102,34 @@ impl Interlocks {
     pub fn with_thermal_state(mut self, thermal_a2: f64) -> Self {
         self.thermal_a2 = thermal_a2;
         self
+    }
+
+    /// The interlocks with a monitor of the residuals between measured and modelled motion.
+    pub fn with_residuals(mut self, residuals: Option<Residuals>) -> Self {
+        self.residuals = residuals;
+        self
+    }
+
+    /// Begins a run. Runs in the tick: must not allocate or block.
+    pub fn begin_run(&mut self) {
+        if let Some(residuals) = &mut self.residuals {
+            residuals.begin();
+        }
+    }
+
+    /// Checks whether the position of a tick of a run answers the current. Runs in the tick: must not allocate or block.
+    pub fn check_motion(&mut self, position_m: f64, missed: u32) -> Result<(), Trip> {
+        match &mut self.residuals {
+            Some(residuals) => residuals.check(position_m, missed),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes the decision of a tick of a run, its factor of the loop gain, and the current that it gave. Runs in the tick: must not allocate or block.
+    pub fn record_motion(&mut self, decision: &Decision, gain: f64, applied_a: f64) {
+        if let Some(residuals) = &mut self.residuals {
+            residuals.record(decision, gain, applied_a);
+        }
     }
 
     /// The thermal state of the motor in A^2: the low-pass filtered square of the current.

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! [`servo`] is the loop itself, [`servo_run`] what belongs to one run of it, [`live_loop`] its thread, which serves runs as long as
-//! the rig is open, [`thread`] how the system schedules it. [`interlock`] and [`arming`] are its safety, [`settling`] the end of a
+//! the rig is open, [`thread`] how the system schedules it. [`interlock`], [`residual`] and [`arming`] are its safety, [`settling`] the end of a
 //! run, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
 //! [`supervision`] what ends a run without a request, [`tuning`] what changes a run in progress.
 
@@ -21,6 +21,7 @@ pub mod program;
 pub mod publisher;
 pub mod record;
 pub mod request;
+pub mod residual;
 pub mod servo;
 pub mod servo_run;
 pub mod settling;

@@ -82,6 +82,7 @@ impl Servo {
         self.advance_enabling(checked, now.number);
         let decision = self.decide(&reading, checked, now.number); // decide
         self.write(decision.requested_a, now.number); // write
+        self.record_motion(&decision);
         let done_ns = clock.now_ns(now);
         let record = self.record(timing, done_ns, &raw, &reading, &decision);
         self.publish(record); // publish
@@ -137,6 +138,7 @@ impl Servo {
         let missed = self.run.interlocks.check_timing(timing.missed, timing.tick);
         let raw = self.run.interlocks.check_reading(raw, timing.tick);
         let corrected = self.run.interlocks.check_travel(reading.position_m);
+        let motion = self.check_motion(reading.position_m, timing.missed);
         let actual_a = self.rig.actual_current_a().filter(|_| !self.is_off());
         let current = self.run.interlocks.check_current(actual_a, timing.tick);
         match self.rig.status() {
@@ -146,9 +148,21 @@ impl Servo {
             }),
             AmplifierStatus::Disabled if self.runs() => Err(Trip::AmplifierDisabled),
             AmplifierStatus::Disabled | AmplifierStatus::Enabled => {
-                missed.and(raw).and(corrected).and(current)
+                missed.and(raw).and(corrected).and(current).and(motion)
             }
         }
+    }
+
+    fn check_motion(&mut self, position_m: f64, missed: u32) -> Result<(), Trip> {
+        match self.runs() {
+            true => self.run.interlocks.check_motion(position_m, missed),
+            false => Ok(()),
+        }
+    }
+
+    fn record_motion(&mut self, decision: &Decision) {
+        let gain = self.run.tuning.now().gain;
+        (self.run.interlocks).record_motion(decision, gain, self.run.applied_a);
     }
 
     fn decide(&mut self, reading: &Reading, checked: Result<(), Trip>, tick: u64) -> Decision {
@@ -479,6 +493,7 @@ impl Servo {
         self.change(Transition::Start, tick);
         (self.run.program_tick, self.run.completed, self.run.trip) = (0, false, None);
         self.run.tuning = Tuning::default();
+        self.run.interlocks.begin_run();
     }
 
     /// Zero current in this tick, amplifier disabled, the reason published.

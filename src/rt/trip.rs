@@ -60,6 +60,15 @@ pub enum Trip {
         /// The nearest commanded current.
         command_a: f64,
     },
+    /// The measured position does not answer the current as the model does, all in metres from the rest position.
+    ModelError {
+        /// The measured position, or in closed loop that of the modelled plant with the applied current.
+        measured_m: f64,
+        /// The modelled position.
+        modelled_m: f64,
+        /// The limit of the difference.
+        limit_m: f64,
+    },
     /// Too many ticks missed within one second.
     Overruns {
         /// How many.
@@ -127,6 +136,11 @@ impl Trip {
                 "check that the drive takes set-points (its mode, another master on the bus); \
                  the limits are interlock.current_error_a and current_error_s",
             ),
+            Trip::ModelError { .. } => (
+                "model_error",
+                "check the probe and its target, the leads and the cable of the motor, the controller, and the model of the stage; \
+                 the limit is interlock.model_error_ratio, and for an unknown stage interlock.model_error_off = \"REASON\" switches the comparison off",
+            ),
             Trip::Overruns { .. } => (
                 "overruns",
                 "lower loop.rate_hz, give the loop real-time scheduling, or raise interlock.overruns_per_s",
@@ -175,6 +189,11 @@ impl Trip {
                 actual_a,
                 command_a,
             } => Some((actual_a, command_a)),
+            Trip::ModelError {
+                measured_m,
+                limit_m,
+                ..
+            } => Some((measured_m, limit_m)),
             Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
             Trip::CommandNotFinite
             | Trip::ProbeInvalid
@@ -234,6 +253,18 @@ impl fmt::Display for Trip {
             } => write!(
                 f,
                 "the amplifier measures {actual_a:.3} A, but the nearest commanded current is {command_a:.3} A"
+            ),
+            Trip::ModelError {
+                measured_m,
+                modelled_m,
+                limit_m,
+            } => write!(
+                f,
+                "the position does not answer the current: {:.1} um measured, {:.1} um by the model, \
+                 a difference of {:.1} um is allowed",
+                measured_m * 1e6,
+                modelled_m * 1e6,
+                limit_m * 1e6
             ),
             Trip::Overruns { count, limit } => write!(
                 f,

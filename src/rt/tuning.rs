@@ -95,6 +95,11 @@ impl Tuning {
         self.change = Some((tune, 0));
     }
 
+    /// The factors of this tick.
+    pub(super) fn now(&self) -> Factors {
+        self.now
+    }
+
     /// The factors of the next tick.
     pub(super) fn next(&mut self) -> Factors {
         if let Some((tune, tick)) = &mut self.change {

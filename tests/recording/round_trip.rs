@@ -116,6 +116,11 @@ fn events_of_every_kind_round_trip_in_order() {
             count: u32::MAX,
             limit: 10,
         },
+        Trip::ModelError {
+            measured_m: -0.0,
+            modelled_m: 0.1 + 0.2,
+            limit_m: 1e-5,
+        },
         Trip::CurrentNotFollowed {
             actual_a: -0.75,
             command_a: 0.25,

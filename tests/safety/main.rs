@@ -10,6 +10,7 @@ mod matrix;
 mod replay;
 mod reproducible;
 mod requests_and_faults;
+mod residual;
 use bench_test_support::loop_rig as rig;
 mod sequence_wrap;
 mod settling;

@@ -145,7 +145,8 @@ impl Failure {
             // Detected after many ticks: none of the failures here.
             Trip::ContinuousCurrent { .. }
             | Trip::ProbeStuck { .. }
-            | Trip::CurrentNotFollowed { .. } => false,
+            | Trip::CurrentNotFollowed { .. }
+            | Trip::ModelError { .. } => false,
         }
     }
 

@@ -8,4 +8,5 @@ mod frf_bias_and_coverage;
 mod frf_noise;
 mod joint_estimate;
 mod modes;
+mod residual_monitor;
 mod verdicts;

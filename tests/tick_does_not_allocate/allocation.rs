@@ -1,11 +1,12 @@
 //! No tick allocates.
 use assert_no_alloc::assert_no_alloc;
-use bench::experiment::Plan;
+use bench::experiment::{Plan, residuals};
 use bench::rt::clock::TickTiming;
 use bench::rt::servo::Request;
 use bench::rt::tuning::{Factors, Tune};
 use bench_hal::Tick;
 
+use crate::faulty_rig::Fault;
 use crate::programs::programs;
 use crate::test_loop::{ConstantCurrent, TestLoop};
 use crate::{all_trips, stage, weak_motor};
@@ -101,6 +102,29 @@ fn a_change_of_reference_and_gain_does_not_allocate() {
         test_loop.collect();
     }
     assert!(test_loop.commands > 1000, "{}", test_loop.commands);
+}
+
+#[test]
+fn comparison_with_the_model_and_its_trip_do_not_allocate() {
+    let mut config = stage();
+    config.control.controller = "fast".into();
+    let plan = Plan::control(config).expect("a plan");
+    // An offset of 100 um of the probe, within the travel limit.
+    for (faults, trip) in [
+        (vec![], None),
+        (
+            vec![(4000..6000, Fault::Offset(100e-6))],
+            Some("model_error"),
+        ),
+    ] {
+        let residuals = residuals(&plan).expect("a model");
+        assert!(residuals.is_some(), "on by default");
+        let mut test_loop = TestLoop::with_residuals(&plan.config, &faults, residuals);
+        test_loop.request(Request::Arm);
+        test_loop.request(Request::Start(plan.program().expect("a program")));
+        test_loop.run(5100);
+        assert_eq!(test_loop.trip, trip);
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ use bench::rt::program::{Decision, Program, ProgramInput};
 use bench::rt::publisher::Publisher;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::request::RequestSender;
+use bench::rt::residual::Residuals;
 use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use rtrb::{Consumer, RingBuffer};
@@ -33,6 +34,15 @@ pub struct TestLoop {
 
 impl TestLoop {
     pub fn new(config: &Config, faults: &[(Range<u64>, Fault)]) -> TestLoop {
+        TestLoop::with_residuals(config, faults, None)
+    }
+
+    /// A loop whose position is compared with a model.
+    pub fn with_residuals(
+        config: &Config,
+        faults: &[(Range<u64>, Fault)],
+        residuals: Option<Residuals>,
+    ) -> TestLoop {
         let rig = FaultyRig::new(SimulatedRig::new(config).expect("a rig"), faults);
         let (publisher, records) = RingBuffer::new(1024);
         let (requests, taken) = RequestSender::ring(16);
@@ -48,7 +58,8 @@ impl TestLoop {
             &config.amplifier,
             &config.motor,
             &config.servo,
-        );
+        )
+        .with_residuals(residuals);
         TestLoop {
             servo: Servo::new(
                 Box::new(rig),

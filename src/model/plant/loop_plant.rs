@@ -90,6 +90,15 @@ pub struct LoopPlantState {
     coming_m: Vec<f64>,
 }
 
+impl LoopPlantState {
+    /// Returns to rest, without an allocation.
+    pub fn clear(&mut self) {
+        self.plant.current_a = 0.0;
+        self.plant.states.fill([0.0; 2]);
+        self.coming_m.fill(0.0);
+    }
+}
+
 impl LoopPlant {
     /// The plant with these modes at the end of a signal path, for example that of a configuration.
     pub fn new(path: impl Into<SignalPath>, modes: &[Mode]) -> LoopPlant {

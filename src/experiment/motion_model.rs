@@ -1,0 +1,45 @@
+//! The residual monitor of a plan: the models of plant and closed loop that the interlocks compare with the measured motion.
+
+use super::loop_check::closed_loop_of;
+use super::plan::Plan;
+use super::plan_error::PlanError;
+use crate::control::ControllerText;
+use crate::model::plant::{self, LoopPlant, ModalModel};
+use crate::rt::residual::{LoopPrediction, Residuals};
+
+/// The monitor of a run, by the model of the configuration; `None` if the settings switch it off.
+pub fn residuals(plan: &Plan) -> Result<Option<Residuals>, PlanError> {
+    let settings = &plan.config.interlock;
+    let Some(ratio) = settings.model_error_ratio else {
+        return Ok(None);
+    };
+    if settings.model_error_off.is_some() {
+        return Ok(None);
+    }
+    let modes = ModalModel::of(&plant::build(&plan.config.plant)?)?.modes;
+    let model = LoopPlant::with_mean_age(&plan.config, &modes);
+    let residuals = Residuals::new(model, &modes, ratio * settings.soft_limit_m);
+    Ok(Some(match &plan.controller {
+        Some(controller) => residuals.closed_by(prediction(plan, controller)?),
+        None => residuals,
+    }))
+}
+
+/// Warns if the settings switch the monitor off.
+pub(super) fn warn_if_off(plan: &Plan) {
+    if let Some(reason) = &plan.config.interlock.model_error_off {
+        tracing::warn!(
+            "the position is not compared with the model ({reason}); remove interlock.model_error_off as soon as the model is known"
+        );
+    }
+}
+
+/// The prediction of a closed loop: by its model if the model is linear and stable.
+fn prediction(plan: &Plan, controller: &ControllerText) -> Result<LoopPrediction, PlanError> {
+    let servo = &plan.config.servo;
+    let is_stable = closed_loop_of(controller, &plan.config).is_ok_and(|model| model.is_stable());
+    Ok(match is_stable {
+        true => LoopPrediction::Model(controller.design(servo.rate_hz)?.law(servo.period_s())),
+        false => LoopPrediction::Reference,
+    })
+}
