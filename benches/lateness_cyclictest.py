@@ -4,18 +4,19 @@
 
 For 1, 2 and 5 kHz, the loop of `bench control` on the simulated stage and cyclictest (Debian package rt-tests) run in
 turns, ROUNDS of each, with SCHED_FIFO 80, locked memory and SECONDS (default 300) in total each. Lateness is the time from the
-scheduled to the actual wake-up. The rounds of the loop are joined by their largest quantile, those of cyclictest by their
-common histogram. Prints p50, p99 and maximum in microseconds, and the ratios.
+scheduled to the actual start of a tick. Prints in microseconds the median over the rounds of p50 and p99, the largest maximum,
+and the ratios. Run it on an idle machine.
 """
 
 import json
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
 
 RATES_HZ = (1000, 2000, 5000)
-ROUNDS = 3
+ROUNDS = 5
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 300.0
 BENCH = sys.argv[2] if len(sys.argv) > 2 else "target/release/bench"
 PRIORITY = 80
@@ -37,14 +38,14 @@ def bench_round(rate_hz, seconds, folder):
 
 
 def cyclictest_round(rate_hz, seconds):
-    """Histogram {microseconds: count} and maximum of cyclictest."""
+    """p50, p99 and maximum of cyclictest in microseconds."""
     period_us = round(1e6 / rate_hz)
     command = ["cyclictest", "--mlockall", f"--priority={PRIORITY}", "--threads=1", f"--interval={period_us}"]
     command += [f"--loops={round(seconds * rate_hz)}", "--quiet", "--histogram=20000"]
     output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     counts = {int(us): int(n) for us, n in re.findall(r"^(\d+)\s+(\d+)$", output, re.MULTILINE) if int(n)}
     maximum = int(re.search(r"Max Latencies:\s*(\d+)", output).group(1))
-    return counts, maximum
+    return [quantile(counts, 0.5), quantile(counts, 0.99), maximum]
 
 
 def quantile(counts, share):
@@ -57,18 +58,19 @@ def quantile(counts, share):
     raise ValueError("no counts")
 
 
+def over_rounds(rounds):
+    """Medians of p50 and p99, and the largest maximum."""
+    p50, p99, largest = zip(*rounds)
+    return [statistics.median(p50), statistics.median(p99), max(largest)]
+
+
 def compare(rate_hz, folder):
-    ours, counts, maximum = [], {}, 0
+    ours, theirs = [], []
     for _ in range(ROUNDS):
         figures, scheduling = bench_round(rate_hz, SECONDS / ROUNDS, folder)
         ours.append(figures)
-        histogram, largest = cyclictest_round(rate_hz, SECONDS / ROUNDS)
-        maximum = max(maximum, largest)
-        for value, count in histogram.items():
-            counts[value] = counts.get(value, 0) + count
-    ours = [max(column) for column in zip(*ours)]
-    theirs = [quantile(counts, 0.5), quantile(counts, 0.99), maximum]
-    for name, a, b in zip(("p50", "p99", "max"), ours, theirs):
+        theirs.append(cyclictest_round(rate_hz, SECONDS / ROUNDS))
+    for name, a, b in zip(("p50", "p99", "max"), over_rounds(ours), over_rounds(theirs)):
         print(f"{rate_hz:5d} Hz  {name:4s} loop {a:9.1f} us   cyclictest {b:9.1f} us   ratio {a / b:.2f}", flush=True)
     return scheduling
 

@@ -51,7 +51,8 @@ fn loop_thread(mut servo: Servo, settings: LoopSettings) -> JoinHandle<()> {
         let scheduling = Pace::Realtime.schedule(&settings);
         println!("loop: {scheduling:?}");
         let privileges = scheduling.hold();
-        run_to_end(&mut servo, Realtime::new(settings.period_s()));
+        let clock = Realtime::new(settings.period_s());
+        run_to_end(&mut servo, clock.awake_before_ticks(settings.awake_s()));
         drop(privileges);
     })
 }

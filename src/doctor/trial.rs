@@ -71,7 +71,7 @@ fn measure(settings: &LoopSettings, scheduling: &Scheduling) -> Lateness {
     let ticks = (settings.rate_hz * DURATION.as_secs_f64()).ceil() as u64;
     let mut late_ns: Vec<u64> = Vec::with_capacity(ticks as usize);
     let publisher = Publisher::new(RingBuffer::new(1).0);
-    let mut clock = Realtime::new(settings.period_s());
+    let mut clock = Realtime::new(settings.period_s()).awake_before_ticks(settings.awake_s());
     let (mut number, mut missed) = (0, 0);
     while number < ticks {
         let timing = clock.wait(number, &publisher);
@@ -219,6 +219,7 @@ mod tests {
             stop_ramp_s: None,
             healthy_s: None,
             arm_lease_s: None,
+            wake_early_s: None,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

@@ -78,14 +78,26 @@ pub struct Realtime {
     period_s: f64,
     /// The clock's reading, in nanoseconds, at the loop's time zero.
     origin_ns: i128,
+    /// The thread wakes this long before a tick, and waits awake.
+    awake_ns: i128,
 }
 
 impl Realtime {
-    /// A clock whose tick 0 is due one period from now.
+    /// A clock whose tick 0 is due one period from now. It sleeps up to each tick.
     pub fn new(period_s: f64) -> Self {
         Realtime {
             period_s,
             origin_ns: monotonic_ns() + (period_s * 1e9) as i128,
+            awake_ns: 0,
+        }
+    }
+
+    /// Wakes `awake_s` before each tick and waits awake, which takes this share of a processor. The time that the system takes
+    /// to wake a thread then does not delay the tick.
+    pub fn awake_before_ticks(self, awake_s: f64) -> Self {
+        Realtime {
+            awake_ns: (awake_s * 1e9) as i128,
+            ..self
         }
     }
 
@@ -115,10 +127,19 @@ fn sleep_until(until_ns: i128) {
     }
 }
 
+/// Reads the monotonic clock until it reaches `until_ns`.
+fn wait_awake_until(until_ns: i128) {
+    while monotonic_ns() < until_ns {
+        std::hint::spin_loop();
+    }
+}
+
 impl Clock for Realtime {
     fn wait(&mut self, number: u64, _publisher: &Publisher) -> TickTiming {
         let due_ns = tick(number, self.period_s).scheduled_ns;
-        sleep_until(self.origin_ns + i128::from(due_ns));
+        let until_ns = self.origin_ns + i128::from(due_ns);
+        sleep_until(until_ns - self.awake_ns);
+        wait_awake_until(until_ns);
         let woke_ns = self.elapsed_ns().max(0) as u64;
         let late_ns = woke_ns.saturating_sub(due_ns);
         let missed = (late_ns as f64 * 1e-9 / self.period_s) as u32;

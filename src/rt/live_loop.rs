@@ -49,7 +49,7 @@ impl LiveLoop {
         let (runs, waiting) = RingBuffer::new(1);
         let (done, ended) = RingBuffer::new(1);
         let (report, reported) = std::sync::mpsc::channel();
-        let period_s = settings.period_s();
+        let (period_s, awake_s) = (settings.period_s(), settings.awake_s());
         let settings = settings.clone();
         let builder = std::thread::Builder::new().name("bench-loop".into());
         let thread = builder.spawn(move || {
@@ -63,7 +63,7 @@ impl LiveLoop {
             let servo = Servo::new(rig, idle, period_s);
             match pace {
                 Pace::Virtual => ends.serve_virtual(servo, period_s),
-                Pace::Realtime => ends.serve_realtime(servo, period_s),
+                Pace::Realtime => ends.serve_realtime(servo, period_s, awake_s),
             }
         })?;
         let scheduling = reported.recv().map_err(std::io::Error::other)?;
@@ -150,12 +150,14 @@ impl LoopEnds {
         }
     }
 
-    fn serve_realtime(mut self, mut servo: Servo, period_s: f64) {
+    fn serve_realtime(mut self, mut servo: Servo, period_s: f64, awake_s: f64) {
         let (mut idle, mut number) = (Realtime::new(period_s), 0);
         while !self.runs.is_abandoned() {
             match self.runs.pop() {
                 Ok(run) => {
-                    self.serve(&mut servo, run, || Realtime::new(period_s));
+                    self.serve(&mut servo, run, || {
+                        Realtime::new(period_s).awake_before_ticks(awake_s)
+                    });
                     (idle, number) = (Realtime::new(period_s), 0);
                 }
                 Err(_) => number = tick(&mut servo, &mut idle, number),

@@ -204,7 +204,7 @@ impl DisplacementProbe for BlockingRig {
 #[test]
 fn real_time_ticks_are_served_or_counted_as_missed() {
     // 500 Hz for a second. The probe blocks for 20 ms in one tick, which is ten periods: at least nine ticks are missed.
-    let clock = Realtime::new(0.002);
+    let clock = Realtime::new(0.002).awake_before_ticks(80e-6);
     let (ended, records) = run(
         BlockingRig(StillRig::default(), 100),
         Box::new(CurrentProgram(|_| 0.1, 500)),
