@@ -1,5 +1,6 @@
 //! A tick does not allocate and makes no system call, with every program and every fault.
 mod allocation;
+mod drivers;
 mod programs;
 mod system_calls;
 mod test_loop;

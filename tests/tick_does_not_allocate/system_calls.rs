@@ -11,13 +11,13 @@ use crate::{all_trips, stage, weak_motor};
 
 /// How a child process ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Termination {
+pub enum Termination {
     Exit(i32),
     Signal(i32),
 }
 
 /// Runs `work` in a forked child with a single thread and waits for it. The exit code is 0 if `work` returns.
-fn in_child_process(work: impl FnOnce()) -> Termination {
+pub fn in_child_process(work: impl FnOnce()) -> Termination {
     // SAFETY: the child has only this thread. Until `_exit` it takes no lock that another thread may hold: the loop is created
     // before the fork, and its ticks must not lock, which these tests check.
     let child = unsafe { libc::fork() };
@@ -42,21 +42,32 @@ fn in_child_process(work: impl FnOnce()) -> Termination {
     }
 }
 
-/// From now on the kernel kills the process at any system call except `calls`, `exit`, `exit_group` and `rt_sigreturn`.
-fn allow_only(calls: &[libc::c_long]) {
+/// From now on the kernel kills the process at any system call except `calls`, `exit`, `exit_group` and `rt_sigreturn`. A write is
+/// permitted to devices only, not to the standard output and error.
+pub fn allow_only(calls: &[libc::c_long]) {
     const LOAD_WORD: u16 = (libc::BPF_LD | libc::BPF_W | libc::BPF_ABS) as u16;
     const JUMP_IF_EQUAL: u16 = (libc::BPF_JMP | libc::BPF_JEQ | libc::BPF_K) as u16;
+    const JUMP_IF_GREATER: u16 = (libc::BPF_JMP | libc::BPF_JGT | libc::BPF_K) as u16;
     const RETURN: u16 = (libc::BPF_RET | libc::BPF_K) as u16;
+    /// Offset of the low word of the first argument in the filter's data.
+    const FIRST_ARGUMENT: u32 = 16;
     let line = |code, jt, jf, k| libc::sock_filter { code, jt, jf, k };
-    let mut filter = [line(RETURN, 0, 0, libc::SECCOMP_RET_KILL_PROCESS); 16];
+    let mut filter = [line(RETURN, 0, 0, libc::SECCOMP_RET_KILL_PROCESS); 20];
     let always = [libc::SYS_exit, libc::SYS_exit_group, libc::SYS_rt_sigreturn];
+    let is_write = |call: &&libc::c_long| **call == libc::SYS_write;
     // The number of the system call is the first word of the filter's data.
     filter[0] = line(LOAD_WORD, 0, 0, 0);
     let mut next = 1;
-    for call in always.iter().chain(calls) {
+    for call in always.iter().chain(calls).filter(|call| !is_write(call)) {
         filter[next] = line(JUMP_IF_EQUAL, 0, 1, *call as u32);
         filter[next + 1] = line(RETURN, 0, 0, libc::SECCOMP_RET_ALLOW);
         next += 2;
+    }
+    if calls.iter().any(|call| is_write(&call)) {
+        filter[next] = line(JUMP_IF_EQUAL, 0, 3, libc::SYS_write as u32);
+        filter[next + 1] = line(LOAD_WORD, 0, 0, FIRST_ARGUMENT);
+        filter[next + 2] = line(JUMP_IF_GREATER, 0, 1, libc::STDERR_FILENO as u32);
+        filter[next + 3] = line(RETURN, 0, 0, libc::SECCOMP_RET_ALLOW);
     }
     let program = libc::sock_fprog {
         len: filter.len() as u16,
@@ -198,7 +209,7 @@ fn trips_requests_and_late_ticks_make_no_system_calls() {
 fn real_time_loop_makes_only_clock_system_calls() {
     let config = weak_motor();
     let mut test_loop = TestLoop::running(&config, &[], Box::new(ConstantCurrent(0.01)));
-    let mut clock = Realtime::new(0.002);
+    let mut clock = Realtime::new(0.002).awake_before_ticks(80e-6);
     let termination = in_child_process(|| {
         allow_only(&[libc::SYS_clock_nanosleep, libc::SYS_clock_gettime]);
         for number in 0..50 {
