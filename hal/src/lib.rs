@@ -35,6 +35,7 @@
 #![warn(missing_docs)]
 #![deny(unsafe_code)]
 
+mod atomics;
 pub mod blocking;
 pub mod can;
 pub mod serial;

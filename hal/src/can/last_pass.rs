@@ -1,6 +1,6 @@
 //! The last pass of a driver's thread. A state in atomics does not show that its writer hangs, so it is used together with its age.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use crate::atomics::{AtomicU64, Ordering};
 
 /// Longest time between two passes, in nanoseconds. A pass waits at most 1 ms for a frame.
 const LIMIT_NS: u64 = 20_000_000;

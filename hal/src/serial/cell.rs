@@ -10,9 +10,9 @@
 //! ```
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 
 use crate::Validity;
+use crate::atomics::{AtomicU8, AtomicU64, Ordering};
 
 /// The measurement that the reader thread passes to the loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -110,7 +110,48 @@ fn measurement([position, sequence, measured_ns, validity]: [u64; 4]) -> Measure
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, loom))]
+mod interleavings {
+    use loom::thread;
+
+    use super::*;
+
+    fn consistent(sequence: u64) -> Measurement {
+        Measurement {
+            position_m: sequence as f64,
+            sequence,
+            measured_ns: sequence,
+            validity: Validity::Valid,
+        }
+    }
+
+    /// Each reading is one that was published, as a whole, and no reading is older than the one before.
+    #[test]
+    fn readings_are_whole_and_in_order() {
+        loom::model(|| {
+            let (mut writer, mut reader) = cell();
+            writer.publish(consistent(1));
+            let publishing = thread::spawn(move || {
+                (2..=3).for_each(|sequence| writer.publish(consistent(sequence)));
+            });
+            let mut before = 0;
+            for _ in 0..2 {
+                let taken = reader.newest();
+                assert_eq!(taken, consistent(taken.sequence), "torn");
+                assert!(
+                    taken.sequence >= before,
+                    "{} after {before}",
+                    taken.sequence
+                );
+                before = taken.sequence;
+            }
+            publishing.join().unwrap();
+            assert_eq!(reader.newest(), consistent(3), "the newest was lost");
+        });
+    }
+}
+
+#[cfg(all(test, not(loom)))]
 mod tests {
     use super::*;
 
