@@ -31,6 +31,11 @@ pub struct InterlockSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub model_error_ratio: Option<f64>,
+    /// Share of the largest modelled position by which the measured and the modelled position may differ in addition; 0.5 if
+    /// absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.05, max = 2.0))]
+    pub model_error_share: Option<f64>,
     /// Reason for which the monitor of the residuals is switched off, for example a stage whose model is not known yet.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_error_off: Option<String>,

@@ -1,24 +1,33 @@
 //! The residual monitor of a plan: the models of plant and closed loop that the interlocks compare with the measured motion.
 
 use super::loop_check::closed_loop_of;
-use super::plan::Plan;
+use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use crate::control::ControllerText;
 use crate::model::plant::{self, LoopPlant, ModalModel};
-use crate::rt::residual::{LoopPrediction, Residuals};
+use crate::rt::residual::{LoopPrediction, ResidualBound, Residuals};
 
-/// The monitor of a run, by the model of the configuration; `None` if the settings switch it off.
+/// Share of the largest modelled position without a setting (see [`rt::residual`](crate::rt::residual)).
+const DEFAULT_SHARE: f64 = 0.5;
+
+/// The monitor of a run, by the model of the configuration; `None` if the settings switch it off, and for the static steps of a
+/// calibration.
 pub fn residuals(plan: &Plan) -> Result<Option<Residuals>, PlanError> {
     let settings = &plan.config.interlock;
     let Some(ratio) = settings.model_error_ratio else {
         return Ok(None);
     };
-    if settings.model_error_off.is_some() {
+    // The static steps measure scale and sign, which the monitor would take as given.
+    if settings.model_error_off.is_some() || plan.kind == RunKind::Calibrate {
         return Ok(None);
     }
     let modes = ModalModel::of(&plant::build(&plan.config.plant)?)?.modes;
     let model = LoopPlant::with_mean_age(&plan.config, &modes);
-    let residuals = Residuals::new(model, &modes, ratio * settings.soft_limit_m);
+    let bound = ResidualBound {
+        absolute_m: ratio * settings.soft_limit_m,
+        share: settings.model_error_share.unwrap_or(DEFAULT_SHARE),
+    };
+    let residuals = Residuals::new(model, &modes, bound);
     Ok(Some(match &plan.controller {
         Some(controller) => residuals.closed_by(prediction(plan, controller)?),
         None => residuals,

@@ -271,7 +271,7 @@ fn trip(message: &Message) -> Result<Trip, UnknownValue> {
             command_a: limit,
         },
         "model_error" => Trip::ModelError {
-            measured_m: value,
+            error_m: value,
             modelled_m: message
                 .modelled_m
                 .ok_or_else(|| unknown("modelled_m", "nothing"))?,

@@ -155,7 +155,7 @@ messages! {
         field "20" (double, optional) gain_factor,
         /// Of the order `tune`: length of the ramp in ticks.
         field "21" (uint64) ramp_ticks,
-        /// Of a trip `model_error`: the modelled position in metres; `value` is the measured one.
+        /// Of a trip `model_error`: the modelled position in metres; `value` is the filtered difference from it.
         field "22" (double, optional) modelled_m,
     }
     /// A summary of up to one second of scheduled time, on channel `/timing`.

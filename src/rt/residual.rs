@@ -11,8 +11,8 @@
 //!
 //! |e| > a + b max |y_p|
 //!
-//! where the maximum decays with twice the time constant of the slowest mode, and a = `interlock.model_error_ratio` times
-//! `interlock.soft_limit_m`.
+//! where the maximum decays with twice the time constant of the slowest mode, a = `interlock.model_error_ratio` times
+//! `interlock.soft_limit_m`, and b = `interlock.model_error_share`, 1/2 if absent.
 //!
 //! - **Plant.** A lightly damped mode whose frequency is uncertain by its own half-power bandwidth makes a residual of up to twice
 //!   its response: the full residual proves nothing near a mode. The low-pass consists of two first-order sections at half the
@@ -25,7 +25,7 @@
 //!   moves the modelled plant along y_loop. Around and above the crossover T(D) differs: hence b = 1/2 of the largest predicted
 //!   position. An oscillation that grows leaves y_loop.
 //! - **Closed loop without prediction.** A loop that is unstable by the model, or that has no linear law, cannot be predicted. Then
-//!   y_loop is the reference, and b = 1 allows an overshoot of 100 %.
+//!   y_loop is the reference, and b is twice as large: 1 allows an overshoot of 100 %.
 //!
 //! A free body (a mode of 0 Hz) drifts without limit after the smallest error of the force; its plant residual is not evaluated.
 
@@ -35,10 +35,8 @@ use crate::control::{ControlLaw, LawInput};
 use crate::model::plant::{LoopPlant, LoopPlantState, Mode};
 use crate::util::numeric::is_within;
 
-/// Share of the largest predicted position that a residual may have, beside the absolute bound.
-const RELATIVE_BOUND: f64 = 0.5;
-/// The same where the reference replaces the prediction.
-const REFERENCE_BOUND: f64 = 1.0;
+/// Factor of the share where the reference replaces the prediction.
+const REFERENCE_FACTOR: f64 = 2.0;
 /// Corner frequency of the low-pass over the frequency of the first mode.
 const CORNER_RATIO: f64 = 0.5;
 /// Corner frequency of the low-pass of the closed loop over the frequency of the last mode.
@@ -56,9 +54,18 @@ pub enum LoopPrediction {
     Reference,
 }
 
+/// The largest permitted residual: an absolute bound, and a share of the largest predicted position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualBound {
+    /// a in metres.
+    pub absolute_m: f64,
+    /// b.
+    pub share: f64,
+}
+
 /// The monitor of a run. Without [`Residuals::closed_by`] it evaluates the residual of the plant only.
 pub struct Residuals {
-    bound_m: f64,
+    bound: ResidualBound,
     plant: Predicted,
     low_pass: Option<LowPass>,
     /// At rest, for the residuals of the closed loop.
@@ -101,21 +108,20 @@ struct Closed {
     is_active: bool,
 }
 
-/// A measured or modelled position, its prediction and the bound of their difference, in metres.
+/// A modelled position, the difference of another one from it, and the bound of the difference, in metres.
 struct Residual {
-    measured_m: f64,
     modelled_m: f64,
     error_m: f64,
     limit_m: f64,
 }
 
 impl Residuals {
-    /// The monitor of a plant with these modes; `bound_m` is the absolute bound a in metres.
-    pub fn new(plant: LoopPlant, modes: &[Mode], bound_m: f64) -> Residuals {
+    /// The monitor of a plant with these modes.
+    pub fn new(plant: LoopPlant, modes: &[Mode], bound: ResidualBound) -> Residuals {
         let period_s = plant.period_s();
         let decay = decay(modes, period_s);
         Residuals {
-            bound_m,
+            bound,
             plant: Predicted::new(plant, decay),
             low_pass: first_rad_s(modes).map(|rad_s| LowPass::new(CORNER_RATIO * rad_s, period_s)),
             closed_low_pass: LowPass::new(CLOSED_CORNER_RATIO * last_rad_s(modes), period_s),
@@ -160,7 +166,7 @@ impl Residuals {
         let plant_m = self.plant.position_m;
         self.check_plant(moved_m, plant_m)?;
         match &mut self.closed {
-            Some(closed) if closed.is_active => closed.check(moved_m, plant_m, self.bound_m),
+            Some(closed) if closed.is_active => closed.check(moved_m, plant_m, self.bound),
             Some(_) | None => Ok(()),
         }
     }
@@ -170,10 +176,9 @@ impl Residuals {
             return Ok(());
         };
         let residual = Residual {
-            measured_m: moved_m,
             modelled_m: plant_m,
             error_m: low_pass.next(moved_m - plant_m),
-            limit_m: self.bound_m + RELATIVE_BOUND * self.plant.peak.value_m,
+            limit_m: self.bound.limit_m(&self.plant.peak),
         };
         residual.check()
     }
@@ -209,21 +214,19 @@ impl Closed {
     }
 
     /// Checks the measured position, and the one that the applied current gives by the model of the plant.
-    fn check(&mut self, moved_m: f64, plant_m: f64, bound_m: f64) -> Result<(), Trip> {
-        let (modelled_m, relative) = match self.prediction {
-            LoopPrediction::Model(_) => (self.plant.position_m, RELATIVE_BOUND),
-            LoopPrediction::Reference => (self.reference_m, REFERENCE_BOUND),
+    fn check(&mut self, moved_m: f64, plant_m: f64, bound: ResidualBound) -> Result<(), Trip> {
+        let (modelled_m, bound) = match self.prediction {
+            LoopPrediction::Model(_) => (self.plant.position_m, bound),
+            LoopPrediction::Reference => (self.reference_m, bound.of_reference()),
         };
-        let limit_m = bound_m + relative * self.plant.peak.value_m;
-        for (measured_m, low_pass) in [moved_m, plant_m].into_iter().zip(&mut self.low_passes) {
-            let error_m = low_pass.next(measured_m - modelled_m);
-            Residual {
-                measured_m,
+        let limit_m = bound.limit_m(&self.plant.peak);
+        for (position_m, low_pass) in [moved_m, plant_m].into_iter().zip(&mut self.low_passes) {
+            let residual = Residual {
                 modelled_m,
-                error_m,
+                error_m: low_pass.next(position_m - modelled_m),
                 limit_m,
-            }
-            .check()?;
+            };
+            residual.check()?;
         }
         Ok(())
     }
@@ -245,6 +248,19 @@ impl Closed {
                 self.applied_a = law.update(&input.with_gain(gain));
             }
             LoopPrediction::Reference => self.plant.peak.add(self.reference_m),
+        }
+    }
+}
+
+impl ResidualBound {
+    fn limit_m(&self, peak: &Peak) -> f64 {
+        self.absolute_m + self.share * peak.value_m
+    }
+
+    fn of_reference(self) -> ResidualBound {
+        ResidualBound {
+            share: REFERENCE_FACTOR * self.share,
+            ..self
         }
     }
 }
@@ -306,7 +322,7 @@ impl Residual {
         match is_within(self.error_m.abs(), self.limit_m) {
             true => Ok(()),
             false => Err(Trip::ModelError {
-                measured_m: self.measured_m,
+                error_m: self.error_m,
                 modelled_m: self.modelled_m,
                 limit_m: self.limit_m,
             }),

@@ -62,8 +62,9 @@ pub enum Trip {
     },
     /// The measured position does not answer the current as the model does, all in metres from the rest position.
     ModelError {
-        /// The measured position, or in closed loop that of the modelled plant with the applied current.
-        measured_m: f64,
+        /// The low-pass filtered difference between the position and the modelled one. The position is the measured one, or in
+        /// closed loop also the one that the applied current gives by the model of the plant.
+        error_m: f64,
         /// The modelled position.
         modelled_m: f64,
         /// The limit of the difference.
@@ -139,7 +140,8 @@ impl Trip {
             Trip::ModelError { .. } => (
                 "model_error",
                 "check the probe and its target, the leads and the cable of the motor, the controller, and the model of the stage; \
-                 the limit is interlock.model_error_ratio, and for an unknown stage interlock.model_error_off = \"REASON\" switches the comparison off",
+                 the limits are interlock.model_error_ratio and interlock.model_error_share, and for an unknown stage \
+                 interlock.model_error_off = \"REASON\" switches the comparison off",
             ),
             Trip::Overruns { .. } => (
                 "overruns",
@@ -190,10 +192,8 @@ impl Trip {
                 command_a,
             } => Some((actual_a, command_a)),
             Trip::ModelError {
-                measured_m,
-                limit_m,
-                ..
-            } => Some((measured_m, limit_m)),
+                error_m, limit_m, ..
+            } => Some((error_m, limit_m)),
             Trip::Overruns { count, limit } => Some((f64::from(count), f64::from(limit))),
             Trip::CommandNotFinite
             | Trip::ProbeInvalid
@@ -255,14 +255,14 @@ impl fmt::Display for Trip {
                 "the amplifier measures {actual_a:.3} A, but the nearest commanded current is {command_a:.3} A"
             ),
             Trip::ModelError {
-                measured_m,
+                error_m,
                 modelled_m,
                 limit_m,
             } => write!(
                 f,
-                "the position does not answer the current: {:.1} um measured, {:.1} um by the model, \
-                 a difference of {:.1} um is allowed",
-                measured_m * 1e6,
+                "the position does not answer the current: it differs by {:.1} um from the modelled {:.1} um, \
+                 and {:.1} um are allowed",
+                error_m.abs() * 1e6,
                 modelled_m * 1e6,
                 limit_m * 1e6
             ),

@@ -117,7 +117,7 @@ fn events_of_every_kind_round_trip_in_order() {
             limit: 10,
         },
         Trip::ModelError {
-            measured_m: -0.0,
+            error_m: -0.0,
             modelled_m: 0.1 + 0.2,
             limit_m: 1e-5,
         },

@@ -1,7 +1,8 @@
 //! The residual monitor does not trip on a stage that differs from its model: operating points 0 to 10 % of the beam length and
 //! asymmetries -10 to +10 %, while the model keeps those of its profile.
 //!
-//! `BENCH_MONITOR_TICKS=100000000` runs 10^8 ticks, the default is 4 million; `BENCH_MONITOR_SEED` sets the seed.
+//! `BENCH_MONITOR_TICKS=100000000` runs 10^8 ticks, the default is 4 million; `BENCH_MONITOR_SEED` sets the seed, and
+//! `BENCH_MONITOR_SHARE` a share `interlock.model_error_share` other than 0.5, to find the margin.
 
 use bench::config::{Config, ExcitationKind, PlantSettings, Source, load};
 use bench::experiment::{Plan, closed_loop, run};
@@ -40,10 +41,13 @@ impl Draw {
 
     fn profile(&mut self) -> Config {
         let profile = *self.one_of(&["stage", "stage", "stage", "xy", "lab"]);
-        let seed = format!("sim.seed={}", self.0.next_u64() % 1_000_000);
+        let mut sets = vec![format!("sim.seed={}", self.0.next_u64() % 1_000_000)];
+        if let Ok(share) = std::env::var("BENCH_MONITOR_SHARE") {
+            sets.push(format!("interlock.model_error_share={share}"));
+        }
         load(&Source {
             config: Some(profile.into()),
-            sets: vec![seed],
+            sets,
             ..Source::default()
         })
         .expect("valid")

@@ -3,6 +3,8 @@
 mod any_frames;
 mod bring_up;
 mod failing;
+#[cfg(loom)]
+mod interleavings;
 mod monitor;
 
 use std::sync::{Arc, Mutex, MutexGuard};
