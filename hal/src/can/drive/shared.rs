@@ -91,7 +91,8 @@ impl Shared {
     }
 
     pub(super) fn set_intent(&self, intent: Intent) {
-        self.intent.store(intent as u8, Ordering::Release);
+        // An exchange, as in `end_reset`: exchanges have one order, so that the newer intent of the caller remains.
+        self.intent.swap(intent as u8, Ordering::AcqRel);
         if intent.is_in_use() {
             self.uses.fetch_add(1, Ordering::Release);
         }
