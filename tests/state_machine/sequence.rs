@@ -6,7 +6,7 @@ use proptest::prelude::*;
 pub enum Fault {
     InvalidReading,
     Travel,
-    AmplifierFault,
+    ReportsFault,
     ReportsDisabled,
     RefusedCommand,
     RefusedEnable,
@@ -20,7 +20,7 @@ pub enum Fault {
 const FAULTS: [Fault; 11] = [
     Fault::InvalidReading,
     Fault::Travel,
-    Fault::AmplifierFault,
+    Fault::ReportsFault,
     Fault::ReportsDisabled,
     Fault::RefusedCommand,
     Fault::RefusedEnable,
