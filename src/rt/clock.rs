@@ -163,3 +163,15 @@ impl Clock for Realtime {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waits_awake_for_the_given_time_only() {
+        assert_eq!(Realtime::new(0.001).awake_ns, 0);
+        let clock = Realtime::new(0.001).awake_before_ticks(80e-6);
+        assert_eq!((clock.awake_ns, clock.period_s), (80_000, 0.001));
+    }
+}
