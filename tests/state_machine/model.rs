@@ -265,7 +265,7 @@ impl Model {
             self.missed.add(missed, number)
         };
         let is_disabled = faults.has(Fault::ReportsDisabled) && self.runs();
-        let is_bad = [Fault::InvalidReading, Fault::Travel, Fault::ReportsFault];
+        let is_bad = [Fault::InvalidReading, Fault::Travel, Fault::FailedDrive];
         is_in_time && !is_disabled && !is_bad.iter().any(|fault| faults.has(*fault))
     }
 

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 pub enum Fault {
     InvalidReading,
     Travel,
-    ReportsFault,
+    FailedDrive,
     ReportsDisabled,
     RefusedCommand,
     RefusedEnable,
@@ -20,7 +20,7 @@ pub enum Fault {
 const FAULTS: [Fault; 11] = [
     Fault::InvalidReading,
     Fault::Travel,
-    Fault::ReportsFault,
+    Fault::FailedDrive,
     Fault::ReportsDisabled,
     Fault::RefusedCommand,
     Fault::RefusedEnable,

@@ -118,7 +118,7 @@ impl CurrentAmplifier for TestRig {
 
     fn status(&self) -> AmplifierStatus {
         let shared = self.shared();
-        if shared.faults.has(Fault::ReportsFault) {
+        if shared.faults.has(Fault::FailedDrive) {
             return AmplifierStatus::Fault(9);
         }
         match shared.is_enabled && !shared.faults.has(Fault::ReportsDisabled) {
