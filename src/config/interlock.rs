@@ -32,7 +32,7 @@ pub struct InterlockSettings {
     #[schemars(range(min = 1e-6, max = 1.0))]
     pub model_error_ratio: Option<f64>,
     /// Share of the largest modelled position by which the measured and the modelled position may differ in addition; 0.5 if
-    /// absent.
+    /// absent. In closed loop 0.4 of it, a fifth, is used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.05, max = 2.0))]
     pub model_error_share: Option<f64>,

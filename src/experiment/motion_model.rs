@@ -46,9 +46,10 @@ pub(super) fn warn_if_off(plan: &Plan) {
 /// The prediction of a closed loop: by its model if the model is linear and stable.
 fn prediction(plan: &Plan, controller: &ControllerText) -> Result<LoopPrediction, PlanError> {
     let servo = &plan.config.servo;
-    let is_stable = closed_loop_of(controller, &plan.config).is_ok_and(|model| model.is_stable());
-    Ok(match is_stable {
-        true => LoopPrediction::Model(controller.design(servo.rate_hz)?.law(servo.period_s())),
-        false => LoopPrediction::Reference,
+    let model = closed_loop_of(controller, &plan.config);
+    Ok(match model.map(|model| model.is_stable()) {
+        Ok(true) => LoopPrediction::Model(controller.design(servo.rate_hz)?.law(servo.period_s())),
+        Ok(false) => LoopPrediction::Unstable,
+        Err(_) => LoopPrediction::NotLinear,
     })
 }

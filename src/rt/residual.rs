@@ -22,10 +22,10 @@
 //! - **Closed loop.** Both residuals pass the same low-pass at twice the frequency of the last modelled mode: above it, modes that
 //!   are not modelled answer, and the model proves nothing. An oscillation at a modelled mode passes with at least 4/5. Feedback
 //!   makes y insensitive to the plant below the crossover, so y - y_loop is small there, and the current must be the one that
-//!   moves the modelled plant along y_loop. Around and above the crossover T(D) differs: hence b = 1/2 of the largest predicted
-//!   position. An oscillation that grows leaves y_loop.
-//! - **Closed loop without prediction.** A loop that is unstable by the model, or that has no linear law, cannot be predicted. Then
-//!   y_loop is the reference, and b is twice as large: 1 allows an overshoot of 100 %.
+//!   moves the modelled plant along y_loop. Around and above the crossover T(D) differs, and the static compliance may: hence 0.4 b,
+//!   a fifth of the largest predicted position. An oscillation that grows leaves y_loop.
+//! - **Closed loop without prediction.** In a loop that is unstable by the model y_loop is the reference, with 0.4 b: what leaves it
+//!   is the oscillation. With a law that is not linear y_loop is the reference, with 2 b: 1 allows an overshoot of 100 %.
 //!
 //! A free body (a mode of 0 Hz) drifts without limit after the smallest error of the force; its plant residual is not evaluated.
 
@@ -35,8 +35,10 @@ use crate::control::{ControlLaw, LawInput};
 use crate::model::plant::{LoopPlant, LoopPlantState, Mode};
 use crate::util::numeric::is_within;
 
-/// Factor of the share where the reference replaces the prediction.
-const REFERENCE_FACTOR: f64 = 2.0;
+/// Factor of the share in a closed loop.
+const CLOSED_FACTOR: f64 = 0.4;
+/// Factor of the share where the reference replaces the prediction, because the law is not linear.
+const NOT_LINEAR_FACTOR: f64 = 2.0;
 /// Corner frequency of the low-pass over the frequency of the first mode.
 const CORNER_RATIO: f64 = 0.5;
 /// Corner frequency of the low-pass of the closed loop over the frequency of the last mode.
@@ -50,8 +52,10 @@ const MAX_MISSED: u32 = 1000;
 pub enum LoopPrediction {
     /// By the model of the closed loop, with a law at rest.
     Model(Box<dyn ControlLaw>),
-    /// The reference itself: the loop is unstable by the model, or its law is not linear.
-    Reference,
+    /// The reference: the loop is unstable by the model, so that an oscillation will grow.
+    Unstable,
+    /// The reference: the law is not linear.
+    NotLinear,
 }
 
 /// The largest permitted residual: an absolute bound, and a share of the largest predicted position.
@@ -216,8 +220,9 @@ impl Closed {
     /// Checks the measured position, and the one that the applied current gives by the model of the plant.
     fn check(&mut self, moved_m: f64, plant_m: f64, bound: ResidualBound) -> Result<(), Trip> {
         let (modelled_m, bound) = match self.prediction {
-            LoopPrediction::Model(_) => (self.plant.position_m, bound),
-            LoopPrediction::Reference => (self.reference_m, bound.of_reference()),
+            LoopPrediction::Model(_) => (self.plant.position_m, bound.scaled(CLOSED_FACTOR)),
+            LoopPrediction::Unstable => (self.reference_m, bound.scaled(CLOSED_FACTOR)),
+            LoopPrediction::NotLinear => (self.reference_m, bound.scaled(NOT_LINEAR_FACTOR)),
         };
         let limit_m = bound.limit_m(&self.plant.peak);
         for (position_m, low_pass) in [moved_m, plant_m].into_iter().zip(&mut self.low_passes) {
@@ -247,7 +252,9 @@ impl Closed {
                 };
                 self.applied_a = law.update(&input.with_gain(gain));
             }
-            LoopPrediction::Reference => self.plant.peak.add(self.reference_m),
+            LoopPrediction::Unstable | LoopPrediction::NotLinear => {
+                self.plant.peak.add(self.reference_m);
+            }
         }
     }
 }
@@ -257,9 +264,9 @@ impl ResidualBound {
         self.absolute_m + self.share * peak.value_m
     }
 
-    fn of_reference(self) -> ResidualBound {
+    fn scaled(self, factor: f64) -> ResidualBound {
         ResidualBound {
-            share: REFERENCE_FACTOR * self.share,
+            share: factor * self.share,
             ..self
         }
     }
