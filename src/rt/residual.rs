@@ -359,3 +359,68 @@ fn decay(modes: &[Mode], period_s: f64) -> f64 {
     let time_constant_s = (2.0 / slowest).max(shortest_s).min(longest_s);
     libm::exp(-period_s / time_constant_s)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mode(omega_rad_s: f64, damping_ratio: f64) -> Mode {
+        Mode {
+            omega_rad_s,
+            damping_ratio,
+            shape: nalgebra::DVector::zeros(1),
+            force_gain: 1.0,
+            sensor_gain: 1.0,
+            floor_gain: 0.0,
+        }
+    }
+
+    #[test]
+    fn low_passes_follow_the_first_and_the_last_mode() {
+        let modes = [mode(60.0, 0.01), mode(30.0, 0.02), mode(500.0, 0.005)];
+        assert_eq!(first_rad_s(&modes), Some(30.0));
+        assert_eq!(last_rad_s(&modes), 500.0);
+    }
+
+    #[test]
+    fn a_free_body_has_no_plant_residual_and_no_last_mode() {
+        let free = [mode(0.0, 0.0)];
+        assert_eq!(first_rad_s(&free), None);
+        assert_eq!(first_rad_s(&[]), None);
+        assert_eq!([last_rad_s(&free), last_rad_s(&[])], [f64::INFINITY; 2]);
+    }
+
+    /// exp(-T/tau) with tau = 2/(zeta omega) of the slowest mode, between 0.1 s and 1000 s.
+    #[test]
+    fn maximum_decays_with_twice_the_longest_time_constant() {
+        let period_s: f64 = 1e-3;
+        for (modes, time_constant_s) in [
+            (vec![mode(100.0, 0.01), mode(50.0, 0.01)], 4.0),
+            (vec![mode(1e4, 0.5)], 0.1),
+            (vec![mode(0.0, 0.0), mode(50.0, 0.01)], 1000.0),
+            (vec![], 1000.0),
+        ] {
+            let expected = (-period_s / time_constant_s).exp();
+            let decayed = decay(&modes, period_s);
+            assert!((decayed - expected).abs() < 1e-15, "{decayed} {expected}");
+        }
+    }
+
+    #[test]
+    fn peak_fades_and_rises() {
+        let mut peak = Peak {
+            decay: 0.5,
+            value_m: 0.0,
+        };
+        peak.add(-8.0);
+        peak.fade();
+        peak.add(1.0);
+        assert_eq!(peak.value_m, 4.0);
+        let bound = ResidualBound {
+            absolute_m: 1.0,
+            share: 0.5,
+        };
+        assert_eq!(bound.limit_m(&peak), 3.0);
+        assert_eq!(bound.scaled(0.5).limit_m(&peak), 2.0);
+    }
+}

@@ -21,7 +21,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseResult, TestRunner};
 
 use model::{Cause, Expected, Model, RunSettings};
-use sequence::{Happening, TickInputs, Timeline, happenings};
+use sequence::{Happening, Timeline, happenings};
 use test_loop::{Done, TestLoop};
 
 const CAUSES: [Cause; 7] = [
@@ -89,8 +89,9 @@ fn follows_the_model(
         }
         let expected = model.tick(&inputs, real.next_tick(inputs.missed));
         let done = real.tick(&inputs);
-        check(&model, &expected, &inputs, &done)?;
+        check(&model, &expected, &done)?;
         check_off(&model, &real, &done)?;
+        check_requests(&model, &real, &done)?;
         coverage.ticks_with_current += u64::from(has_current(&done));
         coverage.settling_ticks +=
             u64::from(has_current(&done) && expected.state == State::Settling);
@@ -107,7 +108,7 @@ fn has_current(done: &Done) -> bool {
         .is_some_and(|current_a| current_a != 0.0)
 }
 
-fn check(model: &Model, expected: &Expected, inputs: &TickInputs, done: &Done) -> TestCaseResult {
+fn check(model: &Model, expected: &Expected, done: &Done) -> TestCaseResult {
     prop_assert_eq!(done.record.state, expected.state, "{:?}", done);
     let command_a = done.calls.command_a;
     prop_assert_eq!(
@@ -129,12 +130,18 @@ fn check(model: &Model, expected: &Expected, inputs: &TickInputs, done: &Done) -
         let heat = model.heat();
         prop_assert!(heat.thermal_a2 <= heat.limit_a2, "{heat:?} {done:?}");
     }
-    let accepted: Vec<bool> = done
-        .answers
-        .iter()
-        .map(|answer| answer.refusal.is_none())
-        .collect();
-    prop_assert_eq!(&accepted, &model.accepted, "{:?} {:?}", inputs, done);
+    Ok(())
+}
+
+/// Each request is answered in its tick, with its number; the amplifier is enabled and reset once for each request.
+fn check_requests(model: &Model, real: &TestLoop, done: &Done) -> TestCaseResult {
+    let answers = done.answers.iter();
+    let accepted: Vec<bool> = answers.map(|answer| answer.refusal.is_none()).collect();
+    prop_assert_eq!(&accepted, &model.accepted, "{:?}", done);
+    let first = real.sent() + 1 - accepted.len() as u64;
+    let numbers = done.answers.iter().map(|answer| answer.id);
+    prop_assert!(numbers.eq(first..=real.sent()), "{:?}", done);
+    prop_assert_eq!(real.begun(), model.begun);
     Ok(())
 }
 

@@ -63,6 +63,15 @@ pub struct Model {
     lease_age: u64,
     pub causes: Vec<Cause>,
     pub accepted: Vec<bool>,
+    /// How often enabling and resetting of the amplifier must have begun.
+    pub begun: Begun,
+}
+
+/// How often enabling and resetting of the amplifier have begun.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Begun {
+    pub enables: u64,
+    pub resets: u64,
 }
 
 /// The thermal model of the motor: thermal' = (i^2 - thermal)/tau by the explicit Euler method.
@@ -105,6 +114,7 @@ impl Model {
             lease_age: 0,
             causes: Vec::new(),
             accepted: Vec::new(),
+            begun: Begun::default(),
         }
     }
 
@@ -192,13 +202,20 @@ impl Model {
                 true
             }
             Order::Clear if self.state == State::Tripped => {
-                if !self.is_clearing && !faults.has(Fault::RefusedReset) {
-                    self.is_clearing = true;
-                    self.poll_reset(faults);
+                if !self.is_clearing {
+                    self.begin_reset(faults);
                 }
                 true
             }
             Order::Arm | Order::Clear | Order::Tune => false,
+        }
+    }
+
+    fn begin_reset(&mut self, faults: Faults) {
+        self.begun.resets += 1;
+        if !faults.has(Fault::RefusedReset) {
+            self.is_clearing = true;
+            self.poll_reset(faults);
         }
     }
 
@@ -277,8 +294,11 @@ impl Model {
         if self.healthy < self.settings.healthy_ticks {
             return;
         }
-        if !self.has_begun && faults.has(Fault::RefusedEnable) {
-            return self.trip(Cause::Enable);
+        if !self.has_begun {
+            self.begun.enables += 1;
+            if faults.has(Fault::RefusedEnable) {
+                return self.trip(Cause::Enable);
+            }
         }
         self.has_begun = true;
         if faults.has(Fault::PendingEnable) {

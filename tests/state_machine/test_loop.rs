@@ -18,7 +18,7 @@ use bench_hal::{
 };
 use rtrb::{Consumer, RingBuffer};
 
-use crate::model::RunSettings;
+use crate::model::{Begun, RunSettings};
 use crate::sequence::{Fault, Faults, Load, Order, TickInputs};
 
 /// What the amplifier was told in a tick.
@@ -35,6 +35,7 @@ struct Shared {
     faults: Faults,
     is_enabled: bool,
     calls: Calls,
+    begun: Begun,
 }
 
 /// A stage that moves by +-1 nm only.
@@ -61,6 +62,7 @@ fn refusal() -> DeviceError {
 impl CurrentAmplifier for TestRig {
     fn begin_enable(&mut self) -> Result<(), DeviceError> {
         let mut shared = self.shared();
+        shared.begun.enables += 1;
         if shared.faults.has(Fault::RefusedEnable) {
             return Err(refusal());
         }
@@ -99,7 +101,9 @@ impl CurrentAmplifier for TestRig {
     }
 
     fn begin_reset(&mut self) -> Result<(), DeviceError> {
-        match self.shared().faults.has(Fault::RefusedReset) {
+        let mut shared = self.shared();
+        shared.begun.resets += 1;
+        match shared.faults.has(Fault::RefusedReset) {
             true => Err(refusal()),
             false => Ok(()),
         }
@@ -206,6 +210,8 @@ pub struct TestLoop {
     outside: Outside,
     clock: Virtual,
     next: u64,
+    /// Number of requests of this run.
+    sent: u64,
 }
 
 impl TestLoop {
@@ -221,6 +227,7 @@ impl TestLoop {
             outside,
             clock: Virtual { period_s },
             next: 0,
+            sent: 0,
         }
     }
 
@@ -235,7 +242,7 @@ impl TestLoop {
         let (run, outside) = run(&self.config, self.settings, thermal_a2);
         self.servo.exchange(run);
         self.outside = outside;
-        self.next = 0;
+        (self.next, self.sent) = (0, 0);
     }
 
     pub fn tick(&mut self, inputs: &TickInputs) -> Done {
@@ -262,7 +269,9 @@ impl TestLoop {
         shared.calls = Calls::default();
         drop(shared);
         for order in &inputs.orders {
-            assert!(self.outside.requests.send(request(*order)).is_ok());
+            self.sent += 1;
+            let number = self.outside.requests.send(request(*order)).ok();
+            assert_eq!(number, Some(self.sent));
         }
         for _ in 0..inputs.signals {
             self.outside.flags.raise();
@@ -291,6 +300,15 @@ impl TestLoop {
             calls: self.rig.shared().calls,
             answers,
         }
+    }
+
+    /// Number of requests of this run.
+    pub fn sent(&self) -> u64 {
+        self.sent
+    }
+
+    pub fn begun(&self) -> Begun {
+        self.rig.shared().begun
     }
 
     pub fn amplifier_is_enabled(&self) -> bool {
