@@ -328,3 +328,14 @@ fn nanoseconds(seconds: f64) -> u64 {
 fn seconds(ns: u64) -> f64 {
     ns as f64 * 1e-9
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tick_missed_exactly_one_second_ago_still_counts() {
+        assert!(!is_past(5, 1_000_000_005));
+        assert!(is_past(5, 1_000_000_006));
+    }
+}

@@ -120,3 +120,24 @@ impl Tuning {
         self.now
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_of_this_moment_are_those_of_the_last_tick() {
+        let to = Factors {
+            reference: 2.0,
+            gain: 0.5,
+        };
+        let mut tuning = Tuning::default();
+        assert_eq!(tuning.now(), Factors::default());
+        tuning.begin(Tune::new(to, 4).expect("valid factors"));
+        for _ in 0..4 {
+            let next = tuning.next();
+            assert_eq!(tuning.now(), next);
+        }
+        assert_eq!(tuning.now(), to);
+    }
+}

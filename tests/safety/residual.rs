@@ -3,12 +3,16 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
 use bench::config::{Config, Source, load};
-use bench::experiment::{Plan, replay, run};
+use bench::experiment::{Plan, replay, residuals, run};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
+use bench::rt::interlock::Interlocks;
+use bench::rt::program::Decision;
 use bench::rt::thread::Pace;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+
+use crate::rig::interlocks;
 
 /// 10 % of the travel limit of 900 um.
 const TRAVEL_M: f64 = 90e-6;
@@ -246,4 +250,61 @@ fn correct_wiring_runs_to_its_end() {
         run_wired(&Plan::chirp(config(&[])), Wiring::Correct).0,
         None
     );
+}
+
+/// The interlocks of a plan with its monitor, at the beginning of a run.
+fn monitored(plan: &Plan) -> Interlocks {
+    let residuals = residuals(plan).expect("a model");
+    assert!(residuals.is_some(), "the monitor is on by default");
+    let mut interlocks = interlocks(&plan.config).with_residuals(residuals);
+    interlocks.begin_run();
+    interlocks
+}
+
+/// One tick of a closed loop: position and reference in metres.
+fn closed_tick(
+    interlocks: &mut Interlocks,
+    position_m: f64,
+    reference_m: f64,
+    applied_a: f64,
+) -> Result<(), Trip> {
+    let checked = interlocks.check_motion(position_m, 0);
+    let decision = Decision {
+        reference_m,
+        requested_a: applied_a,
+        active: true,
+    };
+    interlocks.record_motion(&decision, 1.0, applied_a);
+    checked
+}
+
+/// Every run has its own rest position, and its models begin at rest.
+#[test]
+fn second_run_is_compared_from_its_own_rest() {
+    for amplitude in ["10um", "50um"] {
+        let plan = loop_plan("fast", amplitude, &[]);
+        let mut interlocks = monitored(&plan);
+        for _ in 0..3000 {
+            // The first run ends with a position that the second one must not know.
+            let _ = closed_tick(&mut interlocks, 0.0, 50e-6, 0.3);
+        }
+        interlocks.begin_run();
+        for tick in 0..5000 {
+            let checked = closed_tick(&mut interlocks, 100e-6, 100e-6, 0.0);
+            assert_eq!(checked, Ok(()), "tick {tick}");
+        }
+    }
+}
+
+#[test]
+fn reference_counts_from_the_rest_position_where_it_replaces_the_model() {
+    let plan = loop_plan("fast", "10um", &["plant.mass_asymmetry=-0.1"]);
+    let mut interlocks = monitored(&plan);
+    for tick in 0..5000 {
+        let checked = closed_tick(&mut interlocks, 100e-6, 100e-6, 0.0);
+        assert_eq!(checked, Ok(()), "tick {tick}");
+    }
+    let mut later = (0..100).map(|_| closed_tick(&mut interlocks, 100e-6, 150e-6, 0.0));
+    let trip = later.find_map(Result::err);
+    assert!(matches!(trip, Some(Trip::ModelError { .. })), "{trip:?}");
 }

@@ -5,7 +5,7 @@ use bench::excitation::Reference;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Excite, Program};
-use bench::rt::record::{EventKind, TickRecord};
+use bench::rt::record::{EventKind, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::settling::{Settling, SettlingStep};
 use bench_hal::Validity;
@@ -258,4 +258,34 @@ fn residual_of_the_ramp_follows_the_closed_form() {
             "f T = {f_t}: {swing}, closed form {expected}"
         );
     }
+}
+
+/// In the ramps the tick of the program goes on, up to the last one, and the records do not belong to the experiment any more.
+#[test]
+fn program_goes_on_in_the_first_ramp() {
+    let mut bench =
+        Bench::running(&stage(), &[], endless(|tick| 1e-3 * tick as f64)).with_ramps(10);
+    bench.run(50);
+    let before = *bench.ticks().last().expect("ticks");
+    bench.request(Request::Finish);
+    for ticks in 1..10u64 {
+        let record = bench.tick();
+        assert_eq!(record.state, State::Settling);
+        let SettlingStep::Program { scale } = step(ticks) else {
+            panic!("the first ramp has ten ticks");
+        };
+        let expected_a = scale * (before.requested_a + 1e-3 * ticks as f64);
+        assert!(
+            (record.requested_a - expected_a).abs() < 1e-12,
+            "{record:?}"
+        );
+        assert_eq!(record.flags & flag::ACTIVE, 0, "{record:?}");
+    }
+}
+
+/// The step of a ramp of ten ticks.
+fn step(tick: u64) -> SettlingStep {
+    let mut settling = Settling::new(10);
+    (1..tick).for_each(|_| drop(settling.next(0.0)));
+    settling.next(0.0)
 }
