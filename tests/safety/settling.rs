@@ -286,6 +286,8 @@ fn program_goes_on_in_the_first_ramp() {
 /// The step of a ramp of ten ticks.
 fn step(tick: u64) -> SettlingStep {
     let mut settling = Settling::new(10);
-    (1..tick).for_each(|_| drop(settling.next(0.0)));
+    for _ in 1..tick {
+        let _ = settling.next(0.0);
+    }
     settling.next(0.0)
 }
