@@ -53,6 +53,7 @@
 pub mod cli;
 pub mod config;
 pub mod control;
+pub mod daemon;
 pub mod doctor;
 pub mod excitation;
 pub mod experiment;

@@ -8,7 +8,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. The settings of plants and excitations are defined with the
 /// plants and excitations, and `config` composes them: therefore `model::plant` precedes `config`, and the rest of `model` follows it.
-const ORDER: [&str; 14] = [
+const ORDER: [&str; 15] = [
     "util",
     "model::plant",
     "excitation",
@@ -22,6 +22,7 @@ const ORDER: [&str; 14] = [
     "experiment",
     "report",
     "doctor",
+    "daemon",
     "cli",
 ];
 
