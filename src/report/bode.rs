@@ -43,9 +43,19 @@ pub fn bode_svg(
     let mut lines = trace::lines(traces)?;
     // Stable: measured traces first, so that models lie on top.
     lines.sort_by_key(|line| line.measured.is_none());
-    let mut charts = vec![magnitude(unit, &lines)?, phase(&lines)];
-    charts.extend(coherence(&lines));
-    let x = Scale::frequency(frequency_range(&lines));
+    sheet(unit, &lines, title, subtitle)
+}
+
+/// Magnitude, phase and coherence of lines, in their order.
+pub(super) fn sheet(
+    unit: Unit,
+    lines: &[Line],
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let mut charts = vec![magnitude(unit, lines)?, phase(lines)];
+    charts.extend(coherence(lines));
+    let x = Scale::frequency(frequency_range(lines));
     sheet_svg(title, subtitle, &rows(charts, &x))
 }
 
@@ -80,19 +90,19 @@ fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
 
 fn phase(lines: &[Line]) -> Chart {
     let (low, high) = phase_range(lines);
-    let chart = panel(Scale::degrees("Phase (deg)").within(low, high));
+    let chart = panel(Scale::degrees("Phase (deg)").within(low, high)).without_legend();
     lines.iter().fold(chart, |chart, line| {
-        chart.mark(series(String::new(), line, line.phase_points()))
+        chart.mark(series(line.name.to_owned(), line, line.phase_points()))
     })
 }
 
 /// The coherence of measured responses, if there are any.
 fn coherence(lines: &[Line]) -> Option<Chart> {
     lines.iter().find(|line| line.measured.is_some())?;
-    let chart = panel(Scale::linear("Coherence").within(0.0, 1.05));
+    let chart = panel(Scale::linear("Coherence").within(0.0, 1.05)).without_legend();
     Some(lines.iter().fold(chart, |chart, line| match line.measured {
         Some(frf) => chart.mark(series(
-            String::new(),
+            line.name.to_owned(),
             line,
             coherence_points(line, &frf.coherence),
         )),

@@ -29,7 +29,8 @@ fn chart(heading: &str, y: Scale, frf: &Frf, value: fn(f64) -> f64) -> Chart {
     let pen = Pen::solid(BLUE).width(1.2);
     let ends = frf.frequency_hz.first().zip(frf.frequency_hz.last());
     let x = Scale::frequency(ends.map_or((0.0, 0.0), |(first, last)| (*first, *last)));
-    Chart::new(heading, x, y).line("", pen, points(frf, value))
+    let chart = Chart::new(heading, x, y).without_legend();
+    chart.line("measured", pen, points(frf, value))
 }
 
 fn points(frf: &Frf, value: fn(f64) -> f64) -> Vec<(f64, f64)> {

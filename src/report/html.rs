@@ -1,5 +1,7 @@
 //! Self-contained HTML pages, in light and dark mode, for wide and narrow screens.
 
+use super::chart::dark_style;
+
 const STYLE: &str = "\
 :root{color-scheme:light dark;--ink:#222;--quiet:#5f5f5f;--paper:#fff;--line:#d0d0d0;--code:#f3f3f1;--link:#00588a;--bad:#b04a00;--good:#1f7a4d}
 @media (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--quiet:#a8a8a8;--paper:#16181b;--line:#3c4046;--code:#22262b;--link:#7cc0ee;--bad:#ffb066;--good:#6fd3a2}}
@@ -40,14 +42,40 @@ figure svg{min-width:640px}
 @media print{section{break-inside:avoid-page}}
 ";
 
+/// Cursor readout and zoom of the plots: `attachPlots(root)` attaches to all plots below an element.
+pub const PLOT_SCRIPT: &str = include_str!("plot.js");
+
 /// A page with a title and a body of HTML.
 pub fn document(title: &str, body: &str) -> String {
     let title = escaped(title);
+    let body = with_one_style(body);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n{body}</body>\n</html>\n"
     )
+}
+
+/// A page whose plots have a cursor readout and zoom.
+pub fn document_with_plots(title: &str, body: &str) -> String {
+    let script = without_comments(PLOT_SCRIPT);
+    document(title, &format!("{body}<script>\n{script}</script>\n"))
+}
+
+/// The style of the charts applies to the whole page: the first chart has it, the others need none.
+fn with_one_style(body: &str) -> String {
+    let style = dark_style();
+    match body.split_once(&style) {
+        Some((before, after)) => format!("{before}{style}{}", after.replace(&style, "")),
+        None => body.into(),
+    }
+}
+
+/// A script without indentation and without its lines of comment.
+fn without_comments(script: &str) -> String {
+    let lines = script.lines().map(str::trim_start);
+    let code = lines.filter(|line| !line.is_empty() && !line.starts_with("//"));
+    code.flat_map(|line| [line, "\n"]).collect()
 }
 
 /// A section with a heading; `body` is HTML.

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
+//!                      `-> overlay (several recordings) -------------------+
 //! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
@@ -16,6 +17,7 @@ mod error;
 pub mod html;
 pub mod number;
 mod nyquist;
+mod overlay;
 pub mod phase;
 mod pole_zero;
 mod quadrants;
@@ -32,6 +34,7 @@ pub use coherence::coherence_svg;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use nyquist::nyquist_svg;
+pub use overlay::{StepCurve, overlay_bode_svg, overlay_steps_svg};
 pub use pole_zero::{PoleZeroMap, UncertainPoint, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
 pub use stability::{OrderedMode, stability_svg};

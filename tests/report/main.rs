@@ -1,7 +1,9 @@
 //! Plots and pages of a record. The plots of these tests are kept in `target/tmp` for inspection.
 
+mod attributes;
 mod bode;
 mod nyquist;
+mod overlay;
 mod phase;
 mod pictures;
 mod pole_zero;

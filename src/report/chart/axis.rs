@@ -47,6 +47,11 @@ impl Axis {
         }
     }
 
+    /// Values at both ends.
+    pub fn ends(&self) -> (f64, f64) {
+        (self.low, self.high)
+    }
+
     /// The pixel of a value, beyond the ends of the axis too; NaN for values that a logarithmic axis cannot show.
     pub fn place(&self, value: f64) -> f64 {
         let ratio = match self.kind {

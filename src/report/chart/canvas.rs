@@ -54,30 +54,70 @@ impl TextStyle {
     }
 }
 
-/// Draws a page of `size` pixels on white and returns it as SVG.
-pub(super) fn page(
+/// An SVG document: shapes on white, in nested groups.
+pub(super) struct Page {
+    /// In pixels.
     size: (f64, f64),
-    draw: impl FnOnce(&Canvas) -> Result<(), ReportError>,
-) -> Result<String, ReportError> {
-    let (width, height) = (
-        to_drawing_units(size.0) as u32,
-        to_drawing_units(size.1) as u32,
-    );
-    let mut svg = String::new();
-    {
-        let backend = SVGBackend::with_string(&mut svg, (width, height));
-        let canvas = Canvas(backend.into_drawing_area());
-        canvas.0.fill(&PAPER).map_err(failed)?;
-        draw(&canvas)?;
-        canvas.0.present().map_err(failed)?;
+    elements: String,
+}
+
+impl Page {
+    /// An empty page of `size` pixels.
+    pub fn new(size: (f64, f64)) -> Result<Page, ReportError> {
+        let elements = String::new();
+        let mut page = Page { size, elements };
+        page.draw(|canvas| canvas.0.fill(&PAPER).map_err(failed))?;
+        Ok(page)
     }
-    let from = format!("<svg width=\"{width}\" height=\"{height}\"");
-    let to = format!(
-        "<svg width=\"{}\" height=\"{}\" stroke-linejoin=\"round\"",
-        size.0, size.1
-    );
-    let svg = svg.replacen(&from, &to, 1);
-    Ok(svg.replace("</svg>", &(dark_style() + "\n</svg>")))
+
+    /// Appends what `draw` draws.
+    pub fn draw(
+        &mut self,
+        draw: impl FnOnce(&Canvas) -> Result<(), ReportError>,
+    ) -> Result<(), ReportError> {
+        let mut svg = String::new();
+        {
+            let backend = SVGBackend::with_string(&mut svg, self.size_in_drawing_units());
+            let canvas = Canvas(backend.into_drawing_area());
+            draw(&canvas)?;
+            canvas.0.present().map_err(failed)?;
+        }
+        let inside = svg
+            .split_once('\n')
+            .and_then(|(_, rest)| rest.rsplit_once("</svg>"));
+        self.elements += inside.map_or("", |(elements, _)| elements);
+        Ok(())
+    }
+
+    /// Opens a group with attributes.
+    pub fn open(&mut self, attributes: &str) {
+        self.elements += &format!("<g {attributes}>\n");
+    }
+
+    /// Closes the group that was opened last.
+    pub fn close(&mut self) {
+        self.elements += "</g>\n";
+    }
+
+    /// The document.
+    pub fn into_svg(self) -> String {
+        let ((width, height), style) = (self.size, dark_style());
+        let (view_width, view_height) = self.size_in_drawing_units();
+        let elements = self.elements;
+        format!(
+            "<svg width=\"{width}\" height=\"{height}\" stroke-linejoin=\"round\" \
+             viewBox=\"0 0 {view_width} {view_height}\" xmlns=\"http://www.w3.org/2000/svg\">\n\
+             {elements}{style}\n</svg>\n"
+        )
+    }
+
+    fn size_in_drawing_units(&self) -> (u32, u32) {
+        let (width, height) = self.size;
+        (
+            to_drawing_units(width) as u32,
+            to_drawing_units(height) as u32,
+        )
+    }
 }
 
 impl Canvas<'_> {
@@ -146,7 +186,7 @@ impl Canvas<'_> {
     }
 }
 
-fn to_drawing_units(pixels: f64) -> i32 {
+pub(super) fn to_drawing_units(pixels: f64) -> i32 {
     (pixels * UNITS).round() as i32
 }
 

@@ -2,12 +2,14 @@
 //!
 //! ```text
 //! Chart (Scale, Mark) -> sheet (rows, header, legend) -> plot_area (axes, marks) -> canvas (SVG)
+//!                                                         attributes: scales and names for plot.js
 //!                                                         axis: value to pixel, ticks
 //!                                                         frame, series: clipped and thinned to what a screen shows
 //! ```
 //!
 //! Text stays text in the SVG, in the viewer's own sans-serif font. Colours follow the viewer's light or dark mode.
 
+mod attributes;
 mod axis;
 mod canvas;
 pub mod colours;
@@ -24,6 +26,7 @@ pub use mark::{Mark, Pen, SeriesPoint, Stroke, Symbol};
 pub use scale::{Scale, ScaleKind};
 pub use sheet::{Row, sheet_svg};
 
+pub(super) use colours::dark_style;
 use colours::{Colour, INK};
 
 /// Points (x, y), in values of the axes or in pixels.
@@ -52,6 +55,8 @@ pub struct Chart {
     pub marks: Vec<Mark>,
     /// Whether both axes have the same number of pixels per unit.
     pub equal: bool,
+    /// Whether named marks have an entry in the legend.
+    pub legend: bool,
 }
 
 impl Chart {
@@ -63,6 +68,7 @@ impl Chart {
             y,
             marks: Vec::new(),
             equal: false,
+            legend: true,
         }
     }
 
@@ -70,6 +76,14 @@ impl Chart {
     pub fn equal(self) -> Chart {
         Chart {
             equal: true,
+            ..self
+        }
+    }
+
+    /// Leaves out the legend: another chart of the sheet has it.
+    pub fn without_legend(self) -> Chart {
+        Chart {
+            legend: false,
             ..self
         }
     }

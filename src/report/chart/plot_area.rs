@@ -41,13 +41,12 @@ pub(super) struct PlotArea {
 }
 
 impl PlotArea {
-    /// Grid, frame, numbers, and the label of the vertical axis.
-    pub fn draw_axes(&self, canvas: &Canvas, x: &Scale, y: &Scale) -> Result<(), ReportError> {
+    /// Grid and numbers.
+    pub fn draw_ticks(&self, canvas: &Canvas, x: &Scale, y: &Scale) -> Result<(), ReportError> {
         let x_ticks = self.x.ticks(x, Direction::Horizontal);
         let y_ticks = self.y.ticks(y, Direction::Vertical);
         self.draw_grid(canvas, &x_ticks, &y_ticks, false)?;
         self.draw_grid(canvas, &x_ticks, &y_ticks, true)?;
-        self.draw_frame(canvas)?;
         for tick in &y_ticks {
             let at = (self.frame.left - 6.0, self.y.pixel(tick.value));
             draw_number(canvas, tick, at, NUMBER_LEFT)?;
@@ -56,8 +55,7 @@ impl PlotArea {
             let at = (self.x.pixel(tick.value), self.frame.bottom + 6.0);
             draw_number(canvas, tick, at, NUMBER_BELOW)?;
         }
-        let middle = (self.frame.top + self.frame.bottom) / 2.0;
-        canvas.text(&y.label, (self.frame.left - LABEL_LEFT, middle), LABEL)
+        Ok(())
     }
 
     fn draw_grid(
@@ -84,11 +82,14 @@ impl PlotArea {
         Ok(())
     }
 
-    fn draw_frame(&self, canvas: &Canvas) -> Result<(), ReportError> {
+    /// The frame, and the label of the vertical axis.
+    pub fn draw_frame(&self, canvas: &Canvas, y: &Scale) -> Result<(), ReportError> {
         let frame = self.frame;
         let mut outline = rectangle((frame.left, frame.top), (frame.right, frame.bottom));
         outline.extend([(frame.left, frame.top), (frame.right, frame.top)]);
-        canvas.line(&outline, FRAME.into(), 0.8)
+        canvas.line(&outline, FRAME.into(), 0.8)?;
+        let middle = (frame.top + frame.bottom) / 2.0;
+        canvas.text(&y.label, (frame.left - LABEL_LEFT, middle), LABEL)
     }
 
     pub fn draw_mark(&self, canvas: &Canvas, mark: &Mark) -> Result<(), ReportError> {
@@ -132,7 +133,7 @@ impl PlotArea {
         }
     }
 
-    fn place(&self, (x, y): &(f64, f64)) -> (f64, f64) {
+    pub fn place(&self, (x, y): &(f64, f64)) -> (f64, f64) {
         (self.x.place(*x), self.y.place(*y))
     }
 

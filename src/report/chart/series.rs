@@ -118,10 +118,18 @@ fn middle(column: &Column) -> f64 {
 
 /// A line in the dashes of a stroke.
 pub(super) fn dashes(stroke: Stroke, points: &[(f64, f64)]) -> Vec<Points> {
+    match dash_pattern(stroke) {
+        Some((on, off)) => dashed(points, on, off),
+        None => vec![points.to_vec()],
+    }
+}
+
+/// Pixels drawn and pixels left out; `None` for a continuous line.
+pub(super) fn dash_pattern(stroke: Stroke) -> Option<(f64, f64)> {
     match stroke {
-        Stroke::Solid => vec![points.to_vec()],
-        Stroke::Dashed => dashed(points, 7.0, 5.0),
-        Stroke::Dotted => dashed(points, 2.0, 3.5),
+        Stroke::Solid => None,
+        Stroke::Dashed => Some((7.0, 5.0)),
+        Stroke::Dotted => Some((2.0, 3.5)),
     }
 }
 

@@ -1,11 +1,13 @@
 //! Layout of a sheet: rows of charts below a title.
 
 use super::Chart;
+use super::attributes;
 use super::axis::Axis;
-use super::canvas::{self, Canvas, TextStyle};
+use super::canvas::{Page, TextStyle};
 use super::frame::Frame;
 use super::header::TextBlock;
 use super::legend::Legend;
+use super::mark::Mark;
 use super::plot_area::PlotArea;
 use super::scale::{Scale, ScaleKind};
 use crate::report::ReportError;
@@ -78,10 +80,10 @@ pub fn sheet_svg(title: &str, subtitle: &str, rows: &[Row]) -> Result<String, Re
     for row in rows {
         cells.extend(cells_of(row, &mut bottom));
     }
-    canvas::page((WIDTH, bottom), |canvas| {
-        header.draw(canvas)?;
-        cells.iter().try_for_each(|cell| cell.draw(canvas))
-    })
+    let mut page = Page::new((WIDTH, bottom))?;
+    page.draw(|canvas| header.draw(canvas))?;
+    cells.iter().try_for_each(|cell| cell.draw(&mut page))?;
+    Ok(page.into_svg())
 }
 
 /// The cells of a row from `top` on, which becomes its lower end.
@@ -116,7 +118,8 @@ impl Head {
     fn new(chart: &Chart, edges: (f64, f64), top: f64) -> Head {
         let mut heading = TextBlock::new(edges.0, top + 4.0);
         heading.append(&chart.heading, HEADING, edges.1);
-        let legend = Legend::new(&chart.marks, edges, heading.bottom);
+        let listed: &[Mark] = if chart.legend { &chart.marks } else { &[] };
+        let legend = Legend::new(listed, edges, heading.bottom);
         Head { heading, legend }
     }
 }
@@ -135,22 +138,51 @@ impl<'a> Cell<'a> {
         Cell { chart, head, area }
     }
 
-    fn draw(&self, canvas: &Canvas) -> Result<(), ReportError> {
-        self.head.heading.draw(canvas)?;
-        self.head.legend.draw(canvas)?;
-        self.area.draw_axes(canvas, &self.chart.x, &self.chart.y)?;
+    fn draw(&self, page: &mut Page) -> Result<(), ReportError> {
+        page.draw(|canvas| {
+            self.head.heading.draw(canvas)?;
+            self.head.legend.draw(canvas)
+        })?;
+        page.open(&attributes::plot(self.chart, &self.area));
+        self.draw_axes(page)?;
+        page.open("class=\"marks\"");
         // Areas first: they would cover the curves.
         let (areas, others): (Vec<_>, Vec<_>) =
             self.chart.marks.iter().partition(|mark| mark.is_area());
         let mut marks = areas.into_iter().chain(others);
-        marks.try_for_each(|mark| self.area.draw_mark(canvas, mark))?;
-        if !self.chart.x.numbered {
-            return Ok(());
+        marks.try_for_each(|mark| self.draw_mark(page, mark))?;
+        page.close();
+        page.close();
+        Ok(())
+    }
+
+    fn draw_axes(&self, page: &mut Page) -> Result<(), ReportError> {
+        let (x, y) = (&self.chart.x, &self.chart.y);
+        page.open("class=\"ticks\"");
+        page.draw(|canvas| self.area.draw_ticks(canvas, x, y))?;
+        page.close();
+        page.draw(|canvas| {
+            self.area.draw_frame(canvas, y)?;
+            if !x.numbered {
+                return Ok(());
+            }
+            let frame = self.area.frame;
+            let middle = (frame.left + frame.right) / 2.0;
+            let below = (middle, frame.bottom + BELOW - 8.0);
+            canvas.text(&x.label, below, AXIS_LABEL)
+        })
+    }
+
+    fn draw_mark(&self, page: &mut Page, mark: &Mark) -> Result<(), ReportError> {
+        let attributes = attributes::mark(mark, &self.area);
+        if let Some(attributes) = &attributes {
+            page.open(attributes);
         }
-        let frame = self.area.frame;
-        let middle = (frame.left + frame.right) / 2.0;
-        let below = (middle, frame.bottom + BELOW - 8.0);
-        canvas.text(&self.chart.x.label, below, AXIS_LABEL)
+        page.draw(|canvas| self.area.draw_mark(canvas, mark))?;
+        if attributes.is_some() {
+            page.close();
+        }
+        Ok(())
     }
 }
 

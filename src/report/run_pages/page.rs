@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use super::{Plot, RecordReport};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::identify::verdict::UncertainZero;
-use crate::report::html::{document, escaped, facts, note, picture, row, section, table};
+use crate::report::html::{
+    document_with_plots, escaped, facts, note, picture, row, section, table,
+};
 use crate::report::number::{interval, percent};
 
 /// The page as an HTML document.
@@ -20,7 +22,7 @@ pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
         plots,
         report.after_plots.clone(),
     ];
-    document(&report.title, &body.concat())
+    document_with_plots(&report.title, &body.concat())
 }
 
 fn heading(report: &RecordReport<'_>) -> String {
