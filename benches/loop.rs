@@ -155,7 +155,7 @@ fn one_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     }
     let predicted_bytes = recording::predicted_bytes(u64::MAX);
     let disk = DiskWatch::of(&path, predicted_bytes).expect("the file of the recording");
-    let recorder = recording::spawn(recorder, consumer, disk).expect("a thread");
+    let recorder = recording::spawn(recorder, consumer, disk, None).expect("a thread");
     let start = Instant::now();
     run_to_end(
         &mut servo,

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::outcome::Outcome;
 use crate::experiment::campaign::CampaignError;
-use crate::experiment::{ExperimentError, MotorError, PlanError};
+use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
 use crate::model::study::StudyError;
@@ -37,38 +37,6 @@ pub enum CliError {
     Failed(String),
 }
 
-/// The kinds of error that a script can distinguish.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ErrorKind {
-    /// Wrong options or arguments.
-    Usage,
-    /// A setting is refused, or a configuration cannot be read.
-    Configuration,
-    /// The controller is refused.
-    Controller,
-    /// The excitation or the run is refused.
-    Plan,
-    /// The model cannot be analysed.
-    Model,
-    /// The devices cannot be opened, or differ from their settings.
-    Devices,
-    /// The calibration cannot be used.
-    Calibration,
-    /// The stability margin of the loop is too small.
-    Margin,
-    /// A recording cannot be written or read.
-    Recording,
-    /// The data do not allow the analysis.
-    Data,
-    /// A study is refused, or its file cannot be used.
-    Study,
-    /// A campaign is refused, or its files cannot be used.
-    Campaign,
-    /// Any other failure at run time.
-    Failed,
-}
-
 impl<E: Into<ExperimentError>> From<E> for CliError {
     fn from(error: E) -> Self {
         CliError::Experiment(error.into())
@@ -96,7 +64,7 @@ impl CliError {
 
     fn is_failure(&self) -> bool {
         match self {
-            CliError::Experiment(error) => is_failure(error),
+            CliError::Experiment(error) => error.is_failure(),
             CliError::Identify(_) | CliError::Failed(_) => true,
             CliError::Table(error) => !matches!(error, ExternalCsvError::Columns(_)),
             CliError::Campaign(error) => matches!(
@@ -113,7 +81,7 @@ impl CliError {
     /// The kind of the error.
     pub fn kind(&self) -> ErrorKind {
         match self {
-            CliError::Experiment(error) => experiment_kind(error),
+            CliError::Experiment(error) => error.kind(),
             CliError::Usage(_) => ErrorKind::Usage,
             CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
@@ -125,74 +93,17 @@ impl CliError {
     /// The option, file or line that is wrong, if the error has one.
     pub fn place(&self) -> Option<String> {
         match self {
-            CliError::Experiment(ExperimentError::Plan(PlanError::Config(error))) => error.place(),
-            CliError::Experiment(ExperimentError::Refused(message)) | CliError::Usage(message) => {
-                option_in(message)
-            }
+            CliError::Experiment(error) => error.place(),
+            CliError::Usage(message) => option_in(message),
             _ => None,
         }
     }
-}
-
-/// Whether an experiment failed at run time, not because of its settings.
-fn is_failure(error: &ExperimentError) -> bool {
-    matches!(
-        error,
-        ExperimentError::Run(_)
-            | ExperimentError::Recording(_)
-            | ExperimentError::Analysis(_)
-            | ExperimentError::Failed(_)
-            | ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped)
-    )
-}
-
-fn experiment_kind(error: &ExperimentError) -> ErrorKind {
-    match error {
-        ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
-        ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
-        ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
-        ExperimentError::Motor(error) => motor_kind(error),
-        ExperimentError::Margin(_) => ErrorKind::Margin,
-        ExperimentError::Plant(_) => ErrorKind::Model,
-        ExperimentError::Devices(_) => ErrorKind::Devices,
-        ExperimentError::Calibration(_) => ErrorKind::Calibration,
-        ExperimentError::Refused(_) => ErrorKind::Usage,
-        ExperimentError::Recording(_) => ErrorKind::Recording,
-        ExperimentError::Run(_) | ExperimentError::Analysis(_) | ExperimentError::Failed(_) => {
-            ErrorKind::Failed
-        }
-    }
-}
-
-fn motor_kind(error: &MotorError) -> ErrorKind {
-    match error {
-        MotorError::Warm { .. } | MotorError::Never { .. } => ErrorKind::Plan,
-        MotorError::Memory(_) | MotorError::Stopped => ErrorKind::Failed,
-    }
-}
-
-/// The first option that a message names.
-fn option_in(message: &str) -> Option<String> {
-    let words = message.split([' ', ':', ',', '`', '\'']);
-    let option = words
-        .into_iter()
-        .find(|word| word.len() > 2 && word.starts_with("--"));
-    option.map(str::to_string)
 }
 
 /// The JSON object of a command that failed.
 #[derive(Debug, Serialize)]
 pub(super) struct ErrorReport {
     error: ErrorObject,
-}
-
-#[derive(Debug, Serialize)]
-struct ErrorObject {
-    message: String,
-    kind: ErrorKind,
-    #[serde(rename = "where")]
-    place: Option<String>,
-    remedy: Option<String>,
 }
 
 impl ErrorReport {
@@ -213,14 +124,8 @@ impl ErrorReport {
     }
 
     fn new(message: String, kind: ErrorKind, place: Option<String>) -> ErrorReport {
-        let remedy = remedy::split(&message).1.map(String::from);
         ErrorReport {
-            error: ErrorObject {
-                message,
-                kind,
-                place,
-                remedy,
-            },
+            error: ErrorObject::new(message, kind, place),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Why an experiment was refused or failed.
 
 use super::analysis_error::AnalysisError;
+use super::error_kind::RemoteError;
 use super::loop_check::MarginError;
 use super::motor_error::MotorError;
 use super::plan_error::PlanError;
@@ -52,6 +53,9 @@ pub enum ExperimentError {
     /// Another failure.
     #[error("{0}")]
     Failed(String),
+    /// The daemon refused the run, or it failed there.
+    #[error(transparent)]
+    Remote(#[from] RemoteError),
 }
 
 impl From<ConfigError> for ExperimentError {

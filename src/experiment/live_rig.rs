@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::Sender;
 
 use bench_hal::Rig;
 
@@ -11,8 +11,9 @@ use super::connections::{OutsideEnds, connect};
 use super::motion_model::{residuals, warn_if_off};
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
-use super::run::{Run, StopCause};
+use super::run::{Run, RunFile, StopCause};
 use super::run_error::RunError;
+use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
 use crate::config::{Config, LoopSettings};
@@ -23,7 +24,7 @@ use crate::rt::program::Program;
 use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo_run::{Connections, ServoRun};
 use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
-use crate::rt::thread::Pace;
+use crate::rt::thread::{Pace, Scheduling};
 use crate::rt::tuning::Tune;
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
@@ -39,7 +40,7 @@ const HEALTHY_S: f64 = 0.02;
 pub struct LiveRig {
     live: LiveLoop,
     pace: Pace,
-    tunes: (Sender<Tune>, Receiver<Tune>),
+    hooks: RunHooks,
 }
 
 impl LiveRig {
@@ -48,19 +49,38 @@ impl LiveRig {
     /// # Errors
     /// When the system refuses the thread of the loop.
     pub fn open(rig: Box<dyn Rig>, config: &Config, pace: Pace) -> Result<LiveRig, RunError> {
-        // Nothing of what happens between runs is recorded.
-        let (unrecorded, _) = connect(0);
-        let idle = ServoRun::new(interlocks(config), unrecorded);
-        let live = LiveLoop::open(rig, Box::new(idle), &config.servo, pace);
-        let live = live.map_err(RunError::system("start the thread of the loop"))?;
-        let tunes = channel();
-        Ok(LiveRig { live, pace, tunes })
+        LiveRig::with_hooks(rig, config, pace, RunHooks::default())
     }
 
-    /// Changes the reference or the loop gain of the run in progress. Whoever sends a change must have checked it with
-    /// [`check_tune`](super::check_tune). What is sent between runs is discarded.
+    /// Starts the loop of a rig that other threads stop, change and watch.
+    ///
+    /// # Errors
+    /// When the system refuses the thread of the loop.
+    pub fn with_hooks(
+        rig: Box<dyn Rig>,
+        config: &Config,
+        pace: Pace,
+        hooks: RunHooks,
+    ) -> Result<LiveRig, RunError> {
+        let idle = ServoRun::new(interlocks(config), idle_connections(config, &hooks));
+        let live = LiveLoop::open(rig, Box::new(idle), &config.servo, pace);
+        let live = live.map_err(RunError::system("start the thread of the loop"))?;
+        Ok(LiveRig { live, pace, hooks })
+    }
+
+    /// Replaces the hooks for the next run.
+    pub fn set_hooks(&mut self, hooks: RunHooks) {
+        self.hooks = hooks;
+    }
+
+    /// How the loop is scheduled.
+    pub fn scheduling(&self) -> &Scheduling {
+        self.live.scheduling()
+    }
+
+    /// Changes the reference or the loop gain of the run in progress (see [`RunHooks::tuner`]).
     pub fn tuner(&self) -> Sender<Tune> {
-        self.tunes.0.clone()
+        self.hooks.tuner()
     }
 
     /// Runs `plan` and records it in `folder`. `watch` is called periodically with the number of completed ticks and of all ticks.
@@ -86,7 +106,7 @@ impl LiveRig {
         require_space(folder, recording_bytes, free_bytes(folder))?;
         let (connections, mut outside) = connect(RING_SLOTS);
         queue_start(&mut outside.requests, program);
-        let (stop_flags, lease) = (StopFlags::default(), Arc::<ArmLease>::default());
+        let (stop_flags, lease) = (self.hooks.stop.clone(), Arc::<ArmLease>::default());
         let run = servo_run(plan, connections)?
             .with_correction(plan.correction())
             .with_ramps(ramp_ticks)
@@ -149,7 +169,9 @@ impl PreparedRun<'_> {
         } = self.outside;
         let path = self.recorder.path().to_path_buf();
         let disk = DiskWatch::of(&path, self.recording_bytes).map_err(RunError::Create)?;
-        let recorder = recording::spawn(self.recorder, records, disk).map_err(RunError::Create)?;
+        let copy = rig.hooks.live_copy(self.plan.config.servo.period_s());
+        let recorder = recording::spawn(self.recorder, records, disk, copy);
+        let recorder = recorder.map_err(RunError::Create)?;
         let mut supervisor = Supervisor {
             requests,
             lease: self.lease,
@@ -157,7 +179,7 @@ impl PreparedRun<'_> {
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: self.max_unrecorded_ticks,
             cause: None,
-            tunes: &rig.tunes.1,
+            hooks: &rig.hooks,
         };
         supervisor.discard_tunes();
         let total_ticks = self.total_ticks;
@@ -174,9 +196,19 @@ impl PreparedRun<'_> {
                 .or(ended.stopped_by.and_then(StopCause::by)),
             ended,
             motor: self.plan.motor.clone(),
-            recorder,
+            file: RunFile::Own(Box::new(recorder)),
         })
     }
+}
+
+/// The rings of the loop between two runs. Nothing of it is recorded; it may be watched.
+fn idle_connections(config: &Config, hooks: &RunHooks) -> Connections {
+    let Some(feeds) = hooks.feeds() else {
+        return connect(0).0;
+    };
+    let (connections, outside) = connect(FEED_SLOTS);
+    feeds.send(FeedSource::Idle, config.servo.period_s(), outside.records);
+    connections
 }
 
 /// Requests to arm and to start, queued before the loop begins: they take effect at tick 0.

@@ -4,6 +4,8 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
 use super::{reference_check, swept_reference};
@@ -33,7 +35,8 @@ pub(super) const MOTOR_THERMAL: &str = "motor_thermal_a2";
 pub(super) const MOTOR_KNOWN_FROM: &str = "motor_known_from";
 
 /// The kind of a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum RunKind {
     /// An excitation, open loop.
     Chirp,
@@ -154,6 +157,20 @@ impl Plan {
             motor: motor_start(recording)?,
             ..Plan::excitation(kind(recording)?, config)
         })
+    }
+
+    /// A plan of another process, with the texts of its files.
+    pub(super) fn with_texts(
+        kind: RunKind,
+        config: Config,
+        controller: Option<ControllerText>,
+        reference: Option<String>,
+    ) -> Plan {
+        Plan {
+            controller,
+            reference,
+            ..Plan::excitation(kind, config)
+        }
     }
 
     /// Text of the file of the reference, if it has one.

@@ -1,7 +1,9 @@
 //! The motor before and after a run: a simulated one, or a real one whose heat is kept in a file.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
 
 use super::error::ExperimentError;
 use super::live_rig::TAIL_S;
@@ -13,6 +15,7 @@ use super::run::Run;
 use super::run_error::RunError;
 use super::signals::stop_on_signal;
 use crate::rig::motor::{Moment, MotorMemory};
+use crate::rt::supervision::StopFlags;
 use crate::util::progress::Progress;
 
 /// Longest time in seconds from the entry in the file to the first tick of the run.
@@ -21,7 +24,8 @@ const ENABLING_S: f64 = 10.0;
 const BEAT: Duration = Duration::from_millis(100);
 
 /// How runs treat the thermal state that earlier runs left in the motor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum MotorHandling {
     /// A simulated motor: cold at the first run of a runner. Before a later run it rests for as long as that run requires; this
     /// takes no time.
@@ -52,6 +56,8 @@ pub(super) struct RememberedMotor<'a> {
     pub memory: MotorMemory,
     pub amplifier: &'a str,
     pub now: fn() -> Moment,
+    /// Ends the wait for a cool motor, as a signal does.
+    pub stop: &'a StopFlags,
 }
 
 impl RememberedMotor<'_> {
@@ -133,7 +139,10 @@ impl RememberedMotor<'_> {
             duration_text(wait_s)
         );
         progress.begin("waiting for the motor", wait_s.ceil() as u64);
-        let is_cool = stop_on_signal(|stop| wait_for(wait_s, &begun, now, stop, progress))?;
+        let is_cool = stop_on_signal(|signal| {
+            let is_stopped = || signal.load(Ordering::Relaxed) || self.stop.is_raised();
+            wait_for(wait_s, &begun, now, is_stopped, progress)
+        })?;
         match is_cool {
             true => Ok(()),
             false => Err(MotorError::Stopped.into()),
@@ -141,19 +150,19 @@ impl RememberedMotor<'_> {
     }
 }
 
-/// Whether the time passed before `stop` was set. A clock that is set back ends the wait: the state is then unknown.
+/// Whether the time passed before the wait was stopped. A clock that is set back ends the wait: the state is then unknown.
 fn wait_for(
     wait_s: f64,
     begun: &Moment,
     now: fn() -> Moment,
-    stop: &AtomicBool,
+    is_stopped: impl Fn() -> bool,
     progress: &Progress,
 ) -> bool {
     let total = wait_s.ceil() as u64;
     loop {
         let elapsed_s = now().seconds_since(begun).unwrap_or(wait_s);
         progress.set(elapsed_s as u64, total);
-        if elapsed_s >= wait_s || stop.load(Ordering::Relaxed) {
+        if elapsed_s >= wait_s || is_stopped() {
             return elapsed_s >= wait_s;
         }
         std::thread::sleep(BEAT);

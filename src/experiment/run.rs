@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::motor_start::MotorStart;
 use crate::recording::{Recorder, RecordingError, Shortage, Totals};
@@ -24,13 +24,37 @@ pub struct Run {
     pub stop_cause: Option<StopCause>,
     /// The thermal state of the motor at its start.
     pub motor: MotorStart,
-    pub(super) recorder: Recorder,
+    pub(super) file: RunFile,
+}
+
+/// The open recording of a run.
+pub(super) enum RunFile {
+    /// Of this process.
+    Own(Box<Recorder>),
+    /// Of the process that owns the rig.
+    Remote {
+        /// Its counts, which contain all ticks.
+        totals: Totals,
+        recording: Box<dyn RemoteRecording>,
+    },
+}
+
+/// An open recording of the process that owns the rig. Dropping it completes the file without results.
+pub trait RemoteRecording: Send {
+    /// Adds the results and closes the file.
+    ///
+    /// # Errors
+    /// When the file cannot be written, or the owner cannot be reached.
+    fn finish(self: Box<Self>, results_json: &str) -> Result<Totals, RecordingError>;
 }
 
 impl Run {
     /// Counts of the recording, which contains all ticks by now. Fails if the file was removed during the run.
     pub fn totals(&mut self) -> Result<Totals, RecordingError> {
-        let totals = self.recorder.complete()?;
+        let totals = match &mut self.file {
+            RunFile::Own(recorder) => recorder.complete()?,
+            RunFile::Remote { totals, .. } => totals.clone(),
+        };
         match self.path.exists() {
             true => Ok(totals),
             false => Err(RecordingError::Removed {
@@ -41,13 +65,16 @@ impl Run {
 
     /// Adds the results and closes the file.
     pub fn finish(self, results_json: &str) -> Result<Totals, RecordingError> {
-        self.recorder
-            .finish(&[("results.json", "application/json", results_json.as_bytes())])
+        let results = ("results.json", "application/json", results_json.as_bytes());
+        match self.file {
+            RunFile::Own(recorder) => recorder.finish(&[results]),
+            RunFile::Remote { recording, .. } => recording.finish(results_json),
+        }
     }
 }
 
 /// Why a run was stopped before its end.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopCause {
     /// A signal of the operator or of the system.

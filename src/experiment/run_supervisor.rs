@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Receiver;
 use std::task::Poll;
 use std::time::Duration;
 
 use super::run::StopCause;
 use super::run_error::RunError;
+use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
 use crate::recording::Health;
 use crate::rt::live_loop::{LiveLoop, LoopPanicked};
@@ -15,7 +15,6 @@ use crate::rt::record::Origin;
 use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo_run::{Progress, RunOutcome, ServoRun};
 use crate::rt::supervision::{ArmLease, StopFlags};
-use crate::rt::tuning::Tune;
 
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
@@ -30,7 +29,7 @@ pub(super) struct Supervisor<'a> {
     /// Why it has requested the end of the run, if it has.
     pub(super) cause: Option<StopCause>,
     /// Changes of the run, to be passed on to the loop.
-    pub(super) tunes: &'a Receiver<Tune>,
+    pub(super) hooks: &'a RunHooks,
 }
 
 impl Supervisor<'_> {
@@ -46,8 +45,10 @@ impl Supervisor<'_> {
         stop_flags: &StopFlags,
         mut watch: impl FnMut(),
     ) -> Result<Result<RunOutcome, LoopPanicked>, RunError> {
-        let signals = SignalFlags::set(stop_flags);
-        let _signals = signals.map_err(RunError::system("start the supervisor of the run"))?;
+        let signals = self.hooks.has_signals.then(|| SignalFlags::set(stop_flags));
+        let _signals = signals
+            .transpose()
+            .map_err(RunError::system("start the supervisor of the run"))?;
         if live.begin(run).is_err() {
             return Ok(Err(LoopPanicked)); // only a panic leaves an earlier run in the loop
         }
@@ -65,12 +66,12 @@ impl Supervisor<'_> {
 
     /// Discards the changes that were sent before the run.
     pub(super) fn discard_tunes(&self) {
-        while self.tunes.try_recv().is_ok() {}
+        drop(self.hooks.take_tunes());
     }
 
     /// Passes changes on to the loop. Without room for the request it is discarded: a later change replaces it in any case.
     fn pass_on_tunes(&mut self) {
-        while let Ok(tune) = self.tunes.try_recv() {
+        for tune in self.hooks.take_tunes() {
             if self.requests.send(Request::Tune(tune)).is_err() {
                 tracing::warn!(
                     "a change of the run was discarded, because the loop has too many requests; send it again"
@@ -135,7 +136,7 @@ mod tests {
                 max_unrecorded_ticks: 5000,
                 lease: Arc::default(),
                 cause: None,
-                tunes: &std::sync::mpsc::channel().1,
+                hooks: &RunHooks::default(),
             };
             supervisor.watch_recording();
             assert!(
@@ -171,7 +172,7 @@ mod tests {
             size_bytes,
         };
         let disk = DiskWatch::over(Box::new(move || state), 1000);
-        let recorder = recording::spawn(recorder, records, disk).unwrap();
+        let recorder = recording::spawn(recorder, records, disk, None).unwrap();
         let health = recorder.health();
         assert_eq!(recorder.join().unwrap().ticks(), 1000, "all are recorded");
         health
@@ -188,7 +189,7 @@ mod tests {
             max_unrecorded_ticks: 5000,
             lease: Arc::default(),
             cause: None,
-            tunes: &std::sync::mpsc::channel().1,
+            hooks: &RunHooks::default(),
         };
         progress.unrecorded_ticks.store(4999, Ordering::Relaxed);
         supervisor.watch_recording();

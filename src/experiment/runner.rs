@@ -2,22 +2,24 @@
 
 use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::SystemTime;
 
-use bench_hal::blocking;
 use serde::Serialize;
 
 use super::error::ExperimentError;
 use super::live_rig::LiveRig;
 use super::loop_check::{Stage, closed_loop_of, require_margins};
 use super::motor_error::MotorError;
+use super::open_bench::{DeviceNames, OpenBench, Opening};
 use super::plan::Plan;
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
 use super::run::Run;
 use super::run_error::RunError;
+use super::run_hooks::RunHooks;
+use super::run_order::{RigOwner, run_elsewhere};
 use crate::config::Config;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
-use crate::rig::devices;
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
@@ -37,6 +39,8 @@ pub struct Setup {
     pub now: fn() -> Moment,
     /// Folder for the recordings.
     pub folder: PathBuf,
+    /// The process that owns the rig; `None` if this process opens it.
+    pub owner: Option<Arc<dyn RigOwner>>,
 }
 
 impl Setup {
@@ -49,6 +53,7 @@ impl Setup {
             motor: MotorHandling::WaitUntilCool,
             now: Moment::now,
             folder,
+            owner: None,
         }
     }
 
@@ -61,6 +66,7 @@ impl Setup {
             motor: MotorHandling::Simulated,
             now: Moment::now,
             folder,
+            owner: None,
         }
     }
 
@@ -72,54 +78,13 @@ impl Setup {
         }
     }
 
-    fn open(&self, config: &Config) -> Result<OpenBench, ExperimentError> {
-        let mut opened = match self.stage(config) {
-            Stage::Simulated => devices::simulate(config)?,
-            Stage::Devices => devices::open(config)?,
-        };
-        for note in &opened.notes {
-            tracing::warn!("{note}");
+    /// How the rig of a run is opened.
+    fn opening(&self, config: &Config) -> Opening {
+        Opening {
+            stage: self.stage(config),
+            pace: self.pace,
+            clear_fault: self.clear_fault,
         }
-        if self.clear_fault {
-            blocking::reset_fault(&mut opened.rig, std::thread::sleep).map_err(|error| {
-                ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
-            })?;
-        }
-        Ok(OpenBench {
-            rig: LiveRig::open(opened.rig, config, self.pace)?,
-            names: DeviceNames {
-                amplifier: opened.amplifier,
-                probe: opened.probe,
-            },
-            config: config.clone(),
-        })
-    }
-}
-
-/// Identities of the devices.
-struct DeviceNames {
-    amplifier: String,
-    probe: String,
-}
-
-/// A rig with its loop, which is kept open for the next run.
-struct OpenBench {
-    rig: LiveRig,
-    names: DeviceNames,
-    config: Config,
-}
-
-impl OpenBench {
-    /// Whether it is the rig of `config`. Excitation, controller, calibration and analysis do not belong to the rig.
-    fn is_of(&self, config: &Config) -> bool {
-        let open = &self.config;
-        open.servo == config.servo
-            && open.plant == config.plant
-            && open.motor == config.motor
-            && open.amplifier == config.amplifier
-            && open.probe == config.probe
-            && open.interlock == config.interlock
-            && open.sim == config.sim
     }
 }
 
@@ -133,6 +98,8 @@ pub struct Runner {
     motor_a2: Cell<Option<f64>>,
     /// The rig of the last run, if it is open.
     open: RefCell<Option<OpenBench>>,
+    /// What other threads do with its runs.
+    hooks: RunHooks,
 }
 
 impl Runner {
@@ -148,7 +115,27 @@ impl Runner {
             progress,
             motor_a2: Cell::new(None),
             open: RefCell::new(None),
+            hooks: RunHooks::default(),
         }
+    }
+
+    /// A runner on a rig that is open already, with hooks for its runs.
+    pub fn on_bench(setup: Setup, open: Option<OpenBench>, hooks: RunHooks) -> Runner {
+        Runner {
+            open: RefCell::new(open),
+            hooks,
+            ..Runner::new(setup)
+        }
+    }
+
+    /// Replaces the hooks for the next run.
+    pub fn set_hooks(&mut self, hooks: RunHooks) {
+        self.hooks = hooks;
+    }
+
+    /// The rig, if it is open.
+    pub fn into_bench(self) -> Option<OpenBench> {
+        self.open.into_inner()
     }
 
     /// Runs a plan with the configured calibration.
@@ -164,7 +151,13 @@ impl Runner {
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
         require_stable_loop(plan, self.setup.stage(&plan.config))?;
+        if let Some(owner) = &self.setup.owner {
+            self.progress.begin(phase, 0);
+            let calibration = calibration.as_ref();
+            return run_elsewhere(&**owner, plan, &self.setup, calibration, &self.progress);
+        }
         let mut bench = self.opened(&plan.config)?;
+        bench.rig.set_hooks(self.hooks.clone());
         let plan = calibrated(plan, &bench.names, calibration)?;
         let run = match self.setup.motor {
             MotorHandling::Simulated => self.run_simulated_motor(plan, &mut bench, phase),
@@ -181,9 +174,11 @@ impl Runner {
 
     /// The rig that is open already, or the one of `config`. Another rig is closed first, because it may be the same devices.
     fn opened(&self, config: &Config) -> Result<OpenBench, ExperimentError> {
-        match self.open.take().filter(|open| open.is_of(config)) {
+        let opening = self.setup.opening(config);
+        let open = self.open.take();
+        match open.filter(|open| open.is_of(config, &opening)) {
             Some(open) => Ok(open),
-            None => self.setup.open(config),
+            None => OpenBench::open(config, opening, self.hooks.clone()),
         }
     }
 
@@ -210,6 +205,7 @@ impl Runner {
             memory,
             amplifier: &bench.names.amplifier,
             now: self.setup.now,
+            stop: &self.hooks.stop,
         };
         let is_later = self.motor_a2.get().is_some();
         let waits = is_later || self.setup.motor == MotorHandling::WaitUntilCool;

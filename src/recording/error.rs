@@ -14,6 +14,9 @@ pub enum RecordingError {
         /// The file that exists.
         path: PathBuf,
     },
+    /// The process that owns the rig could not complete the file.
+    #[error("{0}")]
+    Remote(String),
     /// The file could not be created.
     #[error("{}: cannot create the recording: {source}; check that its directory exists and may be written to", path.display())]
     Create {

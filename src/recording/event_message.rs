@@ -26,6 +26,11 @@ impl From<&Event> for Message {
     }
 }
 
+/// The text of an event, as in a recording.
+pub fn event_text(event: &Event) -> String {
+    Message::from(event).text
+}
+
 fn message(kind: &str, text: String) -> Message {
     Message {
         kind: kind.into(),

@@ -59,12 +59,13 @@ pub use disk::{
     nearest_existing, predicted_bytes,
 };
 pub use error::{Emptiness, RecordingError};
+pub use event_message::event_text;
 pub use losses::{Cut, DamagedRange, MissingTicks};
 pub use reader::{Recording, StoredAttachment};
 pub use recover::{Recovered, recover};
 pub use stream::Ticks;
 pub use sync::Syncable;
-pub use thread::{Health, RecorderHandle, spawn};
+pub use thread::{Health, LiveCopy, RecorderHandle, spawn};
 pub use timing::Quantiles;
 pub use writer::{Header, Recorder, Totals};
 

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use rtrb::Consumer;
+use rtrb::{Consumer, Producer};
 
 use super::disk::{DiskWatch, Shortage, Space};
 use super::{Recorder, RecordingError};
@@ -79,6 +79,25 @@ impl RecorderHandle {
     }
 }
 
+/// A copy of everything that is recorded, for a live view. It never delays the recorder: what does not fit is counted.
+pub struct LiveCopy {
+    ring: Producer<LoopMessage>,
+    dropped: Arc<AtomicU64>,
+}
+
+impl LiveCopy {
+    /// A copy into `ring`. `dropped` counts the messages that do not fit.
+    pub fn new(ring: Producer<LoopMessage>, dropped: Arc<AtomicU64>) -> LiveCopy {
+        LiveCopy { ring, dropped }
+    }
+
+    fn push(&mut self, published: &LoopMessage) {
+        if self.ring.push(*published).is_err() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
 /// Starts the thread. It inherits scheduling policy and processor from the calling thread, which therefore must not be a
 /// real-time thread. It ends when the producer is dropped and the ring is empty.
 ///
@@ -89,13 +108,14 @@ pub fn spawn(
     recorder: Recorder,
     ring: Consumer<LoopMessage>,
     disk: DiskWatch,
+    copy: Option<LiveCopy>,
 ) -> Result<RecorderHandle, RecordingError> {
     let health = Arc::new(Health::default());
     let shared = Arc::clone(&health);
     let path = recorder.path().to_path_buf();
     let thread = std::thread::Builder::new()
         .name("bench-recorder".into())
-        .spawn(move || run(recorder, ring, disk, &shared))
+        .spawn(move || run(recorder, ring, disk, copy, &shared))
         .map_err(|source| RecordingError::NotStarted {
             path: path.clone(),
             source,
@@ -111,6 +131,7 @@ fn run(
     mut recorder: Recorder,
     mut ring: Consumer<LoopMessage>,
     mut disk: DiskWatch,
+    mut copy: Option<LiveCopy>,
     health: &Health,
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
@@ -120,6 +141,9 @@ fn run(
         // Read before the ring is emptied: everything that was pushed before the producer was dropped is then in the ring.
         let ended = ring.is_abandoned();
         while let Ok(published) = ring.pop() {
+            if let Some(copy) = &mut copy {
+                copy.push(&published);
+            }
             take(&published, &mut recorder, &mut outcome, health);
             if outcome.is_ok() && health.written().is_multiple_of(RECORDS_PER_CHECK) {
                 outcome = check_disk(&mut disk, &recorder, health);

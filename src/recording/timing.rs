@@ -1,7 +1,7 @@
 //! Lateness and compute time of the loop, for each second and for the whole run.
 
 use hdrhistogram::Histogram;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::continuity::Continuity;
 use super::messages::Timing;
@@ -11,7 +11,7 @@ const SECOND_NS: u64 = 1_000_000_000;
 
 /// Quantiles of a duration in nanoseconds. `max_ns` is exact. The others are exact below 2048 ns and otherwise at most 0.1 %
 /// above the true quantile (three significant digits); durations above 10 s count as 10 s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Quantiles {
     /// Median.
     #[serde(rename = "p50")]

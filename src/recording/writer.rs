@@ -10,6 +10,7 @@ use mcap::records::MessageHeader;
 use mcap::write::{Metadata, NoSeek};
 use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions};
 use prost::Message;
+use serde::{Deserialize, Serialize};
 
 use super::continuity::Continuity;
 use super::digest::Digest;
@@ -48,7 +49,7 @@ pub struct Header {
 }
 
 /// Counts and timing of a recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Totals {
     /// The file.
     pub path: PathBuf,

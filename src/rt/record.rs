@@ -2,6 +2,7 @@
 //! allocation, so that they can leave the tick through a wait-free ring.
 
 use bench_hal::{DeviceError, FaultText, Validity};
+use serde::{Deserialize, Serialize};
 
 use super::arming::{State, Trip};
 use super::tuning::Tune;
@@ -159,7 +160,8 @@ pub struct RequestEvent {
 }
 
 /// Who requested something of the loop.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Origin {
     /// The supervisor, through the ring of requests.
     #[default]

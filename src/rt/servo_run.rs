@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
 use rtrb::{Consumer, Producer};
+use serde::{Deserialize, Serialize};
 
 use super::arming::Trip;
 use super::interlock::Interlocks;
@@ -79,7 +80,7 @@ pub(super) struct Enabling {
 }
 
 /// How a run ended.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RunOutcome {
     /// The trip, if there was one, and its tick.
     pub trip: Option<(Trip, u64)>,

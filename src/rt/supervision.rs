@@ -16,6 +16,11 @@ impl StopFlags {
         &self.0
     }
 
+    /// Whether a flag is set that no tick has taken yet.
+    pub fn is_raised(&self) -> bool {
+        self.0.iter().any(|flag| flag.load(Ordering::Relaxed))
+    }
+
     /// Sets the first flag that is not set.
     pub fn raise(&self) {
         let mut flags = self.0.iter();

@@ -3,9 +3,11 @@
 use std::fmt;
 
 use bench_hal::{DeviceError, FaultText};
+use serde::{Deserialize, Serialize};
 
 /// Why the interlocks tripped, with the value that crossed its limit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Trip {
     /// |position| beyond the soft limit, both in metres.
     Travel {
@@ -84,8 +86,34 @@ pub enum Trip {
         /// The device's number.
         code: i64,
         /// Meaning and remedy, if the driver knows them. A recording stores them as text.
+        #[serde(with = "fault_text")]
         text: Option<FaultText>,
     },
+}
+
+/// Transfer of a [`FaultText`] to another process.
+mod fault_text {
+    use bench_hal::FaultText;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(
+        text: &Option<FaultText>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        text.map(|text| (text.what, text.remedy))
+            .serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<FaultText>, D::Error> {
+        let text = Option::<(String, String)>::deserialize(deserializer)?;
+        // The texts of drivers are static. A process receives a trip at the end of a run, and ends soon after it.
+        Ok(text.map(|(what, remedy)| FaultText {
+            what: what.leak(),
+            remedy: remedy.leak(),
+        }))
+    }
 }
 
 impl From<DeviceError> for Trip {

@@ -72,7 +72,7 @@ fn disk_full_during_a_run_keeps_draining_and_counting() {
     };
     let recorder = Recorder::over(Box::new(disk), &path, &header()).expect("room for the head");
     let (mut ring, consumer) = RingBuffer::new(1024);
-    let handle = spawn(recorder, consumer, disk_with_room()).expect("a thread");
+    let handle = spawn(recorder, consumer, disk_with_room(), None).expect("a thread");
     let health = handle.health();
 
     // 40,000 ticks of about 90 bytes are more than three times the free space.
@@ -149,7 +149,7 @@ fn record_20_000_ticks(
     let disk = DiskWatch::over(Box::new(state), 0);
     let recorder = Recorder::create(path, &header()).expect("a fresh file");
     let (mut ring, consumer) = RingBuffer::new(1024);
-    let handle = spawn(recorder, consumer, disk).expect("a thread");
+    let handle = spawn(recorder, consumer, disk, None).expect("a thread");
     (0..20_000).for_each(|n| push(&mut ring, LoopMessage::Tick(tick(n))));
     drop(ring);
     (handle.health(), handle.join())

@@ -17,6 +17,7 @@ fn recording_contains_all_messages_sent_before_the_loop_ended() {
         Recorder::create(&path, &header()).expect("fresh"),
         consumer,
         disk_with_room(),
+        None,
     )
     .expect("a thread");
     let health = handle.health();
@@ -60,6 +61,7 @@ fn messages_beyond_the_ring_capacity_are_counted_as_lost() {
         Recorder::create(&path, &header()).expect("fresh"),
         consumer,
         disk_with_room(),
+        None,
     )
     .expect("a thread");
     let deadline = Instant::now() + Duration::from_secs(60);

@@ -1,0 +1,100 @@
+//! An open rig with its loop, which is kept open for the next run.
+
+use bench_hal::blocking;
+
+use super::error::ExperimentError;
+use super::live_rig::LiveRig;
+use super::loop_check::Stage;
+use super::run_hooks::RunHooks;
+use crate::config::Config;
+use crate::rig::devices;
+use crate::rt::thread::{Pace, Scheduling};
+
+/// Which rig is opened, and how.
+#[derive(Clone, Copy, Debug)]
+pub struct Opening {
+    /// The simulated stage, or the configured devices.
+    pub stage: Stage,
+    /// Pace of the loop.
+    pub pace: Pace,
+    /// Whether a stored fault of the amplifier is cleared first.
+    pub clear_fault: bool,
+}
+
+/// Identities of the devices.
+#[derive(Clone, Debug)]
+pub struct DeviceNames {
+    /// The amplifier, as it reports itself.
+    pub amplifier: String,
+    /// The probe, as far as it is known.
+    pub probe: String,
+}
+
+/// A rig with its loop. Dropping it closes the rig.
+pub struct OpenBench {
+    pub(super) rig: LiveRig,
+    pub(super) names: DeviceNames,
+    config: Config,
+    opening: Opening,
+}
+
+impl OpenBench {
+    /// Opens the rig of a configuration, disarmed.
+    ///
+    /// # Errors
+    /// When a device cannot be opened, or the system refuses the thread of the loop.
+    pub fn open(
+        config: &Config,
+        opening: Opening,
+        hooks: RunHooks,
+    ) -> Result<OpenBench, ExperimentError> {
+        let mut opened = match opening.stage {
+            Stage::Simulated => devices::simulate(config)?,
+            Stage::Devices => devices::open(config)?,
+        };
+        for note in &opened.notes {
+            tracing::warn!("{note}");
+        }
+        if opening.clear_fault {
+            blocking::reset_fault(&mut opened.rig, std::thread::sleep).map_err(|error| {
+                ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
+            })?;
+        }
+        Ok(OpenBench {
+            rig: LiveRig::with_hooks(opened.rig, config, opening.pace, hooks)?,
+            names: DeviceNames {
+                amplifier: opened.amplifier,
+                probe: opened.probe,
+            },
+            config: config.clone(),
+            opening,
+        })
+    }
+
+    /// Whether it is the rig of `config`, opened in the same way. Excitation, controller, calibration and analysis do not belong to
+    /// the rig, and the model of the plant belongs to a simulated one only.
+    pub(super) fn is_of(&self, config: &Config, opening: &Opening) -> bool {
+        let open = &self.config;
+        let is_simulated = opening.stage == Stage::Simulated;
+        opening.stage == self.opening.stage
+            && opening.pace == self.opening.pace
+            && !opening.clear_fault
+            && open.servo == config.servo
+            && (!is_simulated || open.plant == config.plant)
+            && open.motor == config.motor
+            && open.amplifier == config.amplifier
+            && open.probe == config.probe
+            && open.interlock == config.interlock
+            && open.sim == config.sim
+    }
+
+    /// Identities of the devices.
+    pub fn names(&self) -> &DeviceNames {
+        &self.names
+    }
+
+    /// How the loop is scheduled.
+    pub fn scheduling(&self) -> &Scheduling {
+        self.rig.scheduling()
+    }
+}

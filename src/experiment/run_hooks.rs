@@ -1,0 +1,139 @@
+//! What other threads do with a rig while its loop goes on: they stop the run, change it, and watch it.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rtrb::{Consumer, RingBuffer};
+
+use crate::recording::LiveCopy;
+use crate::rt::record::LoopMessage;
+use crate::rt::supervision::StopFlags;
+use crate::rt::tuning::Tune;
+
+/// Slots of the ring of a live view: 1.6 s at 5 kHz.
+pub(super) const FEED_SLOTS: usize = 1 << 13;
+
+/// What the messages of a feed belong to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FeedSource {
+    /// The loop between two runs.
+    Idle,
+    /// A run.
+    Run,
+}
+
+/// Messages of the loop for a live view, until the ring is abandoned.
+pub struct Feed {
+    /// What they belong to.
+    pub source: FeedSource,
+    /// Sampling period in seconds.
+    pub period_s: f64,
+    /// The messages.
+    pub messages: Consumer<LoopMessage>,
+}
+
+/// Where feeds are sent to, and how many messages did not fit into their rings.
+#[derive(Clone, Debug)]
+pub struct FeedSender {
+    feeds: Sender<Feed>,
+    dropped: Arc<AtomicU64>,
+}
+
+impl FeedSender {
+    /// A sender and its receiver.
+    pub fn channel() -> (FeedSender, Receiver<Feed>) {
+        let (feeds, received) = channel();
+        let dropped = Arc::default();
+        (FeedSender { feeds, dropped }, received)
+    }
+
+    /// Messages of runs that the live view did not take in time.
+    pub fn dropped(&self) -> u64 {
+        self.dropped.load(Ordering::Relaxed)
+    }
+
+    /// Sends a feed. Without a receiver nobody watches.
+    pub(super) fn send(&self, source: FeedSource, period_s: f64, messages: Consumer<LoopMessage>) {
+        let feed = Feed {
+            source,
+            period_s,
+            messages,
+        };
+        let _ = self.feeds.send(feed);
+    }
+
+    /// The copy of a recording.
+    fn copy(&self, period_s: f64) -> LiveCopy {
+        let (ring, messages) = RingBuffer::new(FEED_SLOTS);
+        self.send(FeedSource::Run, period_s, messages);
+        LiveCopy::new(ring, Arc::clone(&self.dropped))
+    }
+}
+
+/// Handles on the run of a rig. Clones belong to the same rig.
+#[derive(Clone, Debug)]
+pub struct RunHooks {
+    /// Ends the run in progress: raised once it settles, raised twice the current is cut.
+    pub stop: StopFlags,
+    tunes: Sender<Tune>,
+    sent_tunes: Arc<Mutex<Receiver<Tune>>>,
+    feeds: Option<FeedSender>,
+    /// Whether the stop signals of this process end the run.
+    pub(super) has_signals: bool,
+}
+
+impl Default for RunHooks {
+    fn default() -> RunHooks {
+        let (tunes, sent) = channel();
+        RunHooks {
+            stop: StopFlags::default(),
+            tunes,
+            sent_tunes: Arc::new(Mutex::new(sent)),
+            feeds: None,
+            has_signals: true,
+        }
+    }
+}
+
+impl RunHooks {
+    /// Hooks of a rig that is watched. Its runs are ended by the stop flags only, not by signals of this process.
+    pub fn watched(feeds: FeedSender) -> RunHooks {
+        RunHooks {
+            feeds: Some(feeds),
+            has_signals: false,
+            ..RunHooks::default()
+        }
+    }
+
+    /// The same rig, with stop flags of the next run.
+    pub fn with_stop(&self, stop: StopFlags) -> RunHooks {
+        RunHooks {
+            stop,
+            ..self.clone()
+        }
+    }
+
+    /// Changes the reference or the loop gain of the run in progress. Whoever sends a change must have checked it with
+    /// [`check_tune`](super::check_tune). What is sent between runs is discarded.
+    pub fn tuner(&self) -> Sender<Tune> {
+        self.tunes.clone()
+    }
+
+    /// The changes that were sent since the last call.
+    pub(super) fn take_tunes(&self) -> Vec<Tune> {
+        let sent = self.sent_tunes.lock();
+        let sent = sent.unwrap_or_else(PoisonError::into_inner);
+        sent.try_iter().collect()
+    }
+
+    /// Who watches the loop.
+    pub(super) fn feeds(&self) -> Option<&FeedSender> {
+        self.feeds.as_ref()
+    }
+
+    /// The copy of a recording for a live view.
+    pub(super) fn live_copy(&self, period_s: f64) -> Option<LiveCopy> {
+        self.feeds.as_ref().map(|feeds| feeds.copy(period_s))
+    }
+}

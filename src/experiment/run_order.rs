@@ -1,0 +1,185 @@
+//! A run as one process orders it from the process that owns the rig, and the report of that process.
+
+use std::fmt::Debug;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::error::ExperimentError;
+use super::motor_start::MotorStart;
+use super::plan::{Plan, RunKind};
+use super::plan_error::PlanError;
+use super::remembered_motor::MotorHandling;
+use super::run::{RemoteRecording, Run, RunFile, StopCause};
+use super::runner::Setup;
+use crate::config;
+use crate::control::ControllerText;
+use crate::recording::Totals;
+use crate::rig::calibration::Calibration;
+use crate::rt::servo_run::RunOutcome;
+use crate::rt::thread::{Pace, Scheduling};
+use crate::util::progress::Progress;
+
+/// Everything that the owner of a rig needs for a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RunOrder {
+    /// Kind of the run.
+    pub kind: RunKind,
+    /// The settings as TOML.
+    pub config_toml: String,
+    /// Name and text of the controller.
+    controller: Option<(String, String)>,
+    /// Text of the file of the reference.
+    reference: Option<String>,
+    /// A calibration instead of the configured one, as TOML.
+    calibration_toml: Option<String>,
+    /// Pace of the loop.
+    pub pace: Pace,
+    /// Whether a stored fault of the amplifier is cleared first.
+    pub clear_fault: bool,
+    /// How the thermal state of the motor is treated.
+    pub motor: MotorHandling,
+    /// Folder for the recording, as an absolute path.
+    pub folder: PathBuf,
+}
+
+impl RunOrder {
+    /// The order of a plan.
+    pub(super) fn of(
+        plan: &Plan,
+        setup: &Setup,
+        calibration: Option<&Calibration>,
+    ) -> Result<RunOrder, ExperimentError> {
+        let mut plan = plan.clone();
+        let file = plan.config.calibration.file.as_mut();
+        // A file that is missing is named as the user named it.
+        if let Some(file) = file.filter(|file| Path::new(file).exists()) {
+            *file = absolute(Path::new(file))?.display().to_string();
+        }
+        let calibration_toml = calibration.map(Calibration::to_toml).transpose();
+        Ok(RunOrder {
+            kind: plan.kind,
+            config_toml: plan.config_toml()?,
+            reference: plan.reference_file().map(String::from),
+            controller: plan.controller.map(|found| (found.name, found.text)),
+            calibration_toml: calibration_toml
+                .map_err(|error| PlanError::Text(error.to_string()))?,
+            pace: setup.pace,
+            clear_fault: setup.clear_fault,
+            motor: setup.motor,
+            folder: absolute(&setup.folder)?,
+        })
+    }
+
+    /// The plan.
+    ///
+    /// # Errors
+    /// When its texts cannot be read.
+    pub fn plan(&self) -> Result<Plan, PlanError> {
+        let config = config::whole("the ordered configuration", &self.config_toml)?;
+        let controller = self.controller.clone();
+        let controller = controller.map(|(name, text)| ControllerText { name, text });
+        Ok(Plan::with_texts(
+            self.kind,
+            config,
+            controller,
+            self.reference.clone(),
+        ))
+    }
+
+    /// A calibration instead of the configured one.
+    ///
+    /// # Errors
+    /// When its text cannot be read.
+    pub fn calibration(&self) -> Result<Option<Calibration>, PlanError> {
+        let text = self.calibration_toml.as_deref();
+        let calibration = text.map(|text| config::typed("the ordered calibration", text));
+        Ok(calibration.transpose()?)
+    }
+}
+
+fn absolute(path: &Path) -> Result<PathBuf, ExperimentError> {
+    let made = std::path::absolute(path);
+    made.map_err(|error| {
+        let path = path.display();
+        ExperimentError::Failed(format!(
+            "{path} has no absolute path: {error}; start the command in a folder that exists"
+        ))
+    })
+}
+
+/// A run that has ended in the process that owns the rig. Its recording is still open for results.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RunReport {
+    ended: RunOutcome,
+    pace: Pace,
+    scheduling: Scheduling,
+    stop_cause: Option<StopCause>,
+    motor: MotorStart,
+    totals: Totals,
+}
+
+impl RunReport {
+    /// Reports a run of this process.
+    ///
+    /// # Errors
+    /// When the recording cannot be completed.
+    pub fn of(run: &mut Run) -> Result<RunReport, ExperimentError> {
+        Ok(RunReport {
+            totals: run.totals()?,
+            ended: run.ended.clone(),
+            pace: run.pace,
+            scheduling: run.scheduling.clone(),
+            stop_cause: run.stop_cause,
+            motor: run.motor.clone(),
+        })
+    }
+
+    /// Path of the recording in the process that owns the rig.
+    pub fn path(&self) -> &Path {
+        &self.totals.path
+    }
+
+    /// The run, as this process knows it. `folder` is the folder of the order as the user named it.
+    fn run(self, recording: Box<dyn RemoteRecording>, folder: &Path) -> Run {
+        let name = self.totals.path.file_name().unwrap_or_default();
+        Run {
+            path: folder.join(name),
+            ended: self.ended,
+            pace: self.pace,
+            scheduling: self.scheduling,
+            stop_cause: self.stop_cause,
+            motor: self.motor,
+            file: RunFile::Remote {
+                totals: self.totals,
+                recording,
+            },
+        }
+    }
+}
+
+/// Another process that owns the rig and runs orders.
+pub trait RigOwner: Debug + Send + Sync {
+    /// Runs an order, reports its progress, and returns when it has ended. A stop signal of this process ends the run.
+    ///
+    /// # Errors
+    /// When the owner refuses the order, when the run fails, or when the owner cannot be reached.
+    fn run(
+        &self,
+        order: &RunOrder,
+        progress: &Progress,
+    ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError>;
+}
+
+/// Runs a plan in the process that owns the rig.
+pub(super) fn run_elsewhere(
+    owner: &dyn RigOwner,
+    plan: &Plan,
+    setup: &Setup,
+    calibration: Option<&Calibration>,
+    progress: &Progress,
+) -> Result<Run, ExperimentError> {
+    let order = RunOrder::of(plan, setup, calibration)?;
+    let (report, recording) = owner.run(&order, progress)?;
+    Ok(report.run(recording, &setup.folder))
+}
