@@ -2,13 +2,14 @@
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use super::connection::operator;
 use super::error::{CliError, ErrorReport};
 use super::help::GLOSSARY;
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
     calibrate, campaign, chirp, completions, config, control, doctor, emulate, identify, linearity,
-    margins, model, recover, replay,
+    margins, model, recover, remote, replay, serve,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -33,6 +34,9 @@ enum Command {
     /// Run the closed loop with a reference signal; writes a recording and prints predicted and measured settling time,
     /// overshoot and error
     Control(control::Args),
+    /// Run as a daemon that owns the bench: live page, HTTP interface, queue of commands; other `bench` commands on this
+    /// machine then use its bench
+    Serve(serve::Args),
     /// Run a chirp at each point of a grid of operating points and asymmetries; prints a map of the verdicts, the
     /// asymmetry offset and a recommendation
     Campaign(campaign::Args),
@@ -70,8 +74,20 @@ pub fn main() -> Outcome {
     let _ = survive_file_size_limit();
     let json = std::env::args_os().any(|argument| argument == "--json");
     match Cli::try_parse() {
-        Ok(cli) => run(cli).unwrap_or_else(|error| failed(&error, json)),
+        Ok(cli) => run_here_or_there(cli).unwrap_or_else(|error| failed(&error, json)),
         Err(error) => not_parsed(&error, json),
+    }
+}
+
+/// Runs a parsed command line in this process, or at the daemon that it names.
+fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
+    let arguments: Vec<String> = std::env::args_os()
+        .skip(1)
+        .map(|argument| argument.to_string_lossy().into_owned())
+        .collect();
+    match remote::target(&arguments) {
+        Some(target) => remote::carry_out(&target, &arguments, &operator()),
+        None => run(cli),
     }
 }
 
@@ -109,6 +125,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Chirp(args) => chirp::run(&args),
         Command::Linearity(args) => linearity::run(&args),
         Command::Control(args) => control::run(&args),
+        Command::Serve(args) => serve::run(&args),
         Command::Campaign(args) => campaign::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),

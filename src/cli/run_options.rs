@@ -1,9 +1,11 @@
 //! Options of every command that makes a run, and how the run ended, as text.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde::Serialize;
 
+use super::connection::ConnectOption;
 use super::error::CliError;
 use super::options::SeedOption;
 use super::outcome::Outcome;
@@ -12,8 +14,8 @@ use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
 use crate::config::Config;
 use crate::experiment::{
-    self, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, Run, RunSummary, Runner,
-    Setup, Stage, StopCause, TimingSummary, TripSummary,
+    self, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run, RunSummary,
+    Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
@@ -43,6 +45,8 @@ pub(super) struct RunOptions {
     /// Folder for the recording and the files computed from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
+    #[command(flatten)]
+    connect: ConnectOption,
 }
 
 impl RunOptions {
@@ -83,7 +87,16 @@ impl RunOptions {
             motor: self.motor(config)?,
             now: Moment::now,
             folder: self.out.clone(),
+            owner: self.owner(config)?,
         })
+    }
+
+    /// The daemon that makes the run. A rehearsal of a run on devices is made in this process.
+    fn owner(&self, config: &Config) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
+        match self.simulate {
+            true => Ok(None),
+            false => self.connect.owner(self.stage(config)),
+        }
     }
 
     /// How the heat of the motor is treated. With `--motor-cold` this statement is stored first.

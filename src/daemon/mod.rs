@@ -1,3 +1,32 @@
 //! The daemon: one process owns the bench and serves clients.
 
+mod api;
+mod catalogue;
+pub mod client;
+mod dispatch;
+pub mod http_client;
+mod lease;
 pub mod live;
+mod metrics;
+mod output;
+mod owner;
+mod page;
+mod run_entry;
+mod run_record;
+mod same_rig;
+mod schedule;
+mod secret;
+mod serve;
+mod session;
+mod session_messages;
+mod shared;
+mod socket;
+mod warnings;
+mod worker;
+
+pub use output::OutputPiece;
+pub use run_entry::{Command, OnDisconnect, RunRequest};
+pub use serve::{ServeError, ServeOptions, Started, serve};
+pub use shared::DaemonConfig;
+pub use socket::own_socket;
+pub use warnings::WarningCopies;

@@ -1,1 +1,11 @@
-//! What the daemon shows while the loop runs: samples, state, events and counters, decimated outside the loop.
+//! What the daemon shows while the loop runs: samples, state and events, derived outside the loop from its messages.
+//!
+//! ```text
+//!  loop -> ring -> recorder -> ring (a copy; what does not fit is counted) -> hub -> samples, events, status -> clients
+//!  loop between two runs ----> ring ------------------------------------------^
+//! ```
+
+pub mod event_text;
+pub mod frame;
+pub mod hub;
+pub mod status;

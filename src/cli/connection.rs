@@ -1,0 +1,77 @@
+//! `--connect`: whether a run is made by a daemon of this machine, or in this process.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::error::CliError;
+use crate::daemon::client::{DaemonOwner, rig_of, running_daemon};
+use crate::daemon::{Command, OnDisconnect, RunRequest};
+use crate::experiment::{RigOwner, Stage};
+
+/// Where runs are made.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct ConnectOption {
+    /// Run at the daemon of this socket, or `none`: in this process [default: at the daemon of this machine, if one runs
+    /// on the same kind of bench]; http://HOST:PORT carries out the whole command there
+    #[arg(long, value_name = "PATH|URL|none")]
+    connect: Option<String>,
+}
+
+impl ConnectOption {
+    /// The daemon that makes the runs; `None` for this process.
+    pub fn owner(&self, stage: Stage) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
+        let socket = match self.connect.as_deref() {
+            Some("none") => return Ok(None),
+            // The whole command is carried out there, before it gets here.
+            Some(url) if url.starts_with("http://") => return Ok(None),
+            Some(path) => Some(required(PathBuf::from(path), stage)?),
+            None => running_daemon().filter(|socket| rig_of(socket).ok() == Some(stage)),
+        };
+        let owner = socket.map(|socket| DaemonOwner::new(socket, request(), operator()));
+        Ok(owner.map(|owner| Arc::new(owner) as Arc<dyn RigOwner>))
+    }
+}
+
+/// A daemon that the operator named must run, with the same kind of bench.
+fn required(socket: PathBuf, stage: Stage) -> Result<PathBuf, CliError> {
+    let shown = socket.display();
+    match rig_of(&socket) {
+        Err(error) => Err(CliError::Failed(format!(
+            "--connect {shown}: no daemon answers ({error}); start it with `bench serve`, or leave --connect out"
+        ))),
+        Ok(rig) if rig != stage => Err(CliError::Usage(format!(
+            "--connect {shown}: the daemon runs {}, and this command is for {}; choose the configuration of the daemon with --config, or add --connect none",
+            name(rig),
+            name(stage)
+        ))),
+        Ok(_) => Ok(socket),
+    }
+}
+
+fn name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Simulated => "the simulated stage",
+        Stage::Devices => "devices",
+    }
+}
+
+/// The command line of this process, for the queue of the daemon.
+fn request() -> RunRequest {
+    let mut words = std::env::args().skip(1);
+    let named = words.next().unwrap_or_default();
+    let command = Command::ALL
+        .into_iter()
+        .find(|command| command.name() == named);
+    RunRequest {
+        command: command.unwrap_or(Command::Chirp),
+        args: words.collect(),
+        name: String::new(),
+        note: String::new(),
+        on_disconnect: OnDisconnect::Default,
+    }
+}
+
+/// The user of this process.
+pub(super) fn operator() -> String {
+    std::env::var("USER").unwrap_or_else(|_| "unknown".into())
+}

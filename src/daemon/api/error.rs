@@ -1,0 +1,151 @@
+//! Errors of the interface as JSON objects.
+
+use aide::OperationOutput;
+use aide::generate::GenContext;
+use aide::openapi::{Operation, Response as Described};
+use axum::Json;
+use axum::http::StatusCode;
+use axum::response::{IntoResponse, Response};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::daemon::schedule::ScheduleError;
+use crate::daemon::worker::{ArgsError, ComputeError};
+use crate::experiment::{ErrorKind, ErrorObject};
+
+/// An error with its status.
+#[derive(Debug)]
+pub struct ApiError {
+    status: StatusCode,
+    object: ErrorObject,
+}
+
+/// The body of an error.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ErrorBody {
+    error: ErrorFields,
+}
+
+/// What is wrong and what to do.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ErrorFields {
+    message: String,
+    kind: String,
+    #[serde(rename = "where")]
+    place: Option<String>,
+    remedy: Option<String>,
+}
+
+impl ApiError {
+    /// An error.
+    pub fn new(status: StatusCode, kind: ErrorKind, message: impl Into<String>) -> ApiError {
+        ApiError {
+            status,
+            object: ErrorObject::new(message.into(), kind, None),
+        }
+    }
+
+    /// A request that cannot be understood.
+    pub fn bad_request(message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::BAD_REQUEST, ErrorKind::Usage, message)
+    }
+
+    /// A request that is understood and refused.
+    pub fn refused(kind: ErrorKind, message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::UNPROCESSABLE_ENTITY, kind, message)
+    }
+
+    /// Something that is not there.
+    pub fn not_found(message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::NOT_FOUND, ErrorKind::Usage, message)
+    }
+
+    /// Something that is in use.
+    pub fn conflict(message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::CONFLICT, ErrorKind::Usage, message)
+    }
+
+    /// Missing or wrong credentials.
+    pub fn unauthorized(message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::UNAUTHORIZED, ErrorKind::Usage, message)
+    }
+
+    /// A request that this client may not make.
+    pub fn forbidden(message: impl Into<String>) -> ApiError {
+        ApiError::new(StatusCode::FORBIDDEN, ErrorKind::Usage, message)
+    }
+
+    /// An object that a command printed instead of its result.
+    pub fn of_command(json: &serde_json::Value) -> ApiError {
+        let error = json.get("error").cloned().unwrap_or_default();
+        let object: Result<ErrorObject, _> = serde_json::from_value(error);
+        match object {
+            Ok(object) => ApiError {
+                status: StatusCode::UNPROCESSABLE_ENTITY,
+                object,
+            },
+            Err(_) => ApiError::refused(
+                ErrorKind::Failed,
+                "the command failed without a message; start it on the command line",
+            ),
+        }
+    }
+}
+
+impl From<ScheduleError> for ApiError {
+    fn from(error: ScheduleError) -> ApiError {
+        let message = error.to_string();
+        match error {
+            ScheduleError::Held { .. } => ApiError::conflict(message),
+            ScheduleError::NoLease | ScheduleError::NoTicket => ApiError::forbidden(message),
+            ScheduleError::Full => {
+                ApiError::new(StatusCode::TOO_MANY_REQUESTS, ErrorKind::Usage, message)
+            }
+            ScheduleError::Unknown(_) => ApiError::not_found(message),
+            ScheduleError::ShuttingDown => ApiError::conflict(message),
+        }
+    }
+}
+
+impl From<ArgsError> for ApiError {
+    fn from(error: ArgsError) -> ApiError {
+        ApiError::refused(ErrorKind::Usage, error.to_string())
+    }
+}
+
+impl From<ComputeError> for ApiError {
+    fn from(error: ComputeError) -> ApiError {
+        ApiError::refused(ErrorKind::Failed, error.to_string())
+    }
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let object = self.object;
+        let body = serde_json::json!({ "error": object });
+        (self.status, Json(body)).into_response()
+    }
+}
+
+impl OperationOutput for ApiError {
+    type Inner = ErrorBody;
+
+    fn operation_response(
+        context: &mut GenContext,
+        operation: &mut Operation,
+    ) -> Option<Described> {
+        Json::<ErrorBody>::operation_response(context, operation)
+    }
+
+    fn inferred_responses(
+        context: &mut GenContext,
+        operation: &mut Operation,
+    ) -> Vec<(Option<aide::openapi::StatusCode>, Described)> {
+        let described = Self::operation_response(context, operation);
+        let range = aide::openapi::StatusCode::Range(4);
+        described
+            .map(|described| (Some(range), described))
+            .into_iter()
+            .collect()
+    }
+}

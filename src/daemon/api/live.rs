@@ -1,0 +1,153 @@
+//! State, events and samples as they happen.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::Duration;
+
+use aide::NoApi;
+use axum::Json;
+use axum::extract::State;
+use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::response::sse::{Event, KeepAlive, Sse};
+use axum::response::{IntoResponse, Response};
+use futures_util::stream;
+use serde::Serialize;
+use tokio::sync::broadcast::Receiver;
+use tokio::sync::broadcast::error::RecvError;
+use tokio::time::{Interval, MissedTickBehavior, interval};
+
+use super::views::{StateView, state};
+use crate::daemon::live::event_text::EventView;
+use crate::daemon::live::hub::LiveMessage;
+use crate::daemon::session;
+use crate::daemon::shared::Daemon;
+
+/// Time between two states.
+const STATE: Duration = Duration::from_millis(200);
+/// A client that takes no message for this long is disconnected.
+const PATIENCE: Duration = Duration::from_secs(20);
+
+/// Everything at one moment.
+pub async fn now(State(daemon): State<Arc<Daemon>>) -> Json<StateView> {
+    Json(state(&daemon))
+}
+
+/// A text message of the WebSocket.
+#[derive(Serialize)]
+#[serde(tag = "type", rename_all = "snake_case")]
+enum TextMessage<'a> {
+    State {
+        state: Box<StateView>,
+    },
+    Event {
+        #[serde(flatten)]
+        event: &'a EventView,
+    },
+    Lagged {
+        frames: u64,
+    },
+}
+
+/// Upgrades to a WebSocket: states and events as JSON text, samples as binary messages.
+pub async fn web_socket(
+    State(daemon): State<Arc<Daemon>>,
+    NoApi(upgrade): NoApi<WebSocketUpgrade>,
+) -> Response {
+    upgrade.on_upgrade(|socket| serve(daemon, socket))
+}
+
+/// Upgrades to the connection of a command of this machine.
+pub async fn command(
+    State(daemon): State<Arc<Daemon>>,
+    NoApi(upgrade): NoApi<WebSocketUpgrade>,
+) -> Response {
+    upgrade.on_upgrade(|socket| session::serve(daemon, socket))
+}
+
+async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket) {
+    let mut source = Source::new(Arc::clone(&daemon));
+    for event in &daemon.live.snapshot().events {
+        if send(&mut socket, text(&TextMessage::Event { event }))
+            .await
+            .is_err()
+        {
+            return;
+        }
+    }
+    loop {
+        let message = tokio::select! {
+            message = source.next() => message,
+            received = socket.recv() => match received {
+                Some(Ok(Message::Close(_)) | Err(_)) | None => return,
+                Some(Ok(_)) => continue, // nothing is expected of a viewer
+            },
+        };
+        let Some(message) = message else { return };
+        if send(&mut socket, message).await.is_err() {
+            return;
+        }
+    }
+}
+
+/// Fails when the client is gone, or takes nothing for too long.
+async fn send(socket: &mut WebSocket, message: Message) -> Result<(), ()> {
+    let sent = tokio::time::timeout(PATIENCE, socket.send(message)).await;
+    sent.map_err(drop)?.map_err(drop)
+}
+
+fn text(message: &TextMessage<'_>) -> Message {
+    // Serialising these types does not fail: their keys are texts.
+    Message::Text(serde_json::to_string(message).unwrap_or_default().into())
+}
+
+/// What one client is sent.
+struct Source {
+    daemon: Arc<Daemon>,
+    messages: Receiver<LiveMessage>,
+    states: Interval,
+}
+
+impl Source {
+    fn new(daemon: Arc<Daemon>) -> Source {
+        let mut states = interval(STATE);
+        states.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        Source {
+            messages: daemon.live.messages(),
+            daemon,
+            states,
+        }
+    }
+
+    async fn next(&mut self) -> Option<Message> {
+        tokio::select! {
+            message = self.messages.recv() => match message {
+                Ok(LiveMessage::Samples(bytes)) => Some(Message::Binary(bytes)),
+                Ok(LiveMessage::Event(event)) => Some(text(&TextMessage::Event { event: &event })),
+                Err(RecvError::Lagged(frames)) => Some(text(&TextMessage::Lagged { frames })),
+                Err(RecvError::Closed) => None,
+            },
+            _ = self.states.tick() => {
+                let state = Box::new(state(&self.daemon));
+                Some(text(&TextMessage::State { state }))
+            }
+        }
+    }
+}
+
+/// State and events as server-sent events.
+pub async fn events(State(daemon): State<Arc<Daemon>>) -> Response {
+    let source = Source::new(daemon);
+    let events = stream::unfold(source, |mut source| async {
+        loop {
+            match source.next().await? {
+                Message::Text(text) => {
+                    let event = Event::default().data(text.as_str());
+                    return Some((Ok::<_, Infallible>(event), source));
+                }
+                Message::Binary(_) | Message::Ping(_) | Message::Pong(_) | Message::Close(_) => {}
+            }
+        }
+    });
+    let events = Sse::new(events).keep_alive(KeepAlive::default());
+    events.into_response()
+}

@@ -1,0 +1,15 @@
+//! The HTTP interface: one line per request in [`routes`], one file per resource.
+
+pub mod error;
+mod extract;
+pub mod guard;
+mod lease;
+mod live;
+mod page;
+mod recordings;
+mod routes;
+mod runs;
+mod tools;
+pub mod views;
+
+pub use routes::{Reach, router};

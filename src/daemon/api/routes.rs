@@ -1,0 +1,249 @@
+//! All requests of the interface, and its description.
+
+use std::sync::Arc;
+
+use aide::axum::ApiRouter;
+use aide::axum::routing::{get_with, post_with, put_with};
+use aide::openapi::{Info, OpenApi};
+use aide::transform::TransformOperation;
+use axum::extract::DefaultBodyLimit;
+use axum::extract::State;
+use axum::http::header::CONTENT_TYPE;
+use axum::response::IntoResponse;
+use axum::routing::get;
+use axum::{Extension, Json, Router};
+use tower_http::limit::RequestBodyLimitLayer;
+
+use super::error::ApiError;
+use super::{lease, live, page, recordings, runs, tools};
+use crate::daemon::client::SESSION_PATH;
+use crate::daemon::metrics;
+use crate::daemon::shared::Daemon;
+
+/// Largest body of a request in bytes.
+const MAX_BODY: usize = 1 << 20;
+
+/// From where requests come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Reach {
+    /// The socket of this machine: commands may order runs.
+    Machine,
+    /// TCP.
+    Network,
+}
+
+/// The requests of the interface.
+pub fn router(daemon: Arc<Daemon>, reach: Reach) -> Router {
+    let mut description = OpenApi {
+        info: Info {
+            title: "bench".into(),
+            version: env!("CARGO_PKG_VERSION").into(),
+            description: Some(DESCRIPTION.into()),
+            ..Info::default()
+        },
+        ..OpenApi::default()
+    };
+    let api = api().finish_api(&mut description);
+    let mut router = api
+        .route("/", get(page::index))
+        .route("/metrics", get(metrics))
+        .route("/page/{name}", get(page::file));
+    if reach == Reach::Machine {
+        router = router.route(SESSION_PATH, get(live::command));
+    }
+    router
+        .fallback(unknown)
+        .method_not_allowed_fallback(wrong_method)
+        .layer(Extension(Arc::new(description)))
+        .layer(DefaultBodyLimit::max(MAX_BODY))
+        .layer(RequestBodyLimitLayer::new(MAX_BODY))
+        .with_state(daemon)
+}
+
+const DESCRIPTION: &str = "Controller daemon of a precision-motion test bench. Over TCP every request that changes something needs the header `Authorization: Bearer TOKEN`, except POST /api/v1/stop: anyone may stop. What moves or tunes also needs the arm lease in the header `Bench-Lease`. Errors are objects `{ \"error\": { message, kind, where, remedy } }`.";
+
+async fn metrics(State(daemon): State<Arc<Daemon>>) -> impl IntoResponse {
+    (
+        [(CONTENT_TYPE, metrics::MEDIA_TYPE)],
+        metrics::text(&daemon),
+    )
+}
+
+async fn unknown() -> ApiError {
+    ApiError::not_found("there is no such request; see /api/v1/openapi.json")
+}
+
+async fn wrong_method() -> ApiError {
+    ApiError::new(
+        axum::http::StatusCode::METHOD_NOT_ALLOWED,
+        crate::experiment::ErrorKind::Usage,
+        "this path does not know the method; see /api/v1/openapi.json",
+    )
+}
+
+async fn description(Extension(description): Extension<Arc<OpenApi>>) -> Json<OpenApi> {
+    Json((*description).clone())
+}
+
+/// Name and summary of a request.
+fn named(
+    id: &'static str,
+    summary: &'static str,
+) -> impl FnOnce(TransformOperation<'_>) -> TransformOperation<'_> {
+    move |operation| operation.id(id).summary(summary)
+}
+
+fn api() -> ApiRouter<Arc<Daemon>> {
+    ApiRouter::new()
+        .api_route(
+            "/api/v1/state",
+            get_with(live::now, named("state", "Everything at one moment")),
+        )
+        .api_route(
+            "/api/v1/live",
+            get_with(
+                live::web_socket,
+                named(
+                    "live",
+                    "WebSocket: states and events as text, samples as binary messages",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/events",
+            get_with(
+                live::events,
+                named("events", "States and events as server-sent events"),
+            ),
+        )
+        .api_route(
+            "/api/v1/lease",
+            post_with(lease::take, named("takeLease", "Take the arm lease"))
+                .put_with(lease::renew, named("renewLease", "Renew the arm lease"))
+                .delete_with(
+                    lease::release,
+                    named("releaseLease", "Release the arm lease"),
+                ),
+        )
+        .api_route(
+            "/api/v1/runs",
+            get_with(runs::list, named("runs", "List the commands")).post_with(
+                runs::start,
+                named("startRun", "Queue a command; needs the lease"),
+            ),
+        )
+        .api_route(
+            "/api/v1/runs/{id}",
+            get_with(runs::one, named("run", "One command")),
+        )
+        .api_route(
+            "/api/v1/runs/{id}/stop",
+            post_with(runs::stop, named("stopRun", "Stop or cancel a command")),
+        )
+        .api_route(
+            "/api/v1/runs/{id}/output",
+            get_with(
+                runs::output,
+                named(
+                    "runOutput",
+                    "What a command prints, as one JSON object a line",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/stop",
+            post_with(
+                runs::stop_all,
+                named("stop", "Stop whatever runs; needs neither lease nor token"),
+            ),
+        )
+        .api_route(
+            "/api/v1/clear",
+            post_with(
+                runs::clear,
+                named("clear", "Acknowledge a trip; needs the lease"),
+            ),
+        )
+        .api_route(
+            "/api/v1/plan",
+            post_with(
+                runs::plan,
+                named(
+                    "plan",
+                    "Predict travel, current, heat and duration; nothing moves",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/tune",
+            post_with(
+                runs::tune,
+                named(
+                    "tune",
+                    "Change reference and gain of the running loop; needs the lease",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/recordings",
+            get_with(recordings::list, named("recordings", "List the recordings")),
+        )
+        .api_route(
+            "/api/v1/recordings/{file}",
+            get_with(
+                recordings::download,
+                named("download", "Download a file; understands Range"),
+            )
+            .delete_with(
+                recordings::remove,
+                named(
+                    "removeRecording",
+                    "Remove a recording and the files computed from it",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/recordings/{file}/note",
+            put_with(
+                recordings::note,
+                named("noteRecording", "Change name and note of a recording"),
+            ),
+        )
+        .api_route(
+            "/api/v1/recordings/{file}/results",
+            get_with(
+                recordings::results,
+                named("results", "The results in a recording"),
+            ),
+        )
+        .api_route(
+            "/api/v1/config",
+            get_with(tools::in_use, named("config", "The configuration in use")),
+        )
+        .api_route(
+            "/api/v1/config/check",
+            post_with(
+                tools::check,
+                named("checkConfig", "Check settings; nothing is changed"),
+            ),
+        )
+        .api_route(
+            "/api/v1/config/schema",
+            get_with(
+                tools::schema,
+                named("configSchema", "The JSON schema of the settings"),
+            ),
+        )
+        .api_route(
+            "/api/v1/doctor",
+            get_with(tools::doctor, named("doctor", "Findings of bench doctor")),
+        )
+        .api_route(
+            "/api/v1/model",
+            get_with(
+                tools::model,
+                named("model", "Modes, residues and zeros of the model"),
+            ),
+        )
+        .route("/api/v1/openapi.json", get(description))
+}

@@ -1,0 +1,282 @@
+//! Commands: start, list, stop, output; and changes of the run in progress.
+
+use std::convert::Infallible;
+use std::sync::Arc;
+
+use axum::Json;
+use axum::body::Body as HttpBody;
+use axum::extract::State;
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use bytes::Bytes;
+use futures_util::stream;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::ApiError;
+use super::extract::{Body, InPath, LeaseHeader};
+use super::lease::random;
+use super::views::RunView;
+use crate::daemon::output::{OutputPiece, RunOutput};
+use crate::daemon::run_entry::{Carrier, Command, RunRequest};
+use crate::daemon::schedule::{NewEntry, StopKind};
+use crate::daemon::secret::Secret;
+use crate::daemon::shared::Daemon;
+use crate::daemon::worker::{self, check_args};
+use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
+use crate::rt::tuning::{Factors, Tune};
+
+/// Longest name and note of a run in bytes.
+const MAX_TEXT: usize = 10_000;
+
+/// All commands that the daemon knows.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Runs {
+    /// The one that has its turn.
+    current: Option<RunView>,
+    /// Those that wait.
+    queue: Vec<RunView>,
+    /// Those that have ended, newest first.
+    finished: Vec<RunView>,
+}
+
+/// Lists the commands.
+pub async fn list(State(daemon): State<Arc<Daemon>>) -> Json<Runs> {
+    Json(daemon.read(|schedule| Runs {
+        current: schedule.current().map(RunView::from),
+        queue: schedule.queue().map(RunView::from).collect(),
+        finished: schedule.finished().map(RunView::from).collect(),
+    }))
+}
+
+/// One command.
+pub async fn one(
+    State(daemon): State<Arc<Daemon>>,
+    InPath(id): InPath<u64>,
+) -> Result<Json<RunView>, ApiError> {
+    let view = daemon.read(|schedule| schedule.entry(id).map(RunView::from))?;
+    Ok(Json(view))
+}
+
+/// Queues a command under the lease of the client.
+pub async fn start(
+    State(daemon): State<Arc<Daemon>>,
+    LeaseHeader(lease): LeaseHeader,
+    Body(request): Body<RunRequest>,
+) -> Result<(StatusCode, Json<RunView>), ApiError> {
+    if request.name.len().max(request.note.len()) > MAX_TEXT {
+        return Err(ApiError::bad_request(format!(
+            "name or note has more than {MAX_TEXT} bytes; shorten it"
+        )));
+    }
+    let operator = daemon.read(|schedule| {
+        let lease = schedule.require_lease(&lease)?;
+        Ok::<_, ApiError>(lease.operator.clone())
+    })?;
+    check_args(&request.args)?;
+    let new = NewEntry {
+        request,
+        carrier: Carrier::Started { ticket: random()? },
+        operator,
+        lease: Some(Secret::known(lease)),
+    };
+    let view = daemon.change(|schedule, now| {
+        let id = schedule.enqueue(new, now)?;
+        schedule.entry(id).map(RunView::from)
+    })?;
+    Ok((StatusCode::ACCEPTED, Json(view)))
+}
+
+/// How a run is stopped.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Stop {
+    /// `settle`: current to zero along a ramp. `cut`: zero current at once.
+    #[serde(default)]
+    how: StopKind,
+}
+
+/// Stops one command.
+pub async fn stop(
+    State(daemon): State<Arc<Daemon>>,
+    InPath(id): InPath<u64>,
+    Body(stop): Body<Stop>,
+) -> Result<Json<RunView>, ApiError> {
+    let view = daemon.change(|schedule, now| {
+        schedule.stop(id, stop.how, now)?;
+        schedule.entry(id).map(RunView::from)
+    })?;
+    tracing::warn!(run = id, how = ?stop.how, "the run was stopped by a client");
+    Ok(Json(view))
+}
+
+/// What was stopped.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct Stopped {
+    /// Number of the run; `null` if nothing had its turn.
+    run: Option<u64>,
+}
+
+/// Stops whatever runs. Needs neither lease nor token.
+pub async fn stop_all(State(daemon): State<Arc<Daemon>>, Body(stop): Body<Stop>) -> Json<Stopped> {
+    let run = daemon.change(|schedule, _| schedule.stop_current(stop.how));
+    tracing::warn!(run, how = ?stop.how, "a client stopped the bench");
+    Json(Stopped { run })
+}
+
+/// Acknowledges a trip.
+pub async fn clear(
+    State(daemon): State<Arc<Daemon>>,
+    LeaseHeader(lease): LeaseHeader,
+) -> Result<StatusCode, ApiError> {
+    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    daemon.live.acknowledge_trip();
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// What a command would do.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanRequest {
+    /// The command.
+    command: Command,
+    /// Its arguments.
+    #[serde(default)]
+    args: Vec<String>,
+}
+
+/// Predicts travel, current, heat and duration. Moves nothing.
+pub async fn plan(
+    State(daemon): State<Arc<Daemon>>,
+    Body(request): Body<PlanRequest>,
+) -> Result<Json<serde_json::Value>, ApiError> {
+    check_args(&request.args)?;
+    let mut args = request.args;
+    args.push("--plan".into());
+    let computed = worker::compute(&daemon, &[request.command.name()], &args).await?;
+    match computed.get("error") {
+        Some(_) => Err(ApiError::of_command(&computed)),
+        None => Ok(Json(computed)),
+    }
+}
+
+/// New factors of the loop in progress.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TuneRequest {
+    /// Factor of the reference, relative to the rest position.
+    #[serde(default = "one_factor")]
+    reference: f64,
+    /// Factor of the loop gain.
+    #[serde(default = "one_factor")]
+    gain: f64,
+    /// Length of the ramp to the new factors.
+    #[serde(default = "half_second")]
+    ramp_s: f64,
+}
+
+fn one_factor() -> f64 {
+    1.0
+}
+
+fn half_second() -> f64 {
+    0.5
+}
+
+/// Longest ramp to new factors.
+const MAX_RAMP_S: f64 = 3600.0;
+
+/// Changes reference and gain of the loop in progress, along a ramp. The margins of the new gain are checked first; an unstable loop is
+/// refused on the simulated stage as well.
+pub async fn tune(
+    State(daemon): State<Arc<Daemon>>,
+    LeaseHeader(lease): LeaseHeader,
+    Body(request): Body<TuneRequest>,
+) -> Result<StatusCode, ApiError> {
+    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    let Some(plan) = daemon.plan() else {
+        return Err(ApiError::conflict(
+            "no run goes on; start `control` first, then change its reference or gain",
+        ));
+    };
+    if !(request.ramp_s > 0.0 && request.ramp_s <= MAX_RAMP_S) {
+        return Err(ApiError::bad_request(format!(
+            "ramp_s is {}; choose a time above 0, up to {MAX_RAMP_S} s",
+            request.ramp_s
+        )));
+    }
+    let factors = Factors {
+        reference: request.reference,
+        gain: request.gain,
+    };
+    let ticks = (request.ramp_s * plan.config.servo.rate_hz).ceil() as u64;
+    let tune =
+        Tune::new(factors, ticks).map_err(|error| ApiError::bad_request(error.to_string()))?;
+    let checked = tokio::task::spawn_blocking(move || check_tune(&plan, factors, Stage::Devices));
+    match checked.await {
+        Ok(Ok(())) => {}
+        Ok(Err(refusal @ TuneRefusal::Margin(_))) => {
+            return Err(ApiError::refused(ErrorKind::Margin, refusal.to_string()));
+        }
+        Ok(Err(refusal)) => return Err(ApiError::refused(ErrorKind::Plan, refusal.to_string())),
+        Err(_) => {
+            let message = "the check of the margins failed; report this with the log of the daemon";
+            return Err(ApiError::refused(ErrorKind::Failed, message));
+        }
+    }
+    // Checked again after the computation: the lease may have ended.
+    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    let _ = daemon.owner.tuner().send(tune); // without a receiver nothing runs
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Follows what a command prints, as one JSON object a line. The last line is its exit code.
+pub async fn output(
+    State(daemon): State<Arc<Daemon>>,
+    InPath(id): InPath<u64>,
+) -> Result<Response, ApiError> {
+    daemon.read(|schedule| schedule.entry(id).map(drop))?;
+    let follower = Follower {
+        output: daemon.output(id),
+        next: 0,
+        is_done: false,
+    };
+    let lines = stream::unfold(follower, |mut follower| async {
+        let bytes = follower.lines().await?;
+        Some((Ok::<_, Infallible>(bytes), follower))
+    });
+    let media_type = [(header::CONTENT_TYPE, "application/x-ndjson")];
+    Ok((media_type, HttpBody::from_stream(lines)).into_response())
+}
+
+/// A client that follows the output of a command.
+struct Follower {
+    output: Arc<RunOutput>,
+    next: usize,
+    is_done: bool,
+}
+
+impl Follower {
+    /// The next lines; `None` after the exit code.
+    async fn lines(&mut self) -> Option<Bytes> {
+        if self.is_done {
+            return None;
+        }
+        let mut changes = self.output.changes();
+        loop {
+            let pieces = self.output.from(self.next);
+            if !pieces.is_empty() {
+                self.next += pieces.len();
+                self.is_done = pieces
+                    .iter()
+                    .any(|piece| matches!(piece, OutputPiece::Exit(_)));
+                let lines = pieces
+                    .iter()
+                    .filter_map(|piece| serde_json::to_string(piece).ok());
+                let text: String = lines.map(|line| line + "\n").collect();
+                return Some(text.into());
+            }
+            changes.changed().await.ok()?;
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Findings and figures that move nothing: doctor, model, configuration.
+
+use std::sync::Arc;
+
+use axum::Json;
+use axum::extract::State;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::ApiError;
+use super::extract::Body;
+use crate::config::{self, Config, Source, load};
+use crate::daemon::shared::{Daemon, DaemonConfig};
+use crate::daemon::worker;
+use crate::experiment::ErrorKind;
+use crate::rig::devices;
+
+/// Findings of `bench doctor`.
+pub async fn doctor(
+    State(daemon): State<Arc<Daemon>>,
+) -> Result<Json<serde_json::Value>, ApiError> {
+    computed(&daemon, &["doctor"]).await
+}
+
+/// Modes, residues and zeros of the model, as `bench model modes`.
+pub async fn model(State(daemon): State<Arc<Daemon>>) -> Result<Json<serde_json::Value>, ApiError> {
+    computed(&daemon, &["model", "modes"]).await
+}
+
+async fn computed(daemon: &Daemon, command: &[&str]) -> Result<Json<serde_json::Value>, ApiError> {
+    let computed = worker::compute(daemon, command, &[]).await?;
+    match computed.get("error") {
+        Some(_) => Err(ApiError::of_command(&computed)),
+        None => Ok(Json(computed)),
+    }
+}
+
+/// The configuration of the daemon.
+#[derive(Debug, Serialize, JsonSchema)]
+pub struct ConfigView {
+    /// Profile or file.
+    source: Option<String>,
+    /// Settings over it, as KEY=VALUE.
+    sets: Vec<String>,
+    /// All settings as TOML.
+    toml: String,
+}
+
+/// The configuration in use.
+pub async fn in_use(State(daemon): State<Arc<Daemon>>) -> Result<Json<ConfigView>, ApiError> {
+    let configuration = daemon.configuration();
+    config_view(configuration).map(Json)
+}
+
+fn config_view(configuration: &DaemonConfig) -> Result<ConfigView, ApiError> {
+    Ok(ConfigView {
+        toml: text(&configuration.config)?,
+        source: configuration.source.config.clone(),
+        sets: configuration.source.sets.clone(),
+    })
+}
+
+fn text(config: &Config) -> Result<String, ApiError> {
+    toml::to_string(config).map_err(|error| {
+        let message = format!("the configuration has no text: {error}; report this");
+        ApiError::refused(ErrorKind::Failed, message)
+    })
+}
+
+/// The JSON schema of the settings.
+pub async fn schema() -> Json<serde_json::Value> {
+    Json(config::schema())
+}
+
+/// Another configuration.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewConfig {
+    /// A profile by name; the one in use if absent.
+    #[serde(default)]
+    profile: Option<String>,
+    /// Settings over it, as KEY=VALUE.
+    #[serde(default)]
+    sets: Vec<String>,
+}
+
+/// Checks a configuration. Nothing is changed.
+pub async fn check(
+    State(daemon): State<Arc<Daemon>>,
+    Body(new): Body<NewConfig>,
+) -> Result<Json<ConfigView>, ApiError> {
+    let checked = checked(&daemon, new)?;
+    config_view(&checked).map(Json)
+}
+
+fn checked(daemon: &Daemon, new: NewConfig) -> Result<DaemonConfig, ApiError> {
+    worker::check_args(&new.sets)?;
+    worker::check_args(new.profile.as_slice())?;
+    let own = daemon.configuration().source.clone();
+    let source = Source {
+        config: new.profile.or(own.config),
+        sets: new.sets,
+        ..own
+    };
+    let refused = |message: String| ApiError::refused(ErrorKind::Configuration, message);
+    let config = load(&source).map_err(|error| refused(error.to_string()))?;
+    devices::check(&config).map_err(|error| refused(error.to_string()))?;
+    Ok(DaemonConfig { source, config })
+}

@@ -1,0 +1,312 @@
+//! A command of this machine as client of the daemon that owns the rig.
+
+use std::fmt;
+use std::io;
+use std::os::unix::net::UnixStream as BlockingStream;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use futures_util::{SinkExt, StreamExt};
+use nix::unistd::getuid;
+use tokio::net::UnixStream;
+use tokio::runtime::Runtime;
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::Message;
+
+use super::http_client::{Ask, HttpError, Target, download, json};
+use super::run_entry::RunRequest;
+use super::schedule::StopKind;
+use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
+use super::socket::{TICKET_VARIABLE, sockets};
+use crate::experiment::{
+    ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder, RunReport, Stage,
+    StopSignals,
+};
+use crate::recording::{RecordingError, Totals};
+use crate::rt::thread::Pace;
+use crate::util::progress::Progress;
+
+/// The path of the session on the socket.
+pub const SESSION_PATH: &str = "/api/v1/session";
+
+/// The socket of a daemon that runs on this machine.
+pub fn running_daemon() -> Option<PathBuf> {
+    sockets()
+        .into_iter()
+        .find(|path| BlockingStream::connect(path).is_ok())
+}
+
+/// The kind of rig that the daemon of a socket has.
+///
+/// # Errors
+/// When no daemon answers.
+pub fn rig_of(socket: &Path) -> Result<Stage, HttpError> {
+    let runtime = runtime()?;
+    let target = Target::Socket(socket.into());
+    let (_, state) = runtime.block_on(json(&target, &Ask::get("/api/v1/state")))?;
+    match state["daemon"]["rig"].as_str() {
+        Some("devices") => Ok(Stage::Devices),
+        Some("simulated") => Ok(Stage::Simulated),
+        _ => Err(io::Error::other("it is not a daemon of this version").into()),
+    }
+}
+
+fn runtime() -> io::Result<Runtime> {
+    tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()
+}
+
+/// The daemon of a socket as owner of the rig. The connection opens with the first run and closes when the command ends.
+pub struct DaemonOwner {
+    socket: PathBuf,
+    request: RunRequest,
+    operator: String,
+    connection: Mutex<Option<Arc<Mutex<Connection>>>>,
+}
+
+impl fmt::Debug for DaemonOwner {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "DaemonOwner({})", self.socket.display())
+    }
+}
+
+impl DaemonOwner {
+    /// The daemon of `socket`, for a command.
+    pub fn new(socket: PathBuf, request: RunRequest, operator: String) -> DaemonOwner {
+        DaemonOwner {
+            socket,
+            request,
+            operator,
+            connection: Mutex::new(None),
+        }
+    }
+
+    /// The connection with its turn.
+    fn connection(
+        &self,
+        order: &RunOrder,
+        progress: &Progress,
+    ) -> Result<Arc<Mutex<Connection>>, ExperimentError> {
+        let mut open = lock(&self.connection);
+        if let Some(connection) = &*open {
+            return Ok(Arc::clone(connection));
+        }
+        let mut connection = Connection::open(&self.socket)
+            .map_err(|error| lost(&self.socket, &error.to_string()))?;
+        connection.enter(self.opening(order), progress)?;
+        let connection = Arc::new(Mutex::new(connection));
+        *open = Some(Arc::clone(&connection));
+        Ok(connection)
+    }
+
+    fn opening(&self, order: &RunOrder) -> OpenCommand {
+        OpenCommand {
+            request: self.request.clone(),
+            operator: self.operator.clone(),
+            user: getuid().as_raw(),
+            ticket: std::env::var(TICKET_VARIABLE).ok(),
+            estimated_s: estimated_s(order),
+        }
+    }
+}
+
+/// Length of a run in real time, by its plan.
+fn estimated_s(order: &RunOrder) -> Option<f64> {
+    if order.pace == Pace::Virtual {
+        return None;
+    }
+    let plan = order.plan().ok()?;
+    let ticks = plan.program().ok()?.ticks();
+    Some(ticks as f64 * plan.config.servo.period_s())
+}
+
+impl RigOwner for DaemonOwner {
+    fn run(
+        &self,
+        order: &RunOrder,
+        progress: &Progress,
+    ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError> {
+        let connection = self.connection(order, progress)?;
+        let report = lock(&connection).run(order, progress)?;
+        let recording = DaemonRecording {
+            connection,
+            copy: Copy::of(&report, order, &self.socket),
+        };
+        recording.fetch()?;
+        Ok((report, Box::new(recording)))
+    }
+}
+
+/// The recording of the last run.
+struct DaemonRecording {
+    connection: Arc<Mutex<Connection>>,
+    /// What is copied from the folder of the daemon; `None` if the daemon writes into the folder of the command.
+    copy: Option<Copy>,
+}
+
+impl DaemonRecording {
+    /// Copies the recording from the folder of the daemon, if it is there.
+    fn fetch(&self) -> Result<(), ExperimentError> {
+        let Some(copy) = &self.copy else {
+            return Ok(());
+        };
+        copy.make().map_err(|error| {
+            RemoteError::failed(format!(
+                "the recording cannot be copied to {}: {error}; download {} from the daemon",
+                copy.to.display(),
+                copy.file
+            ))
+            .into()
+        })
+    }
+}
+
+/// A recording in the folder of the daemon, and its copy.
+struct Copy {
+    socket: PathBuf,
+    file: String,
+    to: PathBuf,
+}
+
+impl Copy {
+    /// The copy of a run; `None` if its recording is in the ordered folder.
+    fn of(report: &RunReport, order: &RunOrder, socket: &Path) -> Option<Copy> {
+        let made = report.path();
+        let file = made.file_name()?.to_str()?;
+        (made.parent() != Some(&order.folder)).then(|| Copy {
+            socket: socket.into(),
+            file: file.into(),
+            to: order.folder.join(file),
+        })
+    }
+
+    fn make(&self) -> Result<(), HttpError> {
+        let target = Target::Socket(self.socket.clone());
+        let path = format!("/api/v1/recordings/{}", self.file);
+        let bytes = runtime()?.block_on(download(&target, &path))?;
+        if let Some(folder) = self.to.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        Ok(std::fs::write(&self.to, bytes)?)
+    }
+}
+
+impl RemoteRecording for DaemonRecording {
+    fn finish(self: Box<Self>, results_json: &str) -> Result<Totals, RecordingError> {
+        let finished = lock(&self.connection).finish(results_json);
+        let copied = finished.and_then(|totals| self.fetch().map(|()| totals));
+        copied.map_err(|error| RecordingError::Remote(error.to_string()))
+    }
+}
+
+/// A connection to the daemon, used from a program without tasks.
+struct Connection {
+    runtime: Runtime,
+    socket: PathBuf,
+    stream: WebSocketStream<UnixStream>,
+}
+
+impl Connection {
+    fn open(socket: &Path) -> io::Result<Connection> {
+        let runtime = runtime()?;
+        let stream = runtime.block_on(async {
+            let stream = UnixStream::connect(socket).await?;
+            let request = format!("ws://localhost{SESSION_PATH}");
+            let connected = tokio_tungstenite::client_async(request, stream).await;
+            connected.map_err(io::Error::other)
+        })?;
+        Ok(Connection {
+            runtime,
+            socket: socket.into(),
+            stream: stream.0,
+        })
+    }
+
+    /// Asks for a turn and waits for it.
+    fn enter(&mut self, open: OpenCommand, progress: &Progress) -> Result<(), ExperimentError> {
+        self.send(&FromCommand::Open(open))?;
+        loop {
+            match self.receive()? {
+                FromDaemon::Granted => return Ok(()),
+                FromDaemon::Refused(error) => return Err(error.into()),
+                FromDaemon::Waiting(text) => {
+                    progress.begin("waiting for the bench", 0);
+                    tracing::warn!("the bench is in use: {text}");
+                }
+                other => return Err(self.unexpected(&other)),
+            }
+        }
+    }
+
+    fn run(&mut self, order: &RunOrder, progress: &Progress) -> Result<RunReport, ExperimentError> {
+        self.send(&FromCommand::Run(Box::new(order.clone())))?;
+        loop {
+            match self.receive()? {
+                FromDaemon::Ended(report) => return Ok(*report),
+                FromDaemon::Refused(error) => return Err(error.into()),
+                FromDaemon::Warning(text) => tracing::warn!("{text}"),
+                FromDaemon::Progress { done, total } => progress.set(done, total),
+                other => return Err(self.unexpected(&other)),
+            }
+        }
+    }
+
+    fn finish(&mut self, results_json: &str) -> Result<Totals, ExperimentError> {
+        self.send(&FromCommand::Finish(results_json.into()))?;
+        match self.receive()? {
+            FromDaemon::Finished(totals) => Ok(totals),
+            FromDaemon::NotFinished(message) => Err(RemoteError::failed(message).into()),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    fn send(&mut self, message: &FromCommand) -> Result<(), ExperimentError> {
+        let text = serde_json::to_string(message)
+            .map_err(|error| lost(&self.socket, &error.to_string()))?;
+        let sent = self.runtime.block_on(self.stream.send(Message::text(text)));
+        sent.map_err(|error| lost(&self.socket, &error.to_string()))
+    }
+
+    /// The next message. Stop signals are sent on to the daemon: the first one settles the run, the second one cuts the current.
+    fn receive(&mut self) -> Result<FromDaemon, ExperimentError> {
+        let (stream, socket) = (&mut self.stream, &self.socket);
+        let received = self.runtime.block_on(async {
+            let mut signals = StopSignals::listen().map_err(|error| error.to_string())?;
+            let mut kind = StopKind::Settle;
+            loop {
+                tokio::select! {
+                    message = stream.next() => match message {
+                        Some(Ok(Message::Text(text))) => return Ok(text),
+                        Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                        Some(Ok(_)) | None => return Err("the daemon has ended".to_string()),
+                        Some(Err(error)) => return Err(error.to_string()),
+                    },
+                    () = signals.received() => {
+                        let stop = serde_json::to_string(&FromCommand::Stop(kind)).map_err(|e| e.to_string())?;
+                        stream.send(Message::text(stop)).await.map_err(|error| error.to_string())?;
+                        kind = StopKind::Cut;
+                    }
+                }
+            }
+        });
+        let text = received.map_err(|why| lost(socket, &why))?;
+        serde_json::from_str(&text).map_err(|error| lost(socket, &error.to_string()))
+    }
+
+    fn unexpected(&self, message: &FromDaemon) -> ExperimentError {
+        lost(&self.socket, &format!("unexpected message {message:?}"))
+    }
+}
+
+fn lost(socket: &Path, why: &str) -> ExperimentError {
+    let socket = socket.display();
+    RemoteError::failed(format!(
+        "the connection to the daemon at {socket} was lost ({why}); look at its log, or add --connect none to run without it"
+    ))
+    .into()
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

@@ -1,0 +1,67 @@
+//! The arm lease of the daemon: who may start and tune. At most one operator holds it.
+//!
+//! ```text
+//!            take                       expiry while a run goes on that may continue
+//!   free ------------> held by a client ----------------------------------------> held by the run
+//!    ^                    | release, expiry                                           | end of the run
+//!    +--------------------+-----------------------------------------------------------+
+//! ```
+
+use std::time::{Duration, Instant};
+
+use super::secret::Secret;
+
+/// Time after the last renewal at which a lease expires.
+pub const LEASE: Duration = Duration::from_secs(10);
+
+/// Who keeps a lease valid.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Keeper {
+    /// A client that renews it until this moment.
+    Client {
+        /// When it expires without a renewal.
+        expires: Instant,
+    },
+    /// A run, until its end.
+    Run(u64),
+}
+
+/// A lease.
+#[derive(Clone, Debug)]
+pub struct Lease {
+    /// What the holder sends with its requests.
+    pub secret: Secret,
+    /// The operator.
+    pub operator: String,
+    /// Since when, in seconds since 1970.
+    pub since_unix_s: f64,
+    /// Who keeps it valid.
+    pub keeper: Keeper,
+}
+
+impl Lease {
+    /// Whether it has expired.
+    pub fn has_expired(&self, now: Instant) -> bool {
+        match self.keeper {
+            Keeper::Client { expires } => now >= expires,
+            Keeper::Run(_) => false,
+        }
+    }
+
+    /// Seconds until it expires without a renewal; `None` for the lease of a run.
+    pub fn expires_in_s(&self, now: Instant) -> Option<f64> {
+        match self.keeper {
+            Keeper::Client { expires } => {
+                Some(expires.saturating_duration_since(now).as_secs_f64())
+            }
+            Keeper::Run(_) => None,
+        }
+    }
+
+    /// Renews the lease of a client. That of a run needs no renewal; a client that returns takes it back.
+    pub fn renew(&mut self, now: Instant) {
+        self.keeper = Keeper::Client {
+            expires: now + LEASE,
+        };
+    }
+}

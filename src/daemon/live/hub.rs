@@ -1,0 +1,339 @@
+//! The thread that follows the loop and serves all clients: it reads the rings, and publishes samples, events and the status.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, TryRecvError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use tokio::sync::broadcast;
+
+use super::event_text::EventView;
+use super::frame::{Frame, sample};
+use super::status::{LatenessTotals, Status};
+pub use super::status::{LoopView, Share, TripView};
+use crate::config::Config;
+use crate::experiment::{Feed, FeedSender, FeedSource};
+use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use crate::util::thread_priority::lower;
+
+/// Period of the thread.
+const PERIOD: Duration = Duration::from_millis(5);
+/// Time between two frames of samples.
+const FRAME: Duration = Duration::from_millis(50);
+/// Time between two views of the status.
+const STATUS: Duration = Duration::from_millis(200);
+/// Messages that a slow client may be behind: 12 s of frames.
+const BACKLOG: usize = 256;
+/// Events that a new client gets.
+const KEPT_EVENTS: usize = 200;
+/// Less urgent than the recorder's source, the loop, and as urgent as the recorder.
+const NICE: i32 = 10;
+
+/// A message to all clients.
+#[derive(Clone, Debug)]
+pub enum LiveMessage {
+    /// Samples, encoded as in [`Frame::encode`].
+    Samples(Bytes),
+    /// An event.
+    Event(Arc<EventView>),
+}
+
+/// The status at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct LiveSnapshot {
+    /// The loop.
+    pub servo: LoopView,
+    /// Shares of the interlocks.
+    pub shares: Vec<Share>,
+    /// The last trip that nobody acknowledged.
+    pub trip: Option<TripView>,
+    /// Lateness of all ticks.
+    pub lateness: LatenessTotals,
+    /// Trips by reason.
+    pub trips: BTreeMap<&'static str, u64>,
+    /// The last events, oldest first.
+    pub events: VecDeque<Arc<EventView>>,
+}
+
+/// The hub. Dropping it ends its thread.
+pub struct LiveHub {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+struct Shared {
+    snapshot: Mutex<LiveSnapshot>,
+    messages: broadcast::Sender<LiveMessage>,
+    ticks: AtomicU64,
+    run: AtomicU64,
+    ends: AtomicBool,
+}
+
+impl LiveHub {
+    /// Starts the thread. `sender` counts the messages that it could not take.
+    ///
+    /// # Errors
+    /// When the system refuses the thread.
+    pub fn start(
+        config: &Config,
+        feeds: Receiver<Feed>,
+        sender: FeedSender,
+    ) -> std::io::Result<LiveHub> {
+        let shared = Arc::new(Shared {
+            snapshot: Mutex::default(),
+            messages: broadcast::Sender::new(BACKLOG),
+            ticks: AtomicU64::new(0),
+            run: AtomicU64::new(0),
+            ends: AtomicBool::new(false),
+        });
+        let mut follower = Follower::new(config, sender, Arc::clone(&shared));
+        follower.show();
+        let builder = std::thread::Builder::new().name("bench-live".into());
+        let thread = builder.spawn(move || follower.serve(&feeds))?;
+        Ok(LiveHub {
+            shared,
+            thread: Some(thread),
+        })
+    }
+
+    /// The status at this moment.
+    pub fn snapshot(&self) -> LiveSnapshot {
+        self.shared.snapshot().clone()
+    }
+
+    /// Messages from now on.
+    pub fn messages(&self) -> broadcast::Receiver<LiveMessage> {
+        self.shared.messages.subscribe()
+    }
+
+    /// Ticks of the loop so far, to see whether it goes on.
+    pub fn ticks(&self) -> u64 {
+        self.shared.ticks.load(Ordering::Relaxed)
+    }
+
+    /// Sets the number of the run to which the next messages belong.
+    pub fn set_run(&self, run: u64) {
+        self.shared.run.store(run, Ordering::Relaxed);
+    }
+
+    /// The operator has seen the trip.
+    pub fn acknowledge_trip(&self) {
+        self.shared.snapshot().trip = None;
+    }
+}
+
+impl Drop for LiveHub {
+    fn drop(&mut self) {
+        self.shared.ends.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panic has been printed
+        }
+    }
+}
+
+impl Shared {
+    fn snapshot(&self) -> MutexGuard<'_, LiveSnapshot> {
+        self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A feed that is being read, with its place in the time of the daemon.
+struct OpenFeed {
+    feed: Feed,
+    run: u32,
+    /// Time of its tick 0 in seconds since the daemon started; `None` before its first tick.
+    begin_s: Option<f64>,
+}
+
+/// The state of the thread.
+struct Follower {
+    status: Status,
+    sender: FeedSender,
+    shared: Arc<Shared>,
+    started: Instant,
+    feeds: Vec<OpenFeed>,
+    frame: Option<Frame>,
+    /// End of the last tick in seconds since the daemon started.
+    end_s: f64,
+    framed: Instant,
+    shown: Instant,
+}
+
+impl Follower {
+    fn new(config: &Config, sender: FeedSender, shared: Arc<Shared>) -> Follower {
+        let started = Instant::now();
+        Follower {
+            status: Status::new(config),
+            sender,
+            shared,
+            started,
+            feeds: Vec::new(),
+            frame: None,
+            end_s: 0.0,
+            framed: started,
+            shown: started,
+        }
+    }
+
+    fn serve(&mut self, feeds: &Receiver<Feed>) {
+        lower(NICE);
+        while !self.shared.ends.load(Ordering::Relaxed) {
+            self.take_feeds(feeds);
+            self.read_feeds();
+            self.publish();
+            std::thread::sleep(PERIOD);
+        }
+    }
+
+    fn take_feeds(&mut self, feeds: &Receiver<Feed>) {
+        loop {
+            match feeds.try_recv() {
+                Ok(feed) => self.open(feed),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn open(&mut self, feed: Feed) {
+        let run = match feed.source {
+            FeedSource::Run => self.shared.run.load(Ordering::Relaxed) as u32,
+            FeedSource::Idle => 0,
+        };
+        if feed.source == FeedSource::Run {
+            self.shared.snapshot().trip = None;
+        }
+        self.feeds.push(OpenFeed {
+            feed,
+            run,
+            begin_s: None,
+        });
+    }
+
+    /// Reads everything that is in the rings. A ring that is empty and abandoned is closed.
+    fn read_feeds(&mut self) {
+        let mut feeds = std::mem::take(&mut self.feeds);
+        for feed in &mut feeds {
+            while let Ok(message) = feed.feed.messages.pop() {
+                match message {
+                    LoopMessage::Tick(tick) => self.tick(&tick, feed),
+                    LoopMessage::Event(event) => self.event(&event, feed),
+                }
+            }
+        }
+        feeds.retain(|feed| !feed.feed.messages.is_abandoned() || !feed.feed.messages.is_empty());
+        self.feeds = feeds;
+    }
+
+    /// The time of a tick since the daemon started. Each run counts its ticks from 0: its first tick has the time of its arrival, or
+    /// follows the tick before it. Afterwards the ticks count, so that a missing tick is a gap.
+    fn time_s(&self, number: u64, feed: &mut OpenFeed) -> f64 {
+        let period_s = feed.feed.period_s;
+        let arrival_s = self.started.elapsed().as_secs_f64();
+        let first_s = self.end_s.max(arrival_s) - number as f64 * period_s;
+        let begin_s = feed.begin_s.get_or_insert(first_s);
+        *begin_s + number as f64 * period_s
+    }
+
+    fn tick(&mut self, tick: &TickRecord, feed: &mut OpenFeed) {
+        if tick.tick == 0 {
+            self.status.begin();
+        }
+        let mut time_s = self.time_s(tick.tick, feed);
+        if time_s < self.end_s - 0.5 * feed.feed.period_s {
+            // The loop between two runs begins to count anew after each run.
+            feed.begin_s = None;
+            time_s = self.time_s(tick.tick, feed);
+        }
+        self.status.tick(tick);
+        self.add_sample(tick, time_s, feed);
+        self.end_s = time_s + feed.feed.period_s;
+    }
+
+    /// Adds a tick to the frame; a gap or another run begins a new frame.
+    fn add_sample(&mut self, tick: &TickRecord, time_s: f64, feed: &OpenFeed) {
+        let period_s = feed.feed.period_s;
+        let follows = self.frame.as_ref().is_some_and(|frame| {
+            let expected_s = frame.start_s + frame.ticks() as f64 * period_s;
+            frame.run == feed.run && (time_s - expected_s).abs() < 0.5 * period_s
+        });
+        if !follows {
+            self.send_frame();
+        }
+        let frame = self
+            .frame
+            .get_or_insert_with(|| Frame::new(time_s, period_s, feed.run));
+        frame.push(sample(tick));
+    }
+
+    fn send_frame(&mut self) {
+        if let Some(frame) = self.frame.take().filter(|frame| !frame.is_empty()) {
+            // Without clients nobody receives it.
+            let _ = self
+                .shared
+                .messages
+                .send(LiveMessage::Samples(frame.encode().into()));
+        }
+    }
+
+    fn event(&mut self, event: &Event, feed: &mut OpenFeed) {
+        let time_s = self.time_s(event.tick, feed);
+        match event.kind {
+            EventKind::Trip(trip) => {
+                let mut snapshot = self.shared.snapshot();
+                *snapshot.trips.entry(trip.reason()).or_default() += 1;
+                snapshot.trip = Some(TripView::of(&trip, time_s, feed.run));
+            }
+            // Between two runs nothing is recorded.
+            EventKind::Lost { records } if feed.feed.source == FeedSource::Run => {
+                self.status.lose(records);
+            }
+            EventKind::Lost { .. }
+            | EventKind::Request(_)
+            | EventKind::State { .. }
+            | EventKind::ResetFailed { .. }
+            | EventKind::Completed
+            | EventKind::Clock(_) => {}
+        }
+        let Some(view) = EventView::of(event, time_s, feed.run).map(Arc::new) else {
+            return;
+        };
+        let _ = self
+            .shared
+            .messages
+            .send(LiveMessage::Event(Arc::clone(&view)));
+        let mut snapshot = self.shared.snapshot();
+        snapshot.events.push_back(view);
+        if snapshot.events.len() > KEPT_EVENTS {
+            snapshot.events.pop_front();
+        }
+    }
+
+    fn publish(&mut self) {
+        self.shared
+            .ticks
+            .store(self.status.ticks(), Ordering::Relaxed);
+        if self.framed.elapsed() >= FRAME {
+            self.framed = Instant::now();
+            self.send_frame();
+        }
+        if self.shown.elapsed() >= STATUS {
+            self.shown = Instant::now();
+            self.show();
+        }
+    }
+
+    /// Renews the status.
+    fn show(&mut self) {
+        let servo = LoopView {
+            live_dropped: self.sender.dropped(),
+            ..self.status.view()
+        };
+        let shares = self.status.take_shares();
+        let mut snapshot = self.shared.snapshot();
+        (snapshot.servo, snapshot.shares) = (servo, shares);
+        snapshot.lateness = self.status.lateness_totals();
+    }
+}

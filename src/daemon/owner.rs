@@ -1,0 +1,261 @@
+//! The one thread that holds the rig. It runs one plan at a time. Between two commands the loop goes on, disarmed.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use tokio::sync::{mpsc, oneshot};
+
+use super::same_rig::require_same_rig;
+use super::warnings::copy_warnings;
+use crate::config::Config;
+use crate::experiment::{
+    DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening, Run, RunHooks,
+    RunOrder, Runner, Setup, Stage,
+};
+use crate::rig::motor::Moment;
+use crate::rt::supervision::StopFlags;
+use crate::rt::thread::{Pace, Scheduling};
+use crate::util::progress::Progress;
+
+/// Pause between two attempts to open the devices.
+const RETRY: Duration = Duration::from_secs(2);
+
+/// A plan for the owner.
+pub struct OwnerOrder {
+    /// The command to which it belongs. The rig stays the same for all plans of a command.
+    pub command: u64,
+    /// The plan.
+    pub order: RunOrder,
+    /// Ends the run.
+    pub stop: StopFlags,
+    /// Receives the progress.
+    pub progress: Progress,
+    /// Receives warnings for the operator.
+    pub warnings: mpsc::UnboundedSender<String>,
+    /// Receives the run.
+    pub reply: oneshot::Sender<Result<Run, ExperimentError>>,
+}
+
+enum Message {
+    Run(Box<OwnerOrder>),
+    EndCommand,
+}
+
+/// The rig, for display.
+#[derive(Clone, Debug)]
+pub struct RigStatus {
+    /// Names of the devices; `None` while they are not open.
+    pub names: Option<DeviceNames>,
+    /// How the loop is scheduled.
+    pub scheduling: Scheduling,
+    /// Pace of the loop.
+    pub pace: Pace,
+    /// Why the rig is not open.
+    pub fault: Option<String>,
+    /// Whether the devices are being opened, which takes up to some seconds.
+    pub is_opening: bool,
+}
+
+/// The thread of the owner. Dropping it waits until the rig is closed.
+pub struct Owner {
+    messages: Option<Sender<Message>>,
+    status: Arc<Mutex<RigStatus>>,
+    tuner: Sender<crate::rt::tuning::Tune>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Owner {
+    /// Opens the rig of `config` on its own thread.
+    ///
+    /// # Errors
+    /// When the system refuses the thread.
+    pub fn start(config: Config, feeds: FeedSender) -> std::io::Result<Owner> {
+        let (messages, received) = channel();
+        let hooks = RunHooks::watched(feeds);
+        let tuner = hooks.tuner();
+        let status = Arc::new(Mutex::new(RigStatus {
+            names: None,
+            scheduling: Scheduling::default(),
+            pace: Pace::Realtime,
+            fault: None,
+            is_opening: true,
+        }));
+        let mut thread = OwnerThread {
+            config,
+            hooks,
+            idle: None,
+            command: None,
+            status: Arc::clone(&status),
+        };
+        let builder = std::thread::Builder::new().name("bench-owner".into());
+        let thread = builder.spawn(move || thread.serve(&received))?;
+        Ok(Owner {
+            messages: Some(messages),
+            status,
+            tuner,
+            thread: Some(thread),
+        })
+    }
+
+    /// The rig, for display.
+    pub fn status(&self) -> RigStatus {
+        lock(&self.status).clone()
+    }
+
+    /// Sends changes of the run in progress to the loop.
+    pub fn tuner(&self) -> Sender<crate::rt::tuning::Tune> {
+        self.tuner.clone()
+    }
+
+    /// Orders a run. The order is dropped, and with it the reply, if the thread has ended.
+    pub fn run(&self, order: OwnerOrder) {
+        self.send(Message::Run(Box::new(order)));
+    }
+
+    /// The command has ended: the rig goes back to its own configuration.
+    pub fn end_command(&self) {
+        self.send(Message::EndCommand);
+    }
+
+    fn send(&self, message: Message) {
+        if let Some(messages) = &self.messages {
+            let _ = messages.send(message); // without the thread there is no run
+        }
+    }
+}
+
+impl Drop for Owner {
+    fn drop(&mut self) {
+        self.messages = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join(); // a panic has been printed
+        }
+    }
+}
+
+fn lock(status: &Mutex<RigStatus>) -> MutexGuard<'_, RigStatus> {
+    status.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+struct OwnerThread {
+    config: Config,
+    hooks: RunHooks,
+    /// The rig between two commands.
+    idle: Option<OpenBench>,
+    /// The command that has its turn.
+    command: Option<(u64, Runner)>,
+    status: Arc<Mutex<RigStatus>>,
+}
+
+impl OwnerThread {
+    fn serve(&mut self, messages: &Receiver<Message>) {
+        self.open_idle();
+        loop {
+            match messages.recv_timeout(RETRY) {
+                Ok(Message::Run(order)) => self.run(*order),
+                Ok(Message::EndCommand) => self.end_command(),
+                Err(RecvTimeoutError::Timeout) => self.open_idle(),
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    fn opening(&self) -> Opening {
+        Opening {
+            stage: Stage::of(&self.config),
+            pace: Pace::Realtime,
+            clear_fault: false,
+        }
+    }
+
+    /// Opens the rig between two commands, if it is not open.
+    fn open_idle(&mut self) {
+        if self.idle.is_some() || self.command.is_some() {
+            return;
+        }
+        lock(&self.status).is_opening = true;
+        let opened = OpenBench::open(&self.config, self.opening(), self.hooks.clone());
+        let mut status = lock(&self.status);
+        status.is_opening = false;
+        match opened {
+            Ok(bench) => {
+                status.names = Some(bench.names().clone());
+                status.pace = Pace::Realtime;
+                status.scheduling = bench.scheduling().clone();
+                status.fault = None;
+                self.idle = Some(bench);
+            }
+            Err(error) => {
+                let fault = error.to_string();
+                if status.fault.as_ref() != Some(&fault) {
+                    tracing::warn!("the rig is not open: {fault}");
+                }
+                (status.names, status.fault) = (None, Some(fault));
+            }
+        }
+    }
+
+    fn run(&mut self, order: OwnerOrder) {
+        let _copy = copy_warnings(order.warnings.clone());
+        let result = self.run_order(&order);
+        // Without a receiver the client has gone, and the recording is completed when it is dropped.
+        let _ = order.reply.send(result);
+    }
+
+    fn run_order(&mut self, order: &OwnerOrder) -> Result<Run, ExperimentError> {
+        let plan = order.order.plan()?;
+        require_same_rig(&self.config, &plan.config)?;
+        let calibration = order.order.calibration()?;
+        let mut runner = self.runner(order);
+        lock(&self.status).pace = order.order.pace;
+        runner.set_hooks(self.hooks.with_stop(order.stop.clone()));
+        runner.progress = order.progress.clone();
+        runner.setup.folder.clone_from(&order.order.folder);
+        let result = runner.run_calibrated(&plan, plan.kind.name(), calibration);
+        self.command = Some((order.command, runner));
+        result
+    }
+
+    /// The runner of a command, which keeps its rig and the heat of a simulated motor between its runs.
+    fn runner(&mut self, order: &OwnerOrder) -> Runner {
+        match self.command.take() {
+            Some((command, runner)) if command == order.command => runner,
+            other => {
+                drop(other);
+                // A simulated stage begins each command at rest, as it does without a daemon.
+                let idle = self.idle.take().filter(|_| !self.is_simulated());
+                Runner::on_bench(self.setup(order), idle, self.hooks.clone())
+            }
+        }
+    }
+
+    fn setup(&self, order: &OwnerOrder) -> Setup {
+        let order = &order.order;
+        Setup {
+            pace: order.pace,
+            simulate: false,
+            clear_fault: order.clear_fault,
+            motor: match self.is_simulated() {
+                true => MotorHandling::Simulated,
+                false => order.motor,
+            },
+            now: Moment::now,
+            folder: order.folder.clone(),
+            owner: None,
+        }
+    }
+
+    fn is_simulated(&self) -> bool {
+        Stage::of(&self.config) == Stage::Simulated
+    }
+
+    fn end_command(&mut self) {
+        if let Some((_, runner)) = self.command.take() {
+            let bench = runner.into_bench();
+            self.idle = bench.filter(|_| !self.is_simulated());
+        }
+        self.open_idle();
+    }
+}

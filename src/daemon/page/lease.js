@@ -1,0 +1,35 @@
+// The arm lease of this page.
+
+import { ask } from "/page/connection.js";
+
+const RENEWAL_MS = 3000;
+
+export class Lease {
+  constructor() {
+    this.secret = null;
+    setInterval(() => this.renew(), RENEWAL_MS);
+  }
+
+  get isHeld() { return this.secret !== null; }
+
+  async take(operator) {
+    const given = await ask("POST", "/lease", { operator });
+    this.secret = given.lease;
+    localStorage.setItem("operator", operator);
+  }
+
+  async release() {
+    const secret = this.secret;
+    this.secret = null;
+    await ask("DELETE", "/lease", undefined, secret);
+  }
+
+  async renew() {
+    if (!this.isHeld) return;
+    try {
+      await ask("PUT", "/lease", undefined, this.secret);
+    } catch (error) {
+      if (error.status === 403) this.secret = null; // it has expired
+    }
+  }
+}

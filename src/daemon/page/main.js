@@ -1,0 +1,366 @@
+// The live page: connects the panels with the daemon.
+
+import { ask, follow, token } from "/page/connection.js";
+import { quantity } from "/page/drawing.js";
+import { Lease } from "/page/lease.js";
+import { showRecordings, showResult } from "/page/recordings.js";
+import { formArguments, planRows, showFields, table } from "/page/run_form.js";
+import { Samples } from "/page/samples.js";
+import { Scope } from "/page/scope.js";
+import { Spectrum } from "/page/spectrum.js";
+import { drawTiming } from "/page/timing.js";
+
+const byId = (id) => document.getElementById(id);
+const SHARE_TITLES = { travel: "Travel", current: "Current", motor_heat: "Heat of the motor", probe_age: "Age of the reading" };
+const EVENTS = 200;
+/** Data older than this are marked, in milliseconds. */
+const OLD_MS = 1500;
+/** Two presses of the space bar within this time cut the current. */
+const TWICE_MS = 1500;
+
+const samples = new Samples();
+const scope = new Scope(byId("scope"), byId("scope-readout"), samples);
+const spectrum = new Spectrum(byId("spectrum"), byId("spectrum-readout"), byId("spectrum-text"), samples);
+const lease = new Lease();
+let state = null, receivedMs = 0, waitsUntilMs = 0, planned = "", finishedRun = null, stoppedMs = -Infinity;
+
+/* --- messages of the daemon --- */
+
+function onMessage(message) {
+  receivedMs = performance.now();
+  if (message.type === "state") showState(message.state);
+  if (message.type === "event") addEvent(message);
+  if (message.type === "lagged") addEvent({ time_s: samples.endS, kind: "lost", text: `this page was too slow: ${message.frames} frames are not shown; the recording is complete` });
+}
+
+function onSamples(buffer) {
+  receivedMs = performance.now();
+  const before = samples.last(0, 1);
+  samples.add(buffer);
+  if (before) checkLevelTrigger();
+}
+
+let lastLevel = null;
+function checkLevelTrigger() {
+  const signal = { position: 1, error: 2, current: 3 }[byId("trigger").value];
+  if (!signal || scope.isPaused || scope.triggerS !== undefined) { lastLevel = null; return; }
+  const level = Number(byId("level").value) * (signal === 3 ? 1 : 1e-6);
+  const [found] = samples.columns(signal, samples.endS - 0.05, samples.endS, 1);
+  if (!found) return;
+  if (lastLevel !== null && lastLevel < level && found[1] >= level) scope.trigger(samples.endS - 0.05);
+  lastLevel = found[1];
+}
+
+function addEvent(event) {
+  scope.events.push(event);
+  if (scope.events.length > EVENTS) scope.events.shift();
+  const item = document.createElement("li");
+  item.textContent = `${event.time_s.toFixed(3)} s  ${event.text}`;
+  if (event.kind === "trip") item.className = "message";
+  byId("events").prepend(item);
+  while (byId("events").children.length > EVENTS) byId("events").lastChild.remove();
+  if (byId("trigger").value === "event" && ["state", "trip"].includes(event.kind) && !scope.isPaused) scope.trigger(event.time_s);
+}
+
+/* --- panels --- */
+
+function setText(id, text) {
+  const element = byId(id);
+  if (element.textContent !== text) element.textContent = text;
+}
+
+function showState(next) {
+  const wasRunning = state?.run?.id;
+  state = next;
+  setText("state", next.daemon.fault ? "no rig" : next.loop.state);
+  byId("state").dataset.state = next.daemon.fault ? "tripped" : next.loop.state;
+  showLease();
+  showShares(next.shares);
+  showAlert();
+  showRun();
+  showTiming();
+  const refused = next.loop.refused.length ? ` Not granted: ${next.loop.refused.join("; ")}.` : "";
+  setText("daemon-text", `bench ${next.daemon.version}, configuration ${next.daemon.config}, ${next.daemon.rig}, amplifier ${next.daemon.amplifier ?? "not open"}, probe ${next.daemon.probe ?? "not open"}; ${next.daemon.start_reason}; recordings in ${next.daemon.recordings}.${refused}`);
+  if (wasRunning && next.run?.id !== wasRunning) runEnded(wasRunning);
+}
+
+function showLease() {
+  const held = state?.lease;
+  setText("lease-text", held ? `arm lease: ${held.operator}${lease.isHeld ? " (this page)" : ""}` : "arm lease: free");
+  byId("lease-button").disabled = Boolean(held) && !lease.isHeld;
+  setText("lease-button", lease.isHeld ? "Release" : "Take lease");
+}
+
+function showShares(shares) {
+  const list = byId("shares");
+  if (list.children.length !== shares.length * 3) {
+    list.replaceChildren(...shares.flatMap((share) => {
+      const title = document.createElement("dt"), track = document.createElement("dd"), figure = document.createElement("dd");
+      title.textContent = SHARE_TITLES[share.name] ?? share.name;
+      track.className = "track-cell";
+      track.innerHTML = '<div class="track"><div class="fill"></div></div>';
+      figure.className = "figure";
+      return [title, figure, track];
+    }));
+  }
+  shares.forEach((share, index) => {
+    const fill = list.children[3 * index + 2].querySelector(".fill");
+    fill.style.width = `${Math.min(100, 100 * share.share)}%`;
+    fill.className = `fill${share.share >= 1 ? " limit" : share.share >= 0.8 ? " high" : ""}`;
+    const figure = list.children[3 * index + 1];
+    const text = `${(100 * share.share).toFixed(1)} %, ${quantity(share.value, share.unit)} of ${quantity(share.limit, share.unit)}`;
+    if (figure.textContent !== text) figure.textContent = text;
+  });
+}
+
+function showAlert() {
+  const alert = byId("alert"), trip = state.trip, fault = state.daemon.fault;
+  alert.hidden = !trip && !fault;
+  const key = trip ? trip.text : fault ?? "";
+  if (alert.dataset.key === key) return;
+  alert.dataset.key = key;
+  alert.replaceChildren();
+  if (!key) return;
+  const paragraph = (text) => { const made = document.createElement("p"); made.textContent = text; alert.append(made); };
+  paragraph(trip ? `Tripped: ${trip.text}` : `The rig is not open: ${fault}`);
+  if (trip) {
+    paragraph(`Remedy: ${trip.remedy}`);
+    const button = document.createElement("button");
+    button.textContent = "Acknowledge";
+    button.onclick = () => withLease(() => ask("POST", "/clear", undefined, lease.secret));
+    alert.append(button);
+  }
+}
+
+function showRun() {
+  const run = state.run;
+  byId("progress-box").hidden = !run;
+  if (run) {
+    const progress = run.progress, isAnalysing = run.phase === "analysing";
+    const left = progress?.remaining_s != null && !isAnalysing ? `, ${progress.remaining_s.toFixed(0)} s left` : "";
+    setText("progress-text", `Run ${run.id}, ${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}: ${run.phase}${left}${run.is_orphan ? " (its client has gone)" : ""}`);
+    const bar = byId("progress");
+    if (isAnalysing || !progress?.total) bar.removeAttribute("value"); else bar.value = progress.done / progress.total;
+  }
+  byId("tune").disabled = !(lease.isHeld && run?.command === "control" && run.phase === "running");
+  showQueue();
+}
+
+function showQueue() {
+  const list = byId("queue"), key = JSON.stringify(state.queue.map((run) => [run.id, run.phase]));
+  if (list.dataset.key === key) return;
+  list.dataset.key = key;
+  list.replaceChildren(...state.queue.map((run) => {
+    const item = document.createElement("li");
+    const length = run.estimated_s ? `, about ${run.estimated_s.toFixed(0)} s` : "";
+    item.textContent = `${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}, ${run.phase}${length} `;
+    const button = document.createElement("button");
+    button.textContent = "cancel";
+    button.setAttribute("aria-label", `cancel run ${run.id}`);
+    button.onclick = () => attempt(() => ask("POST", `/runs/${run.id}/stop`, { how: "settle" }));
+    item.append(button);
+    return item;
+  }));
+}
+
+function showTiming() {
+  const { lateness_us: late, compute_us: compute, overruns, lost_records: lost, live_dropped: dropped, policy, pace } = state.loop;
+  const us = (value) => `${value.toFixed(1)} us`;
+  const timing = pace === "virtual" ? "virtual pace: no timing" : `late p50 ${us(late.p50)}, p99 ${us(late.p99)}, max ${us(late.max)}; computing p50 ${us(compute.p50)}, max ${us(compute.max)}`;
+  setText("timing-text", `${timing}. ${policy}. Ticks not served: ${overruns}, lost records: ${lost}, not shown here: ${dropped}.`);
+  drawTiming(byId("timing"), state.loop.lateness_histogram);
+}
+
+async function runEnded(id) {
+  await attempt(async () => {
+    const run = await ask("GET", `/runs/${id}`);
+    finishedRun = run;
+    const message = run.message ? `: ${run.message}` : "";
+    showPlanText([`Run ${id} ${run.outcome}${message}`], run.outcome === "failed");
+    await showRecordings(recordingActions);
+    const { recordings } = await ask("GET", "/recordings");
+    const made = recordings.find((recording) => recording.file === run.recording);
+    if (made) await showResult(made);
+  });
+}
+
+/* --- what the operator does --- */
+
+/** Shows the error of an action, and asks for the token if it is missing. */
+async function attempt(action) {
+  try {
+    return await action();
+  } catch (error) {
+    if (error.status === 401) {
+      if (await askToken()) return attempt(action);
+    } else {
+      showPlanText([error.message], true);
+    }
+    return undefined;
+  }
+}
+
+function askDialog(id) {
+  const dialog = byId(id);
+  dialog.returnValue = "cancel";
+  dialog.showModal();
+  return new Promise((resolve) => { dialog.onclose = () => resolve(dialog.returnValue === "ok"); });
+}
+
+async function askToken() {
+  if (!await askDialog("token-dialog")) return false;
+  token.set(byId("token").value.trim());
+  return true;
+}
+
+async function takeLease() {
+  byId("operator").value = localStorage.getItem("operator") ?? "";
+  if (!await askDialog("name-dialog")) return;
+  await attempt(() => lease.take(byId("operator").value));
+  await refresh();
+}
+
+async function refresh() {
+  await attempt(async () => showState(await ask("GET", "/state")));
+}
+
+async function withLease(action) {
+  if (!lease.isHeld) await takeLease();
+  if (lease.isHeld) await attempt(action);
+  await refresh();
+}
+
+async function stop() {
+  const how = performance.now() - stoppedMs < TWICE_MS ? "cut" : "settle";
+  stoppedMs = performance.now();
+  await attempt(() => ask("POST", "/stop", { how }));
+}
+
+function showPlanText(lines, isError) {
+  byId("plan-text").replaceChildren(...lines.map((line) => {
+    if (line instanceof Node) return line;
+    const made = document.createElement("p");
+    made.textContent = line;
+    if (isError) made.className = "error";
+    return made;
+  }));
+}
+
+function request() {
+  return { command: byId("command").value, args: formArguments() };
+}
+
+async function plan() {
+  byId("start").disabled = true;
+  showPlanText(["computing the plan"], false);
+  await attempt(async () => {
+    const wanted = request(), found = await ask("POST", "/plan", wanted);
+    showPlanText([table(planRows(found))], false);
+    planned = JSON.stringify(wanted);
+    byId("start").disabled = false;
+  });
+}
+
+async function start(event) {
+  event.preventDefault();
+  const wanted = request();
+  if (JSON.stringify(wanted) !== planned) return plan();
+  const isSimulated = state?.daemon.rig === "simulated";
+  // A simulated run is shown in real time.
+  const args = isSimulated ? [...wanted.args, "--pace", "realtime"] : wanted.args;
+  return withLease(async () => {
+    await ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value }, lease.secret);
+    showPlanText(["queued"], false);
+  });
+}
+
+async function tune() {
+  const number = (id) => Number(byId(id).value);
+  setText("tune-text", "");
+  try {
+    await ask("POST", "/tune", { reference: number("tune-reference"), gain: number("tune-gain") }, lease.secret);
+    setText("tune-text", "changing along a ramp of 0.5 s");
+  } catch (error) {
+    setText("tune-text", error.message);
+  }
+}
+
+const recordingActions = {
+  show: (recording) => attempt(() => showResult(recording)),
+  note: async (recording) => {
+    byId("note-name").value = recording.name;
+    byId("note-text").value = recording.note;
+    if (!await askDialog("note-dialog")) return;
+    const body = { name: byId("note-name").value, note: byId("note-text").value };
+    await attempt(() => ask("PUT", `/recordings/${encodeURIComponent(recording.file)}/note`, body));
+    await attempt(() => showRecordings(recordingActions));
+  },
+  remove: async (recording) => {
+    byId("confirm-text").textContent = `${recording.file} and the files computed from it are removed.`;
+    if (!await askDialog("confirm-dialog")) return;
+    await attempt(() => ask("DELETE", `/recordings/${encodeURIComponent(recording.file)}`));
+    await attempt(() => showRecordings(recordingActions));
+  },
+};
+
+function onKey(event) {
+  const isTyping = /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) || document.querySelector("dialog[open]");
+  if (event.key === " " && !(isTyping && /^(INPUT|TEXTAREA)$/.test(event.target.tagName))) {
+    event.preventDefault();
+    stop();
+    return;
+  }
+  if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
+  const actions = { p: () => byId("pause").click(), l: () => byId("lease-button").click(), "?": () => document.querySelector("footer").scrollIntoView() };
+  actions[event.key]?.();
+}
+
+/* --- start --- */
+
+function showAge() {
+  const ageMs = performance.now() - receivedMs, isOld = receivedMs === 0 || ageMs > OLD_MS;
+  document.body.classList.toggle("is-old", isOld);
+  const waits = Math.ceil((waitsUntilMs - performance.now()) / 1000);
+  if (!isOld) setText("age", state?.run ? `run ${state.run.id}: ${state.run.command}` : "");
+  else setText("age", receivedMs === 0 ? "no connection to the daemon yet" : `these data are ${(ageMs / 1000).toFixed(0)} s old${waits > 0 ? `; next attempt in ${waits} s` : ""}`);
+}
+
+function connectControls() {
+  byId("stop").onclick = stop;
+  byId("lease-button").onclick = () => (lease.isHeld ? attempt(() => lease.release()).then(refresh) : takeLease());
+  byId("pause").onclick = () => scope.pause(!scope.isPaused);
+  scope.onpause = () => { byId("pause").setAttribute("aria-pressed", scope.isPaused); setText("pause", scope.isPaused ? "Follow" : "Pause"); };
+  scope.onzoom = () => { byId("span").value = [...byId("span").options].find((option) => Number(option.value) === scope.spanS)?.value ?? ""; };
+  byId("span").onchange = () => { scope.spanS = Number(byId("span").value); };
+  byId("trigger").onchange = () => { setText("level-unit", byId("trigger").value === "current" ? "A" : "um"); };
+  byId("cursors").onclick = () => byId("cursors").setAttribute("aria-pressed", scope.toggleCursors());
+  byId("plan").onclick = plan;
+  byId("run-form").onsubmit = start;
+  byId("run-form").oninput = () => { showFields(); byId("start").disabled = JSON.stringify(request()) !== planned; };
+  byId("tune-apply").onclick = tune;
+  document.addEventListener("keydown", onKey);
+}
+
+function drawAll(lastMs = 0) {
+  return (nowMs) => {
+    if (!document.hidden) scope.draw();
+    if (nowMs - lastMs > 500 && !document.hidden) {
+      lastMs = nowMs;
+      spectrum.draw();
+      showAge();
+    }
+    requestAnimationFrame(draw);
+  };
+}
+const draw = drawAll();
+
+token.takeFromAddress();
+connectControls();
+showFields();
+follow({
+  onopen: () => attempt(() => showRecordings(recordingActions)),
+  onclose: (waitS) => { waitsUntilMs = performance.now() + waitS * 1000; },
+  onsamples: onSamples,
+  onmessage: onMessage,
+});
+requestAnimationFrame(draw);

@@ -1,0 +1,451 @@
+//! One command of this machine on its connection (see [`session_messages`](super::session_messages)).
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use axum::extract::ws::{Message, WebSocket};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::{MissedTickBehavior, interval};
+
+use super::catalogue::RecordingInfo;
+use super::owner::OwnerOrder;
+use super::run_entry::{Carrier, Phase, RunOutcome};
+use super::schedule::{NewEntry, Schedule, ScheduleError};
+use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
+use super::shared::Daemon;
+use crate::experiment::{
+    Ending, ExperimentError, RemoteError, Run, RunOrder, RunReport, RunSummary, close,
+};
+use crate::util::progress::Progress;
+
+/// Period of the progress reports.
+const PROGRESS: Duration = Duration::from_millis(100);
+
+/// Serves a command until its connection closes.
+pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket) {
+    let _counted = daemon.count_session();
+    let mut connection = Connection(Some(socket));
+    let Some(FromCommand::Open(open)) = connection.receive().await else {
+        return; // not a command of this version
+    };
+    let entered = enter(&daemon, &open);
+    let (id, is_attached) = match entered {
+        Ok(entered) => entered,
+        Err(error) => return connection.send(&refused(error.to_string())).await,
+    };
+    let mut session = Session {
+        daemon,
+        id,
+        connection,
+        is_own_user: nix::unistd::geteuid().as_raw() == open.user,
+        open_run: None,
+        outcome: RunOutcome::Failed,
+    };
+    if session.wait_for_turn().await {
+        session.serve_runs().await;
+    }
+    session.complete_recording().await;
+    session.end(is_attached);
+}
+
+/// Number of the entry, and whether it belongs to the connection.
+fn enter(daemon: &Daemon, open: &OpenCommand) -> Result<(u64, bool), ScheduleError> {
+    if let Some(ticket) = &open.ticket {
+        let id = daemon.read(|schedule| schedule.by_ticket(ticket))?;
+        return Ok((id, false));
+    }
+    let id = daemon.change(|schedule, now| {
+        let new = NewEntry {
+            request: open.request.clone(),
+            carrier: Carrier::Attached,
+            operator: open.operator.clone(),
+            lease: None,
+        };
+        let id = schedule.enqueue(new, now)?;
+        schedule.open_entry(id)?.estimated_s = open.estimated_s;
+        Ok(id)
+    })?;
+    Ok((id, true))
+}
+
+fn refused(message: String) -> FromDaemon {
+    FromDaemon::Refused(RemoteError::failed(message))
+}
+
+/// The connection; `None` after it was closed.
+struct Connection(Option<WebSocket>);
+
+impl Connection {
+    /// The next message. `None` when the connection is closed or sends what is not a message; it is closed then.
+    async fn receive(&mut self) -> Option<FromCommand> {
+        loop {
+            let received = self.0.as_mut()?.recv().await;
+            match received {
+                Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
+                    Ok(message) => return Some(message),
+                    Err(error) => {
+                        tracing::warn!(
+                            "a command sent a message that cannot be read: {error}; use the same version of `bench` for the daemon and the command"
+                        );
+                        self.0 = None;
+                    }
+                },
+                Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}
+                Some(Ok(Message::Binary(_) | Message::Close(_)) | Err(_)) | None => self.0 = None,
+            }
+        }
+    }
+
+    fn is_open(&self) -> bool {
+        self.0.is_some()
+    }
+
+    async fn send(&mut self, message: &FromDaemon) {
+        let Some(socket) = &mut self.0 else { return };
+        let Ok(text) = serde_json::to_string(message) else {
+            self.0 = None;
+            return;
+        };
+        if socket.send(Message::Text(text.into())).await.is_err() {
+            self.0 = None;
+        }
+    }
+}
+
+/// A command in the queue.
+struct Session {
+    daemon: Arc<Daemon>,
+    id: u64,
+    connection: Connection,
+    /// Whether the command runs as the user of the daemon.
+    is_own_user: bool,
+    /// The last run, whose recording is still open for results.
+    open_run: Option<Run>,
+    /// How the last run ended.
+    outcome: RunOutcome,
+}
+
+impl Session {
+    /// Waits for the turn; returns whether it has come.
+    async fn wait_for_turn(&mut self) -> bool {
+        let mut changes = self.daemon.changes();
+        let mut told = String::new();
+        loop {
+            let (phase, text) = self.daemon.read(|schedule| turn(schedule, self.id));
+            match phase {
+                Phase::Starting | Phase::Running | Phase::Analysing => {
+                    self.connection.send(&FromDaemon::Granted).await;
+                    return true;
+                }
+                Phase::Finished => {
+                    self.connection.send(&refused(text)).await;
+                    return false;
+                }
+                Phase::Queued | Phase::WaitingForLease => {}
+            }
+            // A command that is next begins at once.
+            let is_next = phase == Phase::Queued && text.is_empty();
+            if told != text && !is_next {
+                self.connection
+                    .send(&FromDaemon::Waiting(text.clone()))
+                    .await;
+                told = text;
+            }
+            tokio::select! {
+                changed = changes.changed() => if changed.is_err() { return false },
+                _ = self.connection.receive() => if !self.connection.is_open() { return false },
+            }
+        }
+    }
+
+    /// Serves runs until the connection closes or the daemon shuts down.
+    async fn serve_runs(&mut self) {
+        let mut changes = self.daemon.changes();
+        loop {
+            let message = tokio::select! {
+                message = self.connection.receive() => message,
+                changed = changes.changed() => {
+                    let ends = self.daemon.read(Schedule::is_shutting_down);
+                    match changed.is_err() || ends {
+                        true => return,
+                        false => continue,
+                    }
+                }
+            };
+            let Some(message) = message else { return };
+            match message {
+                FromCommand::Run(order) => {
+                    self.complete_recording().await;
+                    self.run(*order).await;
+                }
+                FromCommand::Finish(results) => self.finish(results).await,
+                FromCommand::Stop(kind) => self.stop(kind),
+                FromCommand::Open(_) => return,
+            }
+        }
+    }
+
+    fn stop(&self, kind: super::schedule::StopKind) {
+        // The command has not ended while its connection is open.
+        let _ = self
+            .daemon
+            .change(|schedule, now| schedule.stop(self.id, kind, now));
+    }
+
+    async fn run(&mut self, mut order: RunOrder) {
+        if !self.is_own_user {
+            // The command fetches the recording from there.
+            order.folder.clone_from(&self.daemon.recordings);
+        }
+        let (warnings, warned) = mpsc::unbounded_channel();
+        let (reply, replied) = oneshot::channel();
+        let progress = Progress::new(order.kind.name());
+        let plan = order.plan().ok().map(Arc::new);
+        let begun = self.daemon.change(|schedule, _| {
+            let entry = schedule.open_entry(self.id)?;
+            entry.phase = Phase::Running;
+            entry.progress = Some(progress.clone());
+            Ok::<_, ScheduleError>(entry.stop.clone())
+        });
+        let stop = match begun {
+            Ok(stop) => stop,
+            Err(error) => return self.connection.send(&refused(error.to_string())).await,
+        };
+        self.daemon.set_plan(plan);
+        self.daemon.live.set_run(self.id);
+        self.daemon.owner.run(OwnerOrder {
+            command: self.id,
+            order,
+            stop,
+            progress: progress.clone(),
+            warnings,
+            reply,
+        });
+        let result = self.follow(replied, warned, &progress).await;
+        self.daemon.set_plan(None);
+        self.report(result).await;
+    }
+
+    /// Follows a run to its end, also when the connection closes.
+    async fn follow(
+        &mut self,
+        mut reply: oneshot::Receiver<Result<Run, ExperimentError>>,
+        mut warnings: mpsc::UnboundedReceiver<String>,
+        progress: &Progress,
+    ) -> Result<Run, ExperimentError> {
+        let mut ticks = interval(PROGRESS);
+        ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+        loop {
+            let is_connected = self.connection.is_open();
+            tokio::select! {
+                result = &mut reply => {
+                    while let Ok(text) = warnings.try_recv() {
+                        self.connection.send(&FromDaemon::Warning(text)).await;
+                    }
+                    return result.unwrap_or_else(|_| Err(owner_ended()));
+                }
+                Some(text) = warnings.recv() => {
+                    self.connection.send(&FromDaemon::Warning(text)).await;
+                }
+                _ = ticks.tick() => {
+                    let now = progress.snapshot();
+                    let message = FromDaemon::Progress { done: now.done, total: now.total };
+                    self.connection.send(&message).await;
+                }
+                message = self.connection.receive(), if is_connected => match message {
+                    Some(FromCommand::Stop(kind)) => self.stop(kind),
+                    Some(_) => {}
+                    None => self.daemon.change(|schedule, now| schedule.lose_client(self.id, now)),
+                },
+            }
+        }
+    }
+
+    /// Reports how a run ended.
+    async fn report(&mut self, result: Result<Run, ExperimentError>) {
+        let reported = match result {
+            Ok(run) => blocking(move || reported(run)).await,
+            Err(error) => Err(error),
+        };
+        let message = match reported {
+            Ok((run, report)) => {
+                self.outcome = outcome(&run);
+                self.note_recording(&run);
+                self.open_run = Some(run);
+                FromDaemon::Ended(Box::new(report))
+            }
+            Err(error) => {
+                self.outcome = RunOutcome::Failed;
+                let message = error.to_string();
+                self.note(|entry| entry.message = Some(message));
+                FromDaemon::Refused(RemoteError::from(&error))
+            }
+        };
+        self.connection.send(&message).await;
+    }
+
+    fn note_recording(&self, run: &Run) {
+        let name = run
+            .path
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned());
+        let outcome = self.outcome;
+        self.note(|entry| {
+            entry.recording = name;
+            entry.phase = Phase::Analysing;
+            entry.outcome = Some(outcome);
+        });
+    }
+
+    fn note(&self, note: impl FnOnce(&mut super::run_entry::RunEntry)) {
+        // An entry that has ended needs no notes.
+        self.daemon
+            .change(|schedule, _| schedule.open_entry(self.id).map(note).ok());
+    }
+
+    /// Adds the results of the command to the recording.
+    async fn finish(&mut self, results: String) {
+        let Some(run) = self.open_run.take() else {
+            return self
+                .connection
+                .send(&FromDaemon::NotFinished(
+                    "there is no open recording".into(),
+                ))
+                .await;
+        };
+        if let Some(verdict) = verdict(&results) {
+            self.daemon.count_verdict(&verdict);
+        }
+        self.store_info(&run, &results);
+        let finished = blocking(move || run.finish(&results).map_err(ExperimentError::from)).await;
+        let message = match finished {
+            Ok(totals) => FromDaemon::Finished(totals),
+            Err(error) => FromDaemon::NotFinished(error.to_string()),
+        };
+        self.connection.send(&message).await;
+    }
+
+    /// Completes a recording to which the command added no results.
+    async fn complete_recording(&mut self) {
+        let Some(mut run) = self.open_run.take() else {
+            return;
+        };
+        self.store_info(&run, "");
+        let completed = blocking(move || {
+            let summary = RunSummary::of(&mut run)?;
+            close(run, &summary)
+        });
+        if let Err(error) = completed.await {
+            tracing::warn!("{error}");
+        }
+    }
+
+    /// Stores what is known about a recording in the folder of the daemon.
+    fn store_info(&self, run: &Run, results: &str) {
+        let folder = run.path.parent();
+        if folder != Some(self.daemon.recordings.as_path()) {
+            return;
+        }
+        let Some(file) = run.path.file_name().and_then(|name| name.to_str()) else {
+            return;
+        };
+        let Ok(entry) = self
+            .daemon
+            .read(|schedule| schedule.entry(self.id).cloned())
+        else {
+            return;
+        };
+        let info = RecordingInfo {
+            command: entry.request.command.name().into(),
+            operator: entry.operator,
+            name: entry.request.name,
+            note: entry.request.note,
+            outcome: Some(Ending::from(&run.ended).name().into()),
+            verdict: verdict(results),
+        };
+        if let Err(error) = self.daemon.catalogue().set_info(file, &info) {
+            tracing::warn!("{file}: its note cannot be stored: {error}");
+        }
+    }
+
+    /// The connection has closed. A command that the daemon started ends with its process.
+    fn end(self, is_attached: bool) {
+        let (id, outcome) = (self.id, self.outcome);
+        if is_attached {
+            self.daemon
+                .change(|schedule, now| schedule.finish(id, outcome, None, now));
+            self.daemon.owner.end_command();
+        }
+    }
+}
+
+/// The phase of a command, and what it waits for.
+fn turn(schedule: &Schedule, id: u64) -> (Phase, String) {
+    let Ok(entry) = schedule.entry(id) else {
+        return (
+            Phase::Finished,
+            "the command is not known any more; start it again".into(),
+        );
+    };
+    let text = match entry.phase {
+        Phase::Finished => entry.message.clone().unwrap_or_default(),
+        Phase::WaitingForLease => {
+            let holder = schedule
+                .lease()
+                .map_or("another operator", |lease| &lease.operator);
+            format!("waiting until {holder} releases the arm lease of the bench")
+        }
+        Phase::Queued | Phase::Starting | Phase::Running | Phase::Analysing => {
+            let before = schedule.open().take_while(|other| other.id != id);
+            let ahead: Vec<u64> = before.map(|other| other.id).collect();
+            waiting_text(&ahead)
+        }
+    };
+    (entry.phase, text)
+}
+
+/// The verdict in the results of a command.
+fn verdict(results: &str) -> Option<String> {
+    let results: serde_json::Value = serde_json::from_str(results).ok()?;
+    Some(results.get("cnmp")?.as_str()?.into())
+}
+
+/// What a command waits for; empty if it is next.
+fn waiting_text(ahead: &[u64]) -> String {
+    match ahead {
+        [] => String::new(),
+        [one] => format!("waiting for the end of run {one}"),
+        [first, ..] => format!(
+            "waiting for the end of run {first} and of {} more",
+            ahead.len() - 1
+        ),
+    }
+}
+
+fn reported(mut run: Run) -> Result<(Run, RunReport), ExperimentError> {
+    let report = RunReport::of(&mut run)?;
+    Ok((run, report))
+}
+
+fn outcome(run: &Run) -> RunOutcome {
+    match Ending::from(&run.ended) {
+        Ending::Completed => RunOutcome::Completed,
+        Ending::Tripped(..) => RunOutcome::Tripped,
+        Ending::Stopped | Ending::CutOff => RunOutcome::Stopped,
+    }
+}
+
+fn owner_ended() -> ExperimentError {
+    ExperimentError::Failed(
+        "the thread that owns the rig has ended; restart the daemon and report this with its log"
+            .into(),
+    )
+}
+
+/// Work on files, outside the tasks that serve clients.
+async fn blocking<T: Send + 'static>(
+    work: impl FnOnce() -> Result<T, ExperimentError> + Send + 'static,
+) -> Result<T, ExperimentError> {
+    let done = tokio::task::spawn_blocking(work).await;
+    done.unwrap_or_else(|_| Err(owner_ended()))
+}

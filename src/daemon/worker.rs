@@ -1,0 +1,266 @@
+//! Commands as processes of their own: they send their plan to the owner of the rig and analyse the recording in their own memory.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncReadExt};
+use tokio::process::{Child, Command as Process};
+
+use super::output::{OutputPiece, RunOutput};
+use super::run_entry::Command;
+use super::secret::Secret;
+use super::shared::Daemon;
+use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
+use crate::config::Source;
+use crate::experiment::option_in;
+
+/// Longest time of a computation without motion.
+const COMPUTATION: Duration = Duration::from_secs(60);
+/// Most arguments of a command.
+const MAX_ARGS: usize = 200;
+/// Longest argument in bytes.
+const MAX_ARG_BYTES: usize = 4096;
+
+/// Arguments that a client may not give.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ArgsError {
+    /// The daemon chooses the value of this option.
+    #[error("{0} cannot be given here, because the daemon chooses it; leave it out")]
+    Reserved(String),
+    /// A path outside the folder of the daemon.
+    #[error(
+        "`{0}` is a path outside the folder of the daemon; name a profile, or a file in that folder"
+    )]
+    Outside(String),
+    /// Too many, or too long.
+    #[error(
+        "a command has at most {MAX_ARGS} arguments of at most {MAX_ARG_BYTES} bytes; shorten it"
+    )]
+    TooLong,
+}
+
+/// Options that the daemon gives itself.
+const RESERVED: [&str; 3] = ["--connect", "--out", "--plan"];
+
+/// Refuses arguments with which a command would read or write outside the folder of the daemon.
+///
+/// # Errors
+/// With the first argument that is refused.
+pub fn check_args(args: &[String]) -> Result<(), ArgsError> {
+    let is_long = |arg: &String| arg.len() > MAX_ARG_BYTES || arg.contains('\0');
+    if args.len() > MAX_ARGS || args.iter().any(is_long) {
+        return Err(ArgsError::TooLong);
+    }
+    for arg in args {
+        let option = option_in(arg).unwrap_or_default();
+        let option = option.split('=').next().unwrap_or_default();
+        if RESERVED.contains(&option) {
+            return Err(ArgsError::Reserved(option.into()));
+        }
+        if is_outside(arg) {
+            return Err(ArgsError::Outside(arg.clone()));
+        }
+    }
+    Ok(())
+}
+
+/// Whether an argument may be a path that leaves the folder. Quantities such as `0.1mm/s` are not paths.
+fn is_outside(arg: &str) -> bool {
+    let value = arg.rsplit('=').next().unwrap_or(arg);
+    let value = value.trim_matches(['"', '\'']);
+    value.starts_with(['/', '~'])
+        || Path::new(value)
+            .components()
+            .any(|part| part.as_os_str() == "..")
+}
+
+/// The program of the daemon itself, with arguments. The configuration of the daemon applies unless the client names another.
+fn process(daemon: &Daemon, command: &str, args: &[String]) -> io::Result<Process> {
+    let program = std::env::current_exe()?;
+    let mut process = Process::new(program);
+    process.arg(command);
+    if command != "identify" {
+        process.args(source_args(&daemon.configuration().source, args));
+    }
+    process
+        .args(args)
+        .current_dir(&daemon.recordings)
+        .env(SOCKET_VARIABLE, &daemon.socket)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .kill_on_drop(true);
+    Ok(process)
+}
+
+/// The options of the configuration of the daemon.
+fn source_args(source: &Source, args: &[String]) -> Vec<String> {
+    let names_config = |arg: &String| arg == "--config" || arg.starts_with("--config=");
+    if args.iter().any(names_config) {
+        return Vec::new();
+    }
+    let config = source.config.iter();
+    let config = config.flat_map(|name| ["--config".to_string(), name.clone()]);
+    let sets = source.sets.iter();
+    let sets = sets.flat_map(|set| ["--set".to_string(), set.clone()]);
+    config.chain(sets).collect()
+}
+
+/// Runs a command to its end; returns its exit code.
+///
+/// # Errors
+/// When the system refuses the process.
+pub async fn run(
+    daemon: &Daemon,
+    command: Command,
+    args: &[String],
+    ticket: &Secret,
+    output: &Arc<RunOutput>,
+) -> io::Result<i32> {
+    let mut process = process(daemon, command.name(), args)?;
+    process.env(TICKET_VARIABLE, ticket.reveal());
+    if command != Command::Identify {
+        process.arg("--out").arg(&daemon.recordings);
+    }
+    let mut child = process.spawn()?;
+    let stdout = child
+        .stdout
+        .take()
+        .map(|pipe| copy(pipe, OutputPiece::Stdout, output));
+    let stderr = child
+        .stderr
+        .take()
+        .map(|pipe| copy(pipe, OutputPiece::Stderr, output));
+    let status = child.wait().await?;
+    for copied in [stdout, stderr].into_iter().flatten() {
+        let _ = copied.await; // what was printed before the end
+    }
+    let code = status.code().unwrap_or(1);
+    output.add(OutputPiece::Exit(code));
+    Ok(code)
+}
+
+/// Copies a pipe into the output.
+fn copy(
+    mut pipe: impl AsyncRead + Unpin + Send + 'static,
+    piece: fn(String) -> OutputPiece,
+    output: &Arc<RunOutput>,
+) -> tokio::task::JoinHandle<()> {
+    let output = Arc::clone(output);
+    tokio::spawn(async move {
+        let mut buffer = vec![0; 16 << 10];
+        while let Ok(bytes) = pipe.read(&mut buffer).await {
+            if bytes == 0 {
+                return;
+            }
+            output.add(piece(
+                String::from_utf8_lossy(&buffer[..bytes]).into_owned(),
+            ));
+        }
+    })
+}
+
+/// Why a computation has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum ComputeError {
+    /// The system refuses the process.
+    #[error("the computation cannot be started: {0}; look at the limits of the daemon's processes")]
+    Start(#[from] io::Error),
+    /// It takes too long.
+    #[error("the computation took more than {} s; start it on the command line", COMPUTATION.as_secs())]
+    TooLong,
+    /// It printed no object.
+    #[error("the computation failed: {0}; start it on the command line for details")]
+    NoResult(String),
+}
+
+/// Runs a command that moves nothing and prints one JSON object.
+///
+/// # Errors
+/// When the process cannot be started, takes too long, or prints no object.
+pub async fn compute(
+    daemon: &Daemon,
+    command: &[&str],
+    args: &[String],
+) -> Result<serde_json::Value, ComputeError> {
+    let (name, more) = command.split_first().unwrap_or((&"doctor", &[]));
+    let mut process = process_with(daemon, name, more, args)?;
+    let child: Child = process.arg("--json").spawn()?;
+    let ended = tokio::time::timeout(COMPUTATION, child.wait_with_output()).await;
+    let output = ended.map_err(|_| ComputeError::TooLong)??;
+    let json = serde_json::from_slice(&output.stdout);
+    json.map_err(|_| {
+        let errors = String::from_utf8_lossy(&output.stderr);
+        ComputeError::NoResult(errors.lines().last().unwrap_or("no output").into())
+    })
+}
+
+fn process_with(
+    daemon: &Daemon,
+    name: &str,
+    more: &[&str],
+    args: &[String],
+) -> io::Result<Process> {
+    match more {
+        [] => process(daemon, name, args),
+        more => {
+            let program: PathBuf = std::env::current_exe()?;
+            let mut process = Process::new(program);
+            process
+                .arg(name)
+                .args(more)
+                .args(source_args(&daemon.configuration().source, args))
+                .args(args)
+                .current_dir(&daemon.recordings)
+                .env(SOCKET_VARIABLE, &daemon.socket)
+                .stdin(Stdio::null())
+                .stdout(Stdio::piped())
+                .stderr(Stdio::piped())
+                .kill_on_drop(true);
+            Ok(process)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn checked(args: &[&str]) -> Result<(), ArgsError> {
+        let args: Vec<String> = args.iter().map(|arg| (*arg).to_string()).collect();
+        check_args(&args)
+    }
+
+    #[test]
+    fn refuses_paths_outside_the_folder_and_reserved_options() {
+        for args in [
+            &["--config", "/etc/passwd"][..],
+            &["--config=/etc/passwd"],
+            &["--set", "calibration.file=\"/etc/passwd\""],
+            &["--controller", "../secret.toml"],
+            &["--reference", "a/../../b.csv"],
+            &["--controller", "~/x.toml"],
+            &["--out", "x"],
+            &["--out=x"],
+            &["--connect", "none"],
+        ] {
+            assert!(checked(args).is_err(), "{args:?}");
+        }
+    }
+
+    #[test]
+    fn accepts_quantities_profiles_and_files_of_the_folder() {
+        for args in [
+            &["--amplitude", "0.2A", "--band", "1Hz..200Hz"][..],
+            &["--speed", "0.1mm/s"],
+            &["--operating-point", "-3.8mm"],
+            &["--config", "stage", "--set", "loop.rate_hz=5000"],
+            &["--controller", "own.toml"],
+        ] {
+            assert_eq!(checked(args), Ok(()), "{args:?}");
+        }
+    }
+}
