@@ -1,0 +1,6 @@
+//! The daemon as a process: its interface, its queue, its end, and the commands that use it.
+mod common;
+mod crash;
+mod interface;
+mod queue;
+mod same_command;
