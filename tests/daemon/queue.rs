@@ -121,7 +121,12 @@ fn lost_lease_stops_control_and_not_a_chirp() {
         "the run keeps the lease"
     );
     let run = daemon.wait_for_end(id, "");
-    assert_eq!(run["outcome"], "completed");
+    // A busy machine misses ticks, and the analysis may then refuse the recording. The run itself comes to its end.
+    let events = recorded_events(&daemon, &run);
+    assert!(
+        events.iter().any(|event| event.contains("came to its end")),
+        "{run} {events:?}"
+    );
     assert!(
         daemon.state()["lease"].is_null(),
         "the lease ends with the run"

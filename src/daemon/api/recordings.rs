@@ -59,7 +59,9 @@ pub async fn download(
     };
     // The script of a report cannot use the token of the page.
     let policy = HeaderValue::from_static("sandbox allow-scripts");
-    response.headers_mut().insert(header::CONTENT_SECURITY_POLICY, policy);
+    response
+        .headers_mut()
+        .insert(header::CONTENT_SECURITY_POLICY, policy);
     Ok(response)
 }
 
