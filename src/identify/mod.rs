@@ -11,6 +11,7 @@
 //! | the same without smoothing, for a fit | [`frf_data()`] |
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
 //! | the estimator that the configuration selects | [`response`] |
+//! | the response while a run goes on | [`GrowingResponse`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
 //! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
 //! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
@@ -30,6 +31,7 @@ pub mod external_csv;
 mod fft;
 mod frf;
 pub mod frf_csv;
+mod growing;
 mod local_model;
 mod mean;
 pub mod modal;
@@ -45,6 +47,7 @@ pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoin
 pub use error::IdentifyError;
 pub use estimate::{Estimate, SIGMAS_95};
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
+pub use growing::{GrowingPoint, GrowingResponse};
 pub use local_model::frf_data::frf_data;
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::with_distortion;

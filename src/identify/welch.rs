@@ -108,6 +108,18 @@ fn hann(samples: usize) -> Vec<f64> {
         .collect()
 }
 
+/// The spectrum of samples without their mean, under a window.
+fn windowed(fft: &RealFft, window: &[f64], samples: &[f64]) -> Vec<Complex<f64>> {
+    let mean = mean(samples);
+    let windowed = samples.iter().zip(window).map(|(s, w)| (s - mean) * w);
+    fft.transform(&mut windowed.collect::<Vec<f64>>())
+}
+
+/// The spectrum of samples without their mean, under a Hann window of their length, which must be that of the FFT.
+pub(super) fn windowed_spectrum(fft: &RealFft, samples: &[f64]) -> Vec<Complex<f64>> {
+    windowed(fft, &hann(samples.len()), samples)
+}
+
 /// Running sums over segments.
 struct Sums {
     fft: RealFft,
@@ -132,23 +144,14 @@ impl Sums {
     }
 
     fn add(&mut self, input: &[f64], output: &[f64]) {
-        let (input, output) = (self.windowed(input), self.windowed(output));
+        let input = windowed(&self.fft, &self.window, input);
+        let output = windowed(&self.fft, &self.window, output);
         for (k, (u, y)) in input.iter().zip(&output).enumerate() {
             self.spectra.input[k] += u.norm_sqr();
             self.spectra.output[k] += y.norm_sqr();
             self.spectra.cross[k] += u.conj() * y;
         }
         self.spectra.segments += 1;
-    }
-
-    fn windowed(&self, samples: &[f64]) -> Vec<Complex<f64>> {
-        let mean = mean(samples);
-        let mut windowed: Vec<f64> = samples
-            .iter()
-            .zip(&self.window)
-            .map(|(s, w)| (s - mean) * w)
-            .collect();
-        self.fft.transform(&mut windowed)
     }
 
     /// The mean over the segments as density: 2/(rate sum w^2), without the 2 at zero and at the Nyquist frequency.
