@@ -13,8 +13,9 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
 use crate::config::{Config, OptionSetting, Purpose};
+use crate::excitation::Extremes;
 use crate::experiment::calibration::{self, CalibrationPlan};
-use crate::experiment::{RunSummary, Runner};
+use crate::experiment::{PlanLimits, RunSummary, Runner};
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
@@ -39,6 +40,48 @@ pub(super) struct Args {
     /// Do not measure the delay by a chirp
     #[arg(long)]
     no_delay: bool,
+    /// Only print what the runs would do: travel, current, duration; no motion
+    #[arg(long)]
+    plan: bool,
+}
+
+/// The JSON object of `--plan`: the extremes of both runs.
+#[derive(Debug, Serialize)]
+struct PlanReport {
+    steps: Extremes,
+    chirp: Option<Extremes>,
+    expected: ExpectedExtremes,
+    limits: PlanLimits,
+}
+
+/// The larger ones of both runs, and their length.
+#[derive(Debug, Serialize)]
+struct ExpectedExtremes {
+    travel_m: f64,
+    current_a: f64,
+    thermal_current_a: f64,
+    duration_s: f64,
+}
+
+impl PlanReport {
+    fn new(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> PlanReport {
+        let (steps, chirp) = (plan.steps, with_delay.then_some(plan.chirp));
+        let largest = |value: fn(&Extremes) -> f64| {
+            let chirp = chirp.as_ref().map_or(0.0, value);
+            value(&steps).max(chirp)
+        };
+        PlanReport {
+            expected: ExpectedExtremes {
+                travel_m: largest(|extremes| extremes.travel_m),
+                current_a: largest(|extremes| extremes.current_a),
+                thermal_current_a: largest(|extremes| extremes.thermal_current_a),
+                duration_s: steps.duration_s + chirp.map_or(0.0, |chirp| chirp.duration_s),
+            },
+            steps,
+            chirp,
+            limits: PlanLimits::of(config),
+        }
+    }
 }
 
 /// The JSON object of the command.
@@ -57,6 +100,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
     let plan = calibration::check(&config)?;
     check_target(args.write.as_deref())?;
+    if args.plan {
+        let report = PlanReport::new(&plan, &config, !args.no_delay);
+        let text = plan_text(&plan, &config, !args.no_delay);
+        print_result(args.bench.json, &report, |_| text)?;
+        return Ok(Outcome::Done);
+    }
     let setup = args.run.setup(&config)?;
     if !args.bench.json {
         print_text(&plan_text(&plan, &config, !args.no_delay))?;

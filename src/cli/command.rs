@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
     calibrate, campaign, chirp, completions, config, control, doctor, emulate, identify, linearity,
-    margins, model, recover, remote, replay, serve,
+    margins, model, recover, remote, replay, report, serve,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -50,6 +50,8 @@ enum Command {
     Margins(margins::Args),
     /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
+    /// Write a page with the frequency responses and steps of one or several recordings
+    Report(report::Args),
     /// Feed the recorded probe measurements to the loop code again and compare every command bit for bit
     Replay(replay::Args),
     /// Write a readable copy of a truncated or damaged recording and report what was lost
@@ -131,6 +133,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),
         Command::Identify(args) => identify::run(&args),
+        Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Emulate(args) => emulate::run(&args),

@@ -10,21 +10,20 @@ pub(super) use super::control_options::Args;
 use super::error::CliError;
 use super::margins::text as margins_text;
 use super::outcome::Outcome;
-use super::output::print_text;
+use super::output::{print_result, print_text};
+use super::plan_output;
 use super::run_options::{close, exit, run_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose};
-use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles, step_metrics};
+use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles};
 use crate::excitation::Extremes;
 use crate::experiment::{
-    Plan, Run, RunSummary, TrackingMetrics, closed_loop, require_margins, tracking_metrics,
+    MotorSummary, Plan, PlanLimits, Run, RunSummary, TrackingMetrics, closed_loop, predicted_step,
+    require_margins, tracking_metrics,
 };
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
 use crate::util::decimal::Decimal;
-
-/// Largest number of ticks of a predicted step: 200 s at 5 kHz.
-const PREDICTED_TICKS: usize = 1_000_000;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
@@ -55,6 +54,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     require_margins(&config, &margins, args.run.stage(&config))?;
     let predicted = predicted(margins, &config, &closed_loop);
     let plan = Plan::control(config.clone())?;
+    if args.plan {
+        return print_plan(args, &plan, predicted);
+    }
     if !args.bench.json {
         let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
         print_text(&plan_text(&plan, &predicted, &poles))?;
@@ -68,10 +70,42 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     })
 }
 
+/// The JSON object of `--plan`.
+#[derive(Debug, Serialize)]
+struct PlanReport {
+    reference: String,
+    /// Extremes by the model; `None` if the loop of the model is unstable.
+    expected: Option<Extremes>,
+    limits: PlanLimits,
+    motor: Option<MotorSummary>,
+    predicted: Predicted,
+}
+
+/// Prints what the run would do.
+fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome, CliError> {
+    let config = &plan.config;
+    let report = PlanReport {
+        reference: reference_text(config),
+        expected: plan.loop_extremes()?,
+        limits: PlanLimits::of(config),
+        motor: args.run.motor_summary(plan)?,
+        predicted,
+    };
+    print_result(args.bench.json, &report, |report| {
+        plan_output::control_text(
+            &report.reference,
+            report.expected.as_ref(),
+            &report.limits,
+            report.motor.as_ref(),
+        )
+    })?;
+    Ok(Outcome::Done)
+}
+
 /// The margins and the step by the model.
 fn predicted(margins: Margins, config: &Config, closed_loop: &ClosedLoop) -> Predicted {
     let step = match margins.stable {
-        true => predicted_step(config, closed_loop),
+        true => predicted_step(config, closed_loop).map(|step| step.metrics),
         false => None,
     };
     Predicted { margins, step }
@@ -106,17 +140,6 @@ fn tracking(path: &Path, config: &Config) -> Result<Option<TrackingMetrics>, Cli
         &config.control,
         &config.servo,
     )?)
-}
-
-/// The step by the linear model, if the reference is a step within the run.
-fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<StepMetrics> {
-    let step = config.control.reference.design().step()?;
-    let (amplitude_m, at_s) = (step.height_m, step.at_s);
-    let after_s = config.control.duration_s - at_s;
-    let ticks = ((after_s * config.servo.rate_hz) as usize).min(PREDICTED_TICKS);
-    let positions = closed_loop.simulate(ticks, |_| amplitude_m);
-    (amplitude_m != 0.0 && ticks > 0)
-        .then(|| step_metrics(&positions, amplitude_m, config.servo.period_s()))
 }
 
 /// Margins, reference and predicted step, printed before the run.

@@ -58,6 +58,9 @@ pub(super) struct Args {
     /// Time with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, help = duration_help())]
     duration: Option<Time>,
+    /// Only print what the run would do: margins, travel, current, heat, duration; no motion
+    #[arg(long)]
+    pub plan: bool,
 }
 
 fn duration_help() -> String {

@@ -35,6 +35,7 @@ mod progress;
 mod recover;
 mod remote;
 mod replay;
+mod report;
 mod run_options;
 mod serve;
 mod table;

@@ -1,17 +1,43 @@
-//! The plan of an excitation as text.
+//! The plan of a run as text.
 
 use super::table::labelled;
-use crate::excitation::AmplitudePoint;
-use crate::experiment::{ExcitationPlan, MotorSummary};
+use crate::excitation::{AmplitudePoint, Extremes};
+use crate::experiment::{ExcitationPlan, MotorSummary, PlanLimits};
 
 /// Extremes with their limits, and the amplitude over frequency.
 pub(super) fn text(plan: &ExcitationPlan) -> String {
-    let (expected, limits) = (&plan.expected, &plan.limits);
     let amplitude: String = plan.amplitude.iter().map(amplitude_line).collect();
+    let slew = format!(
+        "  slew         {:.0} A/s of {:.0} A/s\n",
+        plan.expected.slew_a_per_s, plan.limits.slew_a_per_s
+    );
     let motor = plan.motor.as_ref().map_or(String::new(), motor_text);
+    let extremes = extremes_text(&plan.expected, &plan.limits);
+    let excitation = &plan.excitation;
+    format!("{excitation}; no motion\n{extremes}{slew}{motor}{amplitude}")
+}
+
+/// The plan of a closed loop. Without extremes the loop of the model is unstable.
+pub(super) fn control_text(
+    reference: &str,
+    expected: Option<&Extremes>,
+    limits: &PlanLimits,
+    motor: Option<&MotorSummary>,
+) -> String {
+    let extremes = match expected {
+        Some(expected) => extremes_text(expected, limits),
+        None => labelled(
+            "expected",
+            "no prediction: the loop of the model is unstable",
+        ),
+    };
+    let motor = motor.map_or(String::new(), motor_text);
+    format!("{reference}; no motion\n{extremes}{motor}")
+}
+
+fn extremes_text(expected: &Extremes, limits: &PlanLimits) -> String {
     format!(
-        "{}; no motion\n  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n  slew         {:.0} A/s of {:.0} A/s\n{motor}{amplitude}",
-        plan.excitation,
+        "  duration     {:.1} s\n  travel       {:.1} um of {:.0} um\n  current      {:.3} A of {:.2} A, {:.3} A RMS\n  thermal      {:.3} A of {:.2} A\n",
         expected.duration_s,
         expected.travel_m * 1e6,
         limits.travel_m * 1e6,
@@ -20,8 +46,6 @@ pub(super) fn text(plan: &ExcitationPlan) -> String {
         expected.rms_current_a,
         expected.thermal_current_a,
         limits.thermal_current_a,
-        expected.slew_a_per_s,
-        limits.slew_a_per_s,
     )
 }
 

@@ -2,9 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ExperimentError;
-use super::motor_error::MotorError;
-use super::plan_error::PlanError;
 use crate::util::remedy;
 
 /// The kinds of error that a script can distinguish.
@@ -83,74 +80,6 @@ impl RemoteError {
             error: ErrorObject::new(message, ErrorKind::Failed, None),
             is_failure: true,
         }
-    }
-}
-
-impl From<&ExperimentError> for RemoteError {
-    fn from(error: &ExperimentError) -> RemoteError {
-        RemoteError {
-            error: ErrorObject::new(error.to_string(), error.kind(), error.place()),
-            is_failure: error.is_failure(),
-        }
-    }
-}
-
-impl ExperimentError {
-    /// Whether the experiment failed at run time, not because of its settings.
-    pub fn is_failure(&self) -> bool {
-        match self {
-            ExperimentError::Run(_)
-            | ExperimentError::Recording(_)
-            | ExperimentError::Analysis(_)
-            | ExperimentError::Failed(_)
-            | ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped) => true,
-            ExperimentError::Remote(error) => error.is_failure,
-            ExperimentError::Plan(_)
-            | ExperimentError::Margin(_)
-            | ExperimentError::Excitation(_)
-            | ExperimentError::Plant(_)
-            | ExperimentError::Devices(_)
-            | ExperimentError::Calibration(_)
-            | ExperimentError::Motor(MotorError::Warm { .. } | MotorError::Never { .. })
-            | ExperimentError::Refused(_) => false,
-        }
-    }
-
-    /// The kind of the error.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
-            ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
-            ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
-            ExperimentError::Motor(error) => motor_kind(error),
-            ExperimentError::Margin(_) => ErrorKind::Margin,
-            ExperimentError::Plant(_) => ErrorKind::Model,
-            ExperimentError::Devices(_) => ErrorKind::Devices,
-            ExperimentError::Calibration(_) => ErrorKind::Calibration,
-            ExperimentError::Refused(_) => ErrorKind::Usage,
-            ExperimentError::Recording(_) => ErrorKind::Recording,
-            ExperimentError::Run(_) | ExperimentError::Analysis(_) | ExperimentError::Failed(_) => {
-                ErrorKind::Failed
-            }
-            ExperimentError::Remote(error) => error.error.kind,
-        }
-    }
-
-    /// The option, file or line that is wrong, if the error has one.
-    pub fn place(&self) -> Option<String> {
-        match self {
-            ExperimentError::Plan(PlanError::Config(error)) => error.place(),
-            ExperimentError::Refused(message) => option_in(message),
-            ExperimentError::Remote(error) => error.error.place.clone(),
-            _ => None,
-        }
-    }
-}
-
-fn motor_kind(error: &MotorError) -> ErrorKind {
-    match error {
-        MotorError::Warm { .. } | MotorError::Never { .. } => ErrorKind::Plan,
-        MotorError::Memory(_) | MotorError::Stopped => ErrorKind::Failed,
     }
 }
 

@@ -1,6 +1,7 @@
 //! An open rig with its loop, which is kept open for the next run.
 
 use bench_hal::blocking;
+use bench_hal::serial::StatisticsHandle;
 
 use super::error::ExperimentError;
 use super::live_rig::LiveRig;
@@ -34,6 +35,7 @@ pub struct DeviceNames {
 pub struct OpenBench {
     pub(super) rig: LiveRig,
     pub(super) names: DeviceNames,
+    serial: Option<StatisticsHandle>,
     config: Config,
     opening: Opening,
 }
@@ -66,6 +68,7 @@ impl OpenBench {
                 amplifier: opened.amplifier,
                 probe: opened.probe,
             },
+            serial: opened.watch,
             config: config.clone(),
             opening,
         })
@@ -91,6 +94,11 @@ impl OpenBench {
     /// Identities of the devices.
     pub fn names(&self) -> &DeviceNames {
         &self.names
+    }
+
+    /// Counts of the serial port of the probe; `None` on a simulated stage.
+    pub fn serial(&self) -> Option<&StatisticsHandle> {
+        self.serial.as_ref()
     }
 
     /// How the loop is scheduled.

@@ -133,7 +133,7 @@ impl Plan {
         // Refuses a reference or a controller that cannot be built before the plan is shown.
         plan.program()?;
         if let Some(controller) = plan.controller.as_ref().filter(|_| !is_swept) {
-            reference_check::check(&plan.config, controller, plan.reference.as_deref())?;
+            reference_check::predicted(&plan.config, controller, plan.reference.as_deref())?;
         }
         Ok(plan)
     }
@@ -170,6 +170,20 @@ impl Plan {
             controller,
             reference,
             ..Plan::excitation(kind, config)
+        }
+    }
+
+    /// Extremes of a closed loop with its reference, by the model; `None` for an unstable loop, of which nothing can be
+    /// predicted, and for an open loop.
+    ///
+    /// # Errors
+    /// When the reference cannot be built, or would trip an interlock.
+    pub fn loop_extremes(&self) -> Result<Option<Extremes>, PlanError> {
+        let file = self.reference_file();
+        match &self.controller {
+            Some(_) if self.config.control.reference.is_swept() => Ok(self.predicted_extremes),
+            Some(controller) => reference_check::predicted(&self.config, controller, file),
+            None => Ok(None),
         }
     }
 

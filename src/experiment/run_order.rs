@@ -11,7 +11,6 @@ use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use super::remembered_motor::MotorHandling;
 use super::run::{RemoteRecording, Run, RunFile, StopCause};
-use super::runner::Setup;
 use crate::config;
 use crate::control::ControllerText;
 use crate::recording::Totals;
@@ -43,11 +42,21 @@ pub struct RunOrder {
     pub folder: PathBuf,
 }
 
+/// What a run needs besides its plan.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RunConditions<'a> {
+    pub pace: Pace,
+    pub clear_fault: bool,
+    pub motor: MotorHandling,
+    /// Folder for the recording.
+    pub folder: &'a Path,
+}
+
 impl RunOrder {
     /// The order of a plan.
     pub(super) fn of(
         plan: &Plan,
-        setup: &Setup,
+        conditions: &RunConditions<'_>,
         calibration: Option<&Calibration>,
     ) -> Result<RunOrder, ExperimentError> {
         let mut plan = plan.clone();
@@ -64,10 +73,10 @@ impl RunOrder {
             controller: plan.controller.map(|found| (found.name, found.text)),
             calibration_toml: calibration_toml
                 .map_err(|error| PlanError::Text(error.to_string()))?,
-            pace: setup.pace,
-            clear_fault: setup.clear_fault,
-            motor: setup.motor,
-            folder: absolute(&setup.folder)?,
+            pace: conditions.pace,
+            clear_fault: conditions.clear_fault,
+            motor: conditions.motor,
+            folder: absolute(conditions.folder)?,
         })
     }
 
@@ -175,11 +184,11 @@ pub trait RigOwner: Debug + Send + Sync {
 pub(super) fn run_elsewhere(
     owner: &dyn RigOwner,
     plan: &Plan,
-    setup: &Setup,
+    conditions: &RunConditions<'_>,
     calibration: Option<&Calibration>,
     progress: &Progress,
 ) -> Result<Run, ExperimentError> {
-    let order = RunOrder::of(plan, setup, calibration)?;
+    let order = RunOrder::of(plan, conditions, calibration)?;
     let (report, recording) = owner.run(&order, progress)?;
-    Ok(report.run(recording, &setup.folder))
+    Ok(report.run(recording, conditions.folder))
 }

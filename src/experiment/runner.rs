@@ -17,7 +17,7 @@ use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
 use super::run::Run;
 use super::run_error::RunError;
 use super::run_hooks::RunHooks;
-use super::run_order::{RigOwner, run_elsewhere};
+use super::run_order::{RigOwner, RunConditions, run_elsewhere};
 use crate::config::Config;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::motor::{Moment, MotorMemory};
@@ -75,6 +75,16 @@ impl Setup {
         match self.simulate {
             true => Stage::Simulated,
             false => Stage::of(config),
+        }
+    }
+
+    /// What a run needs besides its plan.
+    fn conditions(&self) -> RunConditions<'_> {
+        RunConditions {
+            pace: self.pace,
+            clear_fault: self.clear_fault,
+            motor: self.motor,
+            folder: &self.folder,
         }
     }
 
@@ -154,7 +164,8 @@ impl Runner {
         if let Some(owner) = &self.setup.owner {
             self.progress.begin(phase, 0);
             let calibration = calibration.as_ref();
-            return run_elsewhere(&**owner, plan, &self.setup, calibration, &self.progress);
+            let conditions = self.setup.conditions();
+            return run_elsewhere(&**owner, plan, &conditions, calibration, &self.progress);
         }
         let mut bench = self.opened(&plan.config)?;
         bench.rig.set_hooks(self.hooks.clone());

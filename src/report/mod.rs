@@ -34,7 +34,9 @@ pub use coherence::coherence_svg;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use nyquist::nyquist_svg;
-pub use overlay::{StepCurve, overlay_bode_svg, overlay_steps_svg};
+pub use overlay::{
+    Envelope, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, signals_svg, step_svg,
+};
 pub use pole_zero::{PoleZeroMap, UncertainPoint, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
 pub use stability::{OrderedMode, stability_svg};

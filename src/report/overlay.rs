@@ -1,8 +1,8 @@
-//! Several recordings in one plot.
+//! Steps, and several recordings in one plot.
 
 use super::ReportError;
 use super::bode::sheet;
-use super::chart::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
+use super::chart::colours::{BLUE, Colour, GREEN, ORANGE, PURPLE, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Stroke, sheet_svg};
 use super::trace::{self, Trace};
 use crate::identify::{Frf, Unit};
@@ -13,6 +13,9 @@ const STROKES: [Stroke; 3] = [Stroke::Solid, Stroke::Dashed, Stroke::Dotted];
 /// Height of the frame of a step plot in pixels.
 const STEP_HEIGHT: f64 = 400.0;
 const MICRO: f64 = 1e6;
+/// Ratio of the height of a step, and opacity of its area.
+const SETTLING_BAND: f64 = 0.02;
+const BAND_STRENGTH: f64 = 0.25;
 
 /// The response of a recording to a step of its reference.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,16 +54,97 @@ pub fn overlay_steps_svg(curves: &[StepCurve<'_>], title: &str) -> Result<String
     if curves.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    let (x, y) = (
-        Scale::linear("Time since the step (s)"),
-        Scale::linear("Position (µm)"),
-    );
-    let mut chart = Chart::new("", x, y);
+    let mut chart = step_chart();
     for (k, curve) in curves.iter().enumerate() {
         let points = curve.points.iter().map(|(t, y)| (*t, MICRO * y));
         chart = chart.line(curve.name, pen(k), points.collect());
     }
     sheet_svg(title, "", &[Row::new(STEP_HEIGHT, vec![chart])])
+}
+
+/// A step: (seconds since the step, metres from the rest position).
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepPlot<'a> {
+    /// Height of the step in metres.
+    pub height_m: f64,
+    /// Measured.
+    pub measured: &'a [(f64, f64)],
+    /// By the model; may be empty.
+    pub predicted: &'a [(f64, f64)],
+}
+
+/// A step with its band of 2 %, beside that of the model.
+///
+/// # Errors
+/// When there is nothing to draw, or drawing fails.
+pub fn step_svg(step: &StepPlot<'_>, title: &str) -> Result<String, ReportError> {
+    let end_s = step.measured.last().ok_or(ReportError::NoTrace)?.0;
+    let [low, high] = [1.0 - SETTLING_BAND, 1.0 + SETTLING_BAND].map(|k| k * MICRO * step.height_m);
+    let band = vec![(0.0, low), (end_s, low), (end_s, high), (0.0, high)];
+    let micro = |points: &[(f64, f64)]| points.iter().map(|(t, y)| (*t, MICRO * y)).collect();
+    let mut chart = step_chart()
+        .area("2 % of the step", GREEN, BAND_STRENGTH, band)
+        .line("measured", Pen::solid(BLUE), micro(step.measured));
+    if !step.predicted.is_empty() {
+        let pen = Pen {
+            stroke: Stroke::Dashed,
+            ..Pen::solid(VERMILION)
+        };
+        chart = chart.line("by the model", pen, micro(step.predicted));
+    }
+    sheet_svg(title, "", &[Row::new(STEP_HEIGHT, vec![chart])])
+}
+
+/// A signal over time: (seconds, smallest and largest value of the interval that begins there).
+pub type Envelope = [(f64, f64, f64)];
+
+/// Reference, position and current of a whole run, below each other. Units are metres and amperes.
+///
+/// # Errors
+/// When there is nothing to draw, or drawing fails.
+pub fn signals_svg(
+    reference: &Envelope,
+    position: &Envelope,
+    current: &Envelope,
+    title: &str,
+) -> Result<String, ReportError> {
+    if current.is_empty() {
+        return Err(ReportError::NoTrace);
+    }
+    let time = Scale::linear("Time (s)");
+    let motion = Chart::new(
+        "",
+        time.clone().unnumbered(),
+        Scale::linear("Position (µm)"),
+    )
+    .line("reference", Pen::solid(ORANGE), outline(reference, MICRO))
+    .line("position", Pen::solid(BLUE), outline(position, MICRO));
+    let current = Chart::new("", time, Scale::linear("Current (A)")).line(
+        "current",
+        Pen::solid(GREEN),
+        outline(current, 1.0),
+    );
+    let rows = [
+        Row::new(STEP_HEIGHT, vec![motion]),
+        Row::new(0.5 * STEP_HEIGHT, vec![current]),
+    ];
+    sheet_svg(title, "", &rows)
+}
+
+/// A line from minimum to maximum of each interval.
+fn outline(envelope: &Envelope, factor: f64) -> Vec<(f64, f64)> {
+    let points = envelope
+        .iter()
+        .flat_map(|(time_s, low, high)| [(*time_s, factor * low), (*time_s, factor * high)]);
+    points.collect()
+}
+
+fn step_chart() -> Chart {
+    let (x, y) = (
+        Scale::linear("Time since the step (s)"),
+        Scale::linear("Position (µm)"),
+    );
+    Chart::new("", x, y)
 }
 
 /// The pen of a recording: curves differ in colour and in stroke.

@@ -4,9 +4,11 @@
 //! BenchRun (a run of the bench) -------.
 //!                                       > RecordReport -> plots (SVG) -> page (HTML)
 //! ExternalRecord (a CSV) --------------'
+//! ComparedRun (one or several runs) -> comparison (HTML)
 //! ```
 
 mod bench_run;
+mod comparison;
 mod external;
 mod outputs;
 mod page;
@@ -19,6 +21,7 @@ use crate::identify::verdict::Verdict;
 use crate::identify::{Frf, Unit};
 
 pub use bench_run::BenchRun;
+pub use comparison::{ComparedRun, comparison_page};
 pub use external::ExternalRecord;
 pub use outputs::{
     AnalysisOutputs, AnalysisStatus, ExistingFile, LoopOutputs, ModalSummary, OutputError,

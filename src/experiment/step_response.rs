@@ -1,0 +1,125 @@
+//! The response of a closed loop to a step of its reference: predicted by the model, and measured in a recording.
+
+use super::error::ExperimentError;
+use super::loop_check::closed_loop_of;
+use super::plan::Plan;
+use super::tracking::{TrackingMetrics, tracking_metrics};
+use crate::config::Config;
+use crate::control::{ClosedLoop, StepMetrics, step_metrics};
+use crate::recording::Recording;
+use crate::rt::record::flag;
+
+/// Largest number of ticks of a step: 200 s at 5 kHz.
+const MAX_TICKS: usize = 1_000_000;
+
+/// The step by the linear model of the loop: without noise, disturbance and limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PredictedStep {
+    /// Position in metres from the rest position, at each tick from the step on.
+    pub positions_m: Vec<f64>,
+    /// Settling and overshoot.
+    pub metrics: StepMetrics,
+}
+
+/// The step of the configured reference by the model; `None` if the reference has no step within the run.
+pub fn predicted_step(config: &Config, closed_loop: &ClosedLoop) -> Option<PredictedStep> {
+    let step = config.control.reference.design().step()?;
+    let after_s = config.control.duration_s - step.at_s;
+    let ticks = ((after_s * config.servo.rate_hz) as usize).min(MAX_TICKS);
+    if step.height_m == 0.0 || ticks == 0 {
+        return None;
+    }
+    let positions_m = closed_loop.simulate(ticks, |_| step.height_m);
+    let metrics = step_metrics(&positions_m, step.height_m, config.servo.period_s());
+    Some(PredictedStep {
+        positions_m,
+        metrics,
+    })
+}
+
+/// A recorded step beside that of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepResponse {
+    /// Height of the step in metres.
+    pub height_m: f64,
+    /// Sampling period in seconds.
+    pub period_s: f64,
+    /// Measured position in metres from the rest position, at each tick from the step on.
+    pub positions_m: Vec<f64>,
+    /// By the model; `None` if the loop of the model is unstable.
+    pub predicted: Option<PredictedStep>,
+    /// Measured settling, overshoot and error; `None` if the run ended before its steady state.
+    pub metrics: Option<TrackingMetrics>,
+}
+
+impl StepResponse {
+    /// (Seconds since the step, metres from the rest position), measured, up to a time.
+    pub fn measured_points(&self, up_to_s: f64) -> Vec<(f64, f64)> {
+        points(&self.positions_m, self.period_s, up_to_s)
+    }
+
+    /// The same by the model.
+    pub fn predicted_points(&self, up_to_s: f64) -> Vec<(f64, f64)> {
+        let predicted = self.predicted.as_ref();
+        let positions_m = predicted.map_or(&[][..], |predicted| &predicted.positions_m);
+        points(positions_m, self.period_s, up_to_s)
+    }
+}
+
+fn points(positions_m: &[f64], period_s: f64, up_to_s: f64) -> Vec<(f64, f64)> {
+    let times_s = (0..positions_m.len()).map(|tick| tick as f64 * period_s);
+    let points = times_s.zip(positions_m.iter().copied());
+    points
+        .take_while(|(time_s, _)| *time_s <= up_to_s)
+        .collect()
+}
+
+/// The step in the recording of a closed loop; `None` if its reference has none.
+///
+/// # Errors
+/// When the recording cannot be read, or the loop of its controller cannot be computed.
+pub fn step_response(
+    recording: &Recording,
+    plan: &Plan,
+) -> Result<Option<StepResponse>, ExperimentError> {
+    let (config, Some(controller)) = (&plan.config, &plan.controller) else {
+        return Ok(None);
+    };
+    let Some(step) = config.control.reference.design().step() else {
+        return Ok(None);
+    };
+    let closed_loop = closed_loop_of(controller, config)?;
+    let predicted = match closed_loop.margins().stable {
+        true => predicted_step(config, &closed_loop),
+        false => None,
+    };
+    Ok(Some(StepResponse {
+        height_m: step.height_m,
+        period_s: config.servo.period_s(),
+        positions_m: positions_after(recording, step.at_s * config.servo.rate_hz)?,
+        predicted,
+        metrics: tracking_metrics(recording, &config.control, &config.servo)?,
+    }))
+}
+
+/// The positions from a tick on, counted since the loop was closed. The rest position is the reference of the last tick before the
+/// loop was closed, as in [`tracking_metrics`].
+fn positions_after(recording: &Recording, tick: f64) -> Result<Vec<f64>, ExperimentError> {
+    let first = tick.round() as u64;
+    let (mut active, mut rest_m) = (0, 0.0);
+    let mut positions_m = Vec::new();
+    for record in recording.ticks()? {
+        let record = record?;
+        if record.flags & flag::ACTIVE == 0 {
+            if active == 0 {
+                rest_m = record.reference_m;
+            }
+            continue;
+        }
+        if active >= first && positions_m.len() < MAX_TICKS {
+            positions_m.push(record.position_m - rest_m);
+        }
+        active += 1;
+    }
+    Ok(positions_m)
+}

@@ -1,0 +1,192 @@
+//! One page for one or several recordings: their frequency responses and their steps.
+
+use crate::experiment::{Extent, Overview, StepResponse, TrackingMetrics};
+use crate::identify::{Frf, Unit};
+use crate::report::html::{document_with_plots, escaped, note, picture, row, section, table};
+use crate::report::{
+    ReportError, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, signals_svg, step_svg,
+};
+
+/// Longest part of a step that is drawn, as a multiple of its settling time.
+const SETTLING_TIMES: f64 = 4.0;
+/// Shortest and longest part in seconds.
+const DRAWN_S: (f64, f64) = (0.05, 20.0);
+
+const STEP_CAPTION: &str =
+    "Position from the rest position since the step. The band is 2 % of the step.";
+const SIGNALS_CAPTION: &str =
+    "The whole run. Each column reaches from minimum to maximum, so that no spike is left out.";
+const FRF_CAPTION: &str = "Measured responses, each with a band of two sigma.";
+
+/// A recording with what it shows.
+#[derive(Clone, Debug)]
+pub struct ComparedRun {
+    /// Name in legends and tables.
+    pub name: String,
+    /// The frequency response of the stage.
+    pub frf: Option<Frf>,
+    /// The step of a closed loop.
+    pub step: Option<StepResponse>,
+    /// Its signals.
+    pub overview: Overview,
+}
+
+/// The page of recordings as an HTML document.
+///
+/// # Errors
+/// When there is nothing to draw, or drawing fails.
+pub fn comparison_page(runs: &[ComparedRun]) -> Result<String, ReportError> {
+    let parts = [responses(runs)?, steps(runs)?, signals(runs)?].concat();
+    if parts.is_empty() {
+        return Err(ReportError::NoTrace);
+    }
+    let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
+    let title = match names[..] {
+        [name] => name.to_string(),
+        _ => format!("Comparison of {} recordings", names.len()),
+    };
+    let heading = format!("<h1>{}</h1>\n", escaped(&title));
+    Ok(document_with_plots(&title, &(heading + &parts)))
+}
+
+fn responses(runs: &[ComparedRun]) -> Result<String, ReportError> {
+    let named = |run: &'_ ComparedRun| -> Option<(String, Frf)> {
+        Some((run.name.clone(), run.frf.clone()?))
+    };
+    let found: Vec<(String, Frf)> = runs.iter().filter_map(named).collect();
+    if found.is_empty() {
+        return Ok(String::new());
+    }
+    let traces: Vec<(&str, &Frf)> = found
+        .iter()
+        .map(|(name, frf)| (name.as_str(), frf))
+        .collect();
+    let heading = "Frequency responses of the stage";
+    let svg = overlay_bode_svg(Unit::MetresPerAmpere, &traces, heading)?;
+    Ok(section(heading, &picture(&svg, heading, FRF_CAPTION)))
+}
+
+fn steps(runs: &[ComparedRun]) -> Result<String, ReportError> {
+    let found = runs
+        .iter()
+        .filter_map(|run| Some((run.name.as_str(), run.step.as_ref()?)));
+    let found: Vec<(&str, &StepResponse)> = found.collect();
+    let heading = "Step response";
+    let svg = match found[..] {
+        [] => return Ok(String::new()),
+        [(_, step)] => single(step, heading)?,
+        _ => overlay(&found, heading)?,
+    };
+    let picture = picture(&svg, heading, STEP_CAPTION);
+    Ok(section(heading, &(picture + &figures(&found))))
+}
+
+fn single(step: &StepResponse, heading: &str) -> Result<String, ReportError> {
+    let drawn_s = drawn_s(step);
+    let (measured, predicted) = (
+        step.measured_points(drawn_s),
+        step.predicted_points(drawn_s),
+    );
+    let plot = StepPlot {
+        height_m: step.height_m,
+        measured: &measured,
+        predicted: &predicted,
+    };
+    step_svg(&plot, heading)
+}
+
+fn overlay(steps: &[(&str, &StepResponse)], heading: &str) -> Result<String, ReportError> {
+    let longest_s = steps
+        .iter()
+        .map(|(_, step)| drawn_s(step))
+        .fold(0.0, f64::max);
+    let points: Vec<Vec<(f64, f64)>> = steps
+        .iter()
+        .map(|(_, step)| step.measured_points(longest_s))
+        .collect();
+    let curves: Vec<StepCurve> = steps
+        .iter()
+        .zip(&points)
+        .map(|((name, _), points)| StepCurve { name, points })
+        .collect();
+    overlay_steps_svg(&curves, heading)
+}
+
+/// How much of a step is drawn: some settling times, measured or predicted.
+fn drawn_s(step: &StepResponse) -> f64 {
+    let measured_s = step
+        .metrics
+        .and_then(|metrics| metrics.step?.settling_time_s);
+    let predicted = step.predicted.as_ref();
+    let predicted_s = predicted.and_then(|predicted| predicted.metrics.settling_time_s);
+    let settling_s = measured_s
+        .into_iter()
+        .chain(predicted_s)
+        .fold(0.0, f64::max);
+    let whole_s = step.positions_m.len() as f64 * step.period_s;
+    let wanted_s = match settling_s > 0.0 {
+        true => SETTLING_TIMES * settling_s,
+        false => whole_s,
+    };
+    wanted_s.clamp(DRAWN_S.0, DRAWN_S.1).min(whole_s)
+}
+
+/// The signals of a single run. Several runs would hide each other.
+fn signals(runs: &[ComparedRun]) -> Result<String, ReportError> {
+    let [run] = runs else {
+        return Ok(String::new());
+    };
+    let overview = &run.overview;
+    let envelope = |extents: &[Extent]| -> Vec<(f64, f64, f64)> {
+        let extents = extents.iter();
+        extents.map(|e| (e.time_s, e.min, e.max)).collect()
+    };
+    let heading = "Signals";
+    let svg = signals_svg(
+        &envelope(&overview.reference_m),
+        &envelope(&overview.position_m),
+        &envelope(&overview.current_a),
+        heading,
+    )?;
+    Ok(section(heading, &picture(&svg, heading, SIGNALS_CAPTION)))
+}
+
+fn figures(steps: &[(&str, &StepResponse)]) -> String {
+    let header = [
+        "Recording",
+        "Step (µm)",
+        "Settling to 2 % (ms)",
+        "by the model",
+        "Overshoot (%)",
+        "by the model",
+        "Mean error (µm)",
+        "Sigma of the error (µm)",
+    ];
+    let rows: String = steps
+        .iter()
+        .map(|(name, step)| figure_row(name, step))
+        .collect();
+    let text = "A settling time is given if the band of 2 % is above three sigma of the error.";
+    note(text) + &table(&header, &rows)
+}
+
+fn figure_row(name: &str, step: &StepResponse) -> String {
+    let measured = step.metrics.and_then(|metrics| metrics.step);
+    let predicted = step.predicted.as_ref().map(|predicted| predicted.metrics);
+    let ms = |seconds: Option<f64>| seconds.map_or("none".into(), |s| format!("{:.1}", s * 1e3));
+    let percent = |value: Option<f64>| value.map_or("none".into(), |value| format!("{value:.1}"));
+    let um = |value: fn(&TrackingMetrics) -> f64| {
+        let value = step.metrics.as_ref().map(value);
+        value.map_or("none".into(), |metres| format!("{:.4}", metres * 1e6))
+    };
+    row(&[
+        name.into(),
+        format!("{:.3}", step.height_m * 1e6),
+        ms(measured.and_then(|step| step.settling_time_s)),
+        ms(predicted.and_then(|step| step.settling_time_s)),
+        percent(measured.map(|step| step.overshoot_percent)),
+        percent(predicted.map(|step| step.overshoot_percent)),
+        um(|metrics| metrics.steady_state_mean_error_m),
+        um(|metrics| metrics.steady_state_sigma_m),
+    ])
+}
