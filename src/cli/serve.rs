@@ -33,6 +33,10 @@ pub(super) struct Args {
     /// something needs the token that is printed
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
+    /// Also serve the channels of the recordings to Foxglove and Lichtblick: 127.0.0.1:8765. Everyone who reaches the
+    /// address may read; nobody can change anything there
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    foxglove: Option<SocketAddr>,
     /// Folder for the recordings
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     out: PathBuf,
@@ -52,6 +56,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         configuration,
         socket: args.socket.clone().unwrap_or_else(own_socket),
         listen: args.listen.or(args.demo.then_some(DEMO_ADDRESS)),
+        foxglove: args.foxglove,
         recordings: args.out.clone(),
         demo: args.demo,
     };
@@ -93,12 +98,15 @@ fn absolute_if_file(name: String) -> String {
 
 fn started_text(started: &Started) -> String {
     let page = started.page.as_ref().map(|page| labelled("page", page));
+    let foxglove = started.foxglove.map(|address| format!("ws://{address}"));
+    let foxglove = foxglove.map(|address| labelled("foxglove", &address));
     let file = started.token_file.as_ref();
     let file = file.map(|file| labelled("token", &format!("in {}", file.display())));
     format!(
-        "the daemon runs; Ctrl-C ends it\n{}{}{}",
+        "the daemon runs; Ctrl-C ends it\n{}{}{}{}",
         labelled("socket", &started.socket.display().to_string()),
         page.unwrap_or_default(),
+        foxglove.unwrap_or_default(),
         file.unwrap_or_default(),
     )
 }

@@ -5,6 +5,7 @@ use std::fmt::{Display, Write};
 use super::live::status::EDGES_US;
 use super::shared::Daemon;
 use crate::recording::free_bytes;
+use crate::rig::devices::CanAmplifier;
 use crate::rt::arming::State;
 
 /// The media type of the text.
@@ -56,6 +57,7 @@ pub fn text(daemon: &Daemon) -> String {
     out.begin("bench_build_info", "gauge", "Version of the daemon.");
     out.value("bench_build_info", &version, 1);
     write_loop(&mut out, daemon);
+    write_devices(&mut out, daemon);
     write_runs(&mut out, daemon);
     if let Some(bytes) = free_bytes(&daemon.recordings) {
         let help = "Free space in the folder of the recordings.";
@@ -139,6 +141,34 @@ fn write_loop(out: &mut Exposition, daemon: &Daemon) {
     }
 }
 
+/// Errors of the connections to the devices; nothing on a simulated stage.
+fn write_devices(out: &mut Exposition, daemon: &Daemon) {
+    let amplifier = &daemon.configuration().config.amplifier.device;
+    let address = amplifier.can().map(CanAmplifier::address);
+    if let Some(errors) = address.and_then(|can| interface_errors(can.interface)) {
+        let help = "Errors of the CAN interface, received and sent, as the kernel counts them.";
+        out.counter("bench_bus_errors_total", help, errors);
+    }
+    if let Some(serial) = daemon.owner.status().serial {
+        let counts = serial.statistics();
+        let errors = counts.damaged_bytes + counts.timeouts + counts.faults + counts.restarts;
+        let help = "Damaged bytes, missing answers, faults and restarts of the probe.";
+        out.counter("bench_serial_errors_total", help, errors);
+    }
+}
+
+/// Errors that the kernel has counted [Linux, Documentation/ABI/testing/sysfs-class-net-statistics]; `None` without the interface.
+fn interface_errors(interface: &str) -> Option<u64> {
+    if interface.contains('/') {
+        return None;
+    }
+    let count = |name: &str| -> Option<u64> {
+        let path = format!("/sys/class/net/{interface}/statistics/{name}");
+        std::fs::read_to_string(path).ok()?.trim().parse().ok()
+    };
+    Some(count("rx_errors")? + count("tx_errors")?)
+}
+
 fn write_runs(out: &mut Exposition, daemon: &Daemon) {
     out.begin("bench_runs_total", "counter", "Commands that have ended.");
     for ((command, outcome), count) in daemon.read(|schedule| schedule.ended().clone()) {
@@ -160,5 +190,17 @@ fn write_runs(out: &mut Exposition, daemon: &Daemon) {
             &format!("verdict=\"{verdict}\""),
             count,
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::interface_errors;
+
+    #[test]
+    fn an_interface_has_errors_and_an_absent_one_has_none() {
+        assert!(interface_errors("lo").is_some());
+        assert_eq!(interface_errors("none0"), None);
+        assert_eq!(interface_errors("../../lo"), None);
     }
 }

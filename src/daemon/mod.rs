@@ -4,6 +4,8 @@ mod api;
 mod catalogue;
 pub mod client;
 mod dispatch;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 pub mod http_client;
 mod lease;
 pub mod live;

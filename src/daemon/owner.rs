@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+use bench_hal::serial::StatisticsHandle;
 use tokio::sync::{mpsc, oneshot};
 
 use super::same_rig::require_same_rig;
@@ -52,6 +53,8 @@ pub struct RigStatus {
     pub scheduling: Scheduling,
     /// Pace of the loop.
     pub pace: Pace,
+    /// Counts of the serial port of the probe; `None` on a simulated stage.
+    pub serial: Option<StatisticsHandle>,
     /// Why the rig is not open.
     pub fault: Option<String>,
     /// Whether the devices are being opened, which takes up to some seconds.
@@ -79,6 +82,7 @@ impl Owner {
             names: None,
             scheduling: Scheduling::default(),
             pace: Pace::Realtime,
+            serial: None,
             fault: None,
             is_opening: true,
         }));
@@ -184,6 +188,7 @@ impl OwnerThread {
                 status.names = Some(bench.names().clone());
                 status.pace = Pace::Realtime;
                 status.scheduling = bench.scheduling().clone();
+                status.serial = bench.serial().cloned();
                 status.fault = None;
                 self.idle = Some(bench);
             }

@@ -15,7 +15,7 @@ use tokio::net::{TcpListener, UnixListener};
 use super::api::guard::{Guard, guard};
 use super::api::{Reach, router};
 use super::dispatch;
-use super::live::hub::LiveHub;
+use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
 use super::run_entry::{Carrier, Command, OnDisconnect, RunRequest};
 use super::run_record::{LastEnd, RunRecord, recover_cut_recordings};
@@ -41,6 +41,8 @@ pub struct ServeOptions {
     pub socket: PathBuf,
     /// An address for TCP.
     pub listen: Option<SocketAddr>,
+    /// An address for Foxglove and Lichtblick. Only with the feature `foxglove`.
+    pub foxglove: Option<SocketAddr>,
     /// Folder of the recordings.
     pub recordings: PathBuf,
     /// Whether a closed loop begins at once, on the simulated stage.
@@ -77,6 +79,19 @@ pub enum ServeError {
         /// The error of the operating system.
         why: io::Error,
     },
+    /// The address for viewers cannot be used.
+    #[error("cannot listen at {address}: {why}; choose another address with --foxglove")]
+    Foxglove {
+        /// The address.
+        address: SocketAddr,
+        /// Why.
+        why: String,
+    },
+    /// The program was built without the server for viewers.
+    #[error(
+        "this program was built without --foxglove; install the Debian package, or build with `--features foxglove`"
+    )]
+    WithoutFoxglove,
     /// The system refuses threads or random numbers.
     #[error("cannot start the daemon: {0}; look at the limits of the system")]
     System(String),
@@ -105,6 +120,8 @@ pub struct Started {
     pub socket: PathBuf,
     /// The address of the page with the token.
     pub page: Option<String>,
+    /// The address for Foxglove and Lichtblick.
+    pub foxglove: Option<SocketAddr>,
     /// The file with the token.
     pub token_file: Option<PathBuf>,
     /// Why the daemon started.
@@ -131,7 +148,8 @@ async fn serve_clients(
     let (token, token_file) = token(&options)?;
     let mut signals =
         StopSignals::listen().map_err(|error| ServeError::System(error.to_string()))?;
-    let daemon = start_daemon(&options, &recordings, reason.clone())?;
+    let (viewer, foxglove) = start_viewer(options.foxglove).await?.unzip();
+    let daemon = start_daemon(&options, &recordings, reason.clone(), viewer)?;
     let tasks = spawn_tasks(&daemon, unix, tcp.as_ref(), token.as_ref())?;
     if options.demo {
         start_demo(&daemon);
@@ -142,6 +160,7 @@ async fn serve_clients(
     started(&Started {
         socket: options.socket.clone(),
         page,
+        foxglove,
         token_file,
         reason,
     });
@@ -157,16 +176,45 @@ async fn serve_clients(
     Ok(())
 }
 
+/// The server for Foxglove and Lichtblick, with its address.
+#[cfg(feature = "foxglove")]
+async fn start_viewer(
+    address: Option<SocketAddr>,
+) -> Result<Option<(Box<dyn Viewer>, SocketAddr)>, ServeError> {
+    let Some(address) = address else {
+        return Ok(None);
+    };
+    let server = super::foxglove::FoxgloveServer::start(address).await;
+    let server = server.map_err(|error| ServeError::Foxglove {
+        address,
+        why: error.to_string(),
+    })?;
+    let address = server.address();
+    Ok(Some((Box::new(server), address)))
+}
+
+/// Without the feature there is no server.
+#[cfg(not(feature = "foxglove"))]
+async fn start_viewer(
+    address: Option<SocketAddr>,
+) -> Result<Option<(Box<dyn Viewer>, SocketAddr)>, ServeError> {
+    match address {
+        None => Ok(None),
+        Some(_) => Err(ServeError::WithoutFoxglove),
+    }
+}
+
 /// The threads of the rig and of the live view.
 fn start_daemon(
     options: &ServeOptions,
     recordings: &Path,
     start_reason: String,
+    viewer: Option<Box<dyn Viewer>>,
 ) -> Result<Arc<Daemon>, ServeError> {
     let system = |error: io::Error| ServeError::System(error.to_string());
     let config = options.configuration.config.clone();
     let (sender, feeds) = FeedSender::channel();
-    let live = LiveHub::start(&config, feeds, sender.clone()).map_err(system)?;
+    let live = LiveHub::start(&config, feeds, sender.clone(), viewer).map_err(system)?;
     let owner = Owner::start(config, sender).map_err(system)?;
     Ok(Arc::new(Daemon::new(Parts {
         owner,

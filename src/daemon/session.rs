@@ -8,6 +8,7 @@ use tokio::sync::{mpsc, oneshot};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::catalogue::RecordingInfo;
+use super::live::hub::LiveRun;
 use super::owner::OwnerOrder;
 use super::run_entry::{Carrier, Phase, RunOutcome};
 use super::schedule::{NewEntry, Schedule, ScheduleError};
@@ -201,6 +202,10 @@ impl Session {
         let (reply, replied) = oneshot::channel();
         let progress = Progress::new(order.kind.name());
         let plan = order.plan().ok().map(Arc::new);
+        let live_run = LiveRun {
+            number: u32::try_from(self.id).unwrap_or(u32::MAX),
+            kind: order.kind,
+        };
         let begun = self.daemon.change(|schedule, _| {
             let entry = schedule.open_entry(self.id)?;
             entry.phase = Phase::Running;
@@ -212,7 +217,7 @@ impl Session {
             Err(error) => return self.connection.send(&refused(error.to_string())).await,
         };
         self.daemon.set_plan(plan);
-        self.daemon.live.set_run(self.id);
+        self.daemon.live.set_run(live_run);
         self.daemon.owner.run(OwnerOrder {
             command: self.id,
             order,

@@ -2,7 +2,7 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -77,12 +77,15 @@ fn is_outside(arg: &str) -> bool {
             .any(|part| part.as_os_str() == "..")
 }
 
+/// Commands that take the configuration from the recording.
+const WITHOUT_CONFIG: [&str; 2] = ["identify", "report"];
+
 /// The program of the daemon itself, with arguments. The configuration of the daemon applies unless the client names another.
 fn process(daemon: &Daemon, command: &str, args: &[String]) -> io::Result<Process> {
     let program = std::env::current_exe()?;
     let mut process = Process::new(program);
     process.arg(command);
-    if command != "identify" {
+    if !WITHOUT_CONFIG.contains(&command) {
         process.args(source_args(&daemon.configuration().source, args));
     }
     process
@@ -188,14 +191,35 @@ pub async fn compute(
 ) -> Result<serde_json::Value, ComputeError> {
     let (name, more) = command.split_first().unwrap_or((&"doctor", &[]));
     let mut process = process_with(daemon, name, more, args)?;
-    let child: Child = process.arg("--json").spawn()?;
+    let output = printed(process.arg("--json")).await?;
+    serde_json::from_slice(&output.stdout).map_err(|_| ComputeError::of(&output))
+}
+
+/// The page of recordings as HTML.
+///
+/// # Errors
+/// When the process cannot be started, takes too long, or draws nothing.
+pub async fn page(daemon: &Daemon, files: &[String]) -> Result<String, ComputeError> {
+    let mut process = process(daemon, "report", files)?;
+    let output = printed(process.args(["--out", "-"])).await?;
+    match output.status.success() {
+        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
+        false => Err(ComputeError::of(&output)),
+    }
+}
+
+/// Runs a process to its end, and ends it if it takes too long.
+async fn printed(process: &mut Process) -> Result<Output, ComputeError> {
+    let child: Child = process.spawn()?;
     let ended = tokio::time::timeout(COMPUTATION, child.wait_with_output()).await;
-    let output = ended.map_err(|_| ComputeError::TooLong)??;
-    let json = serde_json::from_slice(&output.stdout);
-    json.map_err(|_| {
+    Ok(ended.map_err(|_| ComputeError::TooLong)??)
+}
+
+impl ComputeError {
+    fn of(output: &Output) -> ComputeError {
         let errors = String::from_utf8_lossy(&output.stderr);
         ComputeError::NoResult(errors.lines().last().unwrap_or("no output").into())
-    })
+    }
 }
 
 fn process_with(

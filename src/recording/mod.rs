@@ -38,6 +38,7 @@ mod digest;
 mod disk;
 mod error;
 mod event_message;
+mod live_encoder;
 mod log_time;
 mod losses;
 pub mod messages;
@@ -60,9 +61,11 @@ pub use disk::{
 };
 pub use error::{Emptiness, RecordingError};
 pub use event_message::event_text;
+pub use live_encoder::{EncodedMessage, LiveEncoder};
 pub use losses::{Cut, DamagedRange, MissingTicks};
 pub use reader::{Recording, StoredAttachment};
 pub use recover::{Recovered, recover};
+pub use schema::descriptor_set;
 pub use stream::Ticks;
 pub use sync::Syncable;
 pub use thread::{Health, LiveCopy, RecorderHandle, spawn};
@@ -80,16 +83,21 @@ const RECOVERED: &str = "recovered";
 
 /// The channels of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Topic {
+pub enum Topic {
+    /// A message for each tick.
     Loop,
+    /// Changes and their reasons.
     Event,
+    /// A message for each second.
     Timing,
 }
 
 impl Topic {
-    const ALL: [Topic; 3] = [Topic::Loop, Topic::Event, Topic::Timing];
+    /// All channels.
+    pub const ALL: [Topic; 3] = [Topic::Loop, Topic::Event, Topic::Timing];
 
-    fn name(self) -> &'static str {
+    /// Its name.
+    pub fn name(self) -> &'static str {
         match self {
             Topic::Loop => "/loop",
             Topic::Event => "/event",
@@ -97,7 +105,8 @@ impl Topic {
         }
     }
 
-    fn schema_name(self) -> &'static str {
+    /// Name of its message in the schema.
+    pub fn schema_name(self) -> &'static str {
         match self {
             Topic::Loop => "bench.Loop",
             Topic::Event => "bench.Event",

@@ -4,7 +4,7 @@ use aide::OperationInput;
 use aide::generate::GenContext;
 use aide::openapi::Operation;
 use axum::Json;
-use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
@@ -61,6 +61,29 @@ impl<S: Send + Sync, T: DeserializeOwned + Send> FromRequestParts<S> for InPath<
 impl<T: JsonSchema> OperationInput for InPath<T> {
     fn operation_input(context: &mut GenContext, operation: &mut Operation) {
         Path::<T>::operation_input(context, operation);
+    }
+}
+
+/// Parts of the query, after `?`.
+pub struct InQuery<T>(pub T);
+
+impl<S: Send + Sync, T: DeserializeOwned> FromRequestParts<S> for InQuery<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, ApiError> {
+        match Query::<T>::from_request_parts(parts, state).await {
+            Ok(Query(value)) => Ok(InQuery(value)),
+            Err(rejection) => Err(ApiError::bad_request(format!(
+                "the query cannot be used: {}; see /api/v1/openapi.json for its form",
+                rejection.body_text()
+            ))),
+        }
+    }
+}
+
+impl<T: JsonSchema> OperationInput for InQuery<T> {
+    fn operation_input(context: &mut GenContext, operation: &mut Operation) {
+        Query::<T>::operation_input(context, operation);
     }
 }
 

@@ -11,14 +11,17 @@ use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
+use super::extract::InQuery;
 use super::views::{StateView, state};
 use crate::daemon::live::event_text::EventView;
 use crate::daemon::live::hub::LiveMessage;
+use crate::daemon::live::response::ResponseView;
 use crate::daemon::session;
 use crate::daemon::shared::Daemon;
 
@@ -43,17 +46,35 @@ enum TextMessage<'a> {
         #[serde(flatten)]
         event: &'a EventView,
     },
+    Response {
+        response: &'a ResponseView,
+    },
     Lagged {
         frames: u64,
     },
 }
 
+/// What a client of the WebSocket asks for.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct LiveQuery {
+    /// Whether the samples of the last ten minutes are sent first, in blocks of 64 ticks.
+    #[serde(default)]
+    history: bool,
+}
+
+/// The response of the stage during the last chirp; `null` before the first one.
+pub async fn response(State(daemon): State<Arc<Daemon>>) -> Json<Option<ResponseView>> {
+    let response = daemon.live.snapshot().response;
+    Json(response.map(|response| ResponseView::clone(&response)))
+}
+
 /// Upgrades to a WebSocket: states and events as JSON text, samples as binary messages.
 pub async fn web_socket(
     State(daemon): State<Arc<Daemon>>,
+    InQuery(query): InQuery<LiveQuery>,
     NoApi(upgrade): NoApi<WebSocketUpgrade>,
 ) -> Response {
-    upgrade.on_upgrade(|socket| serve(daemon, socket))
+    upgrade.on_upgrade(move |socket| serve(daemon, socket, query))
 }
 
 /// Upgrades to the connection of a command of this machine.
@@ -64,13 +85,10 @@ pub async fn command(
     upgrade.on_upgrade(|socket| session::serve(daemon, socket))
 }
 
-async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket) {
+async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {
     let mut source = Source::new(Arc::clone(&daemon));
-    for event in &daemon.live.snapshot().events {
-        if send(&mut socket, text(&TextMessage::Event { event }))
-            .await
-            .is_err()
-        {
+    for message in first_messages(&daemon, &query) {
+        if send(&mut socket, message).await.is_err() {
             return;
         }
     }
@@ -87,6 +105,21 @@ async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket) {
             return;
         }
     }
+}
+
+/// What a client gets that was sent before it connected.
+fn first_messages(daemon: &Daemon, query: &LiveQuery) -> Vec<Message> {
+    let history = match query.history {
+        true => daemon.live.history(),
+        false => Vec::new(),
+    };
+    let snapshot = daemon.live.snapshot();
+    let events = snapshot.events.iter();
+    let events = events.map(|event| text(&TextMessage::Event { event }));
+    let response = snapshot.response.iter();
+    let response = response.map(|response| text(&TextMessage::Response { response }));
+    let history = history.into_iter().map(Message::Binary);
+    history.chain(events).chain(response).collect()
 }
 
 /// Fails when the client is gone, or takes nothing for too long.
@@ -123,6 +156,7 @@ impl Source {
             message = self.messages.recv() => match message {
                 Ok(LiveMessage::Samples(bytes)) => Some(Message::Binary(bytes)),
                 Ok(LiveMessage::Event(event)) => Some(text(&TextMessage::Event { event: &event })),
+                Ok(LiveMessage::Response(response)) => Some(text(&TextMessage::Response { response: &response })),
                 Err(RecvError::Lagged(frames)) => Some(text(&TextMessage::Lagged { frames })),
                 Err(RecvError::Closed) => None,
             },

@@ -12,14 +12,19 @@ use tower::ServiceExt;
 use tower_http::services::ServeFile;
 
 use super::error::ApiError;
-use super::extract::{Body, InPath};
+use super::extract::{Body, InPath, InQuery};
 use crate::daemon::catalogue::{ListedRecording, RecordingInfo};
 use crate::daemon::shared::Daemon;
+use crate::daemon::worker;
 use crate::experiment::ErrorKind;
 use crate::recording::Recording;
 
 /// Longest name and note in bytes.
 const MAX_TEXT: usize = 10_000;
+/// Most recordings on one page: the curves of more cannot be told apart.
+const MAX_COMPARED: usize = 12;
+/// The script of a report gets no access to the token of the page.
+const REPORT_POLICY: &str = "sandbox allow-scripts";
 
 /// The recordings, newest first.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -58,11 +63,40 @@ pub async fn download(
         Err(never) => match never {},
     };
     // The script of a report cannot use the token of the page.
-    let policy = HeaderValue::from_static("sandbox allow-scripts");
-    response
-        .headers_mut()
-        .insert(header::CONTENT_SECURITY_POLICY, policy);
+    let policy = HeaderValue::from_static(REPORT_POLICY);
+    let headers = response.headers_mut();
+    headers.insert(header::CONTENT_SECURITY_POLICY, policy);
     Ok(response)
+}
+
+/// Which recordings are drawn.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct ReportQuery {
+    /// File names of recordings, separated by commas.
+    files: String,
+}
+
+/// A page with the frequency responses and steps of one or several recordings, as `bench report`.
+pub async fn report(
+    State(daemon): State<Arc<Daemon>>,
+    InQuery(query): InQuery<ReportQuery>,
+) -> Result<Response, ApiError> {
+    let files: Vec<String> = query.files.split(',').map(String::from).collect();
+    if files.len() > MAX_COMPARED {
+        return Err(ApiError::bad_request(format!(
+            "{} recordings are too many for one page; choose at most {MAX_COMPARED}",
+            files.len()
+        )));
+    }
+    for file in &files {
+        require(&daemon, file)?;
+    }
+    let page = worker::page(&daemon, &files).await?;
+    let headers = [
+        (header::CONTENT_TYPE, "text/html; charset=utf-8"),
+        (header::CONTENT_SECURITY_POLICY, REPORT_POLICY),
+    ];
+    Ok((headers, page).into_response())
 }
 
 /// Removes a recording and the files computed from it.

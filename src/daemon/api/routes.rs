@@ -117,6 +117,16 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             ),
         )
         .api_route(
+            "/api/v1/response",
+            get_with(
+                live::response,
+                named(
+                    "response",
+                    "The response of the stage during the last chirp, as it grows",
+                ),
+            ),
+        )
+        .api_route(
             "/api/v1/lease",
             post_with(lease::take, named("takeLease", "Take the arm lease"))
                 .put_with(lease::renew, named("renewLease", "Renew the arm lease"))
@@ -187,6 +197,16 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         .api_route(
             "/api/v1/recordings",
             get_with(recordings::list, named("recordings", "List the recordings")),
+        )
+        .api_route(
+            "/api/v1/report",
+            get_with(
+                recordings::report,
+                named(
+                    "report",
+                    "Page (HTML) with the frequency responses and steps of recordings",
+                ),
+            ),
         )
         .api_route(
             "/api/v1/recordings/{file}",

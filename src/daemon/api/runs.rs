@@ -74,6 +74,7 @@ pub async fn start(
         Ok::<_, ApiError>(lease.operator.clone())
     })?;
     check_args(&request.args)?;
+    let (command, args) = (request.command, request.args.clone());
     let new = NewEntry {
         request,
         carrier: Carrier::Started { ticket: random()? },
@@ -84,7 +85,21 @@ pub async fn start(
         let id = schedule.enqueue(new, now)?;
         schedule.entry(id).map(RunView::from)
     })?;
+    tokio::spawn(estimate(daemon, view.id, command, args));
     Ok((StatusCode::ACCEPTED, Json(view)))
+}
+
+/// Adds the length of a command by its plan. A command without a plan has none.
+async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<String>) {
+    args.push("--plan".into());
+    let computed = worker::compute(&daemon, &[command.name()], &args).await;
+    let plan = computed.unwrap_or_default();
+    let length_s = plan["expected"]["duration_s"].as_f64();
+    daemon.change(|schedule, _| {
+        if let Ok(entry) = schedule.open_entry(id) {
+            entry.estimated_s = entry.estimated_s.or(length_s);
+        }
+    });
 }
 
 /// How a run is stopped.

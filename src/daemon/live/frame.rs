@@ -14,10 +14,11 @@ const VERSION: u8 = 1;
 /// The signals of a tick. What is not known is not a number.
 pub type Sample = [f32; SIGNALS];
 
-/// The signals of a tick. Without a valid reading there is neither position nor error; without a loop there is no error.
-pub fn sample(tick: &TickRecord) -> Sample {
+/// The signals of a tick of a closed loop or of another run. Without a valid reading there is neither position nor error; without
+/// a closed loop there is no error.
+pub fn sample(tick: &TickRecord, is_closed: bool) -> Sample {
     let is_valid = tick.validity == Validity::Valid;
-    let is_active = tick.flags & flag::ACTIVE != 0;
+    let is_active = is_closed && tick.flags & flag::ACTIVE != 0;
     let known = |value: f64, is_known: bool| match is_known {
         true => value as f32,
         false => f32::NAN,
@@ -75,10 +76,15 @@ pub struct Frame {
 impl Frame {
     /// An empty frame that begins at a tick.
     pub fn new(start_s: f64, tick_s: f64, run: u32) -> Frame {
+        Frame::with_blocks(start_s, tick_s, run, 1)
+    }
+
+    /// An empty frame with a number of ticks in each block.
+    pub fn with_blocks(start_s: f64, tick_s: f64, run: u32, block_ticks: u32) -> Frame {
         Frame {
             start_s,
             tick_s,
-            block_ticks: 1,
+            block_ticks,
             run,
             last_block_ticks: 0,
             blocks: Vec::new(),
@@ -94,6 +100,16 @@ impl Frame {
     pub fn ticks(&self) -> u64 {
         let whole = self.blocks.len().saturating_sub(1) as u64;
         whole * u64::from(self.block_ticks) + u64::from(self.last_block_ticks)
+    }
+
+    /// End of its last tick in seconds since the daemon started.
+    pub fn end_s(&self) -> f64 {
+        self.start_s + self.ticks() as f64 * self.tick_s
+    }
+
+    /// Whether a tick of a run follows its last one.
+    pub fn continues(&self, time_s: f64, run: u32) -> bool {
+        self.run == run && (time_s - self.end_s()).abs() < 0.5 * self.tick_s
     }
 
     /// Adds the next tick. A frame with too many blocks gets blocks of twice the length.
@@ -216,7 +232,7 @@ mod tests {
             validity: Validity::Missing,
             ..TickRecord::default()
         };
-        let [reference, position, error, current] = sample(&tick);
+        let [reference, position, error, current] = sample(&tick, true);
         assert_eq!((reference, current), (2.0, 0.0));
         assert!(position.is_nan() && error.is_nan());
     }

@@ -5,19 +5,24 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use bytes::Bytes;
 use tokio::sync::broadcast;
 
 use super::event_text::EventView;
-use super::frame::{Frame, sample};
+use super::frame::{Frame, Sample, sample};
+use super::history::History;
+use super::response::ResponseView;
 use super::status::{LatenessTotals, Status};
 pub use super::status::{LoopView, Share, TripView};
 use crate::config::Config;
-use crate::experiment::{Feed, FeedSender, FeedSource};
-use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use crate::experiment::{Feed, FeedSender, FeedSource, RunKind};
+use crate::identify::GrowingResponse;
+use crate::recording::{EncodedMessage, LiveEncoder};
+use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use crate::util::thread_priority::lower;
+use crate::util::timestamp::unix_ns;
 
 /// Period of the thread.
 const PERIOD: Duration = Duration::from_millis(5);
@@ -32,6 +37,12 @@ const KEPT_EVENTS: usize = 200;
 /// Less urgent than the recorder's source, the loop, and as urgent as the recorder.
 const NICE: i32 = 10;
 
+/// Somebody who takes the messages of the recordings while the loop goes on. It must not block.
+pub trait Viewer: Send {
+    /// Takes a message.
+    fn show(&self, message: &EncodedMessage);
+}
+
 /// A message to all clients.
 #[derive(Clone, Debug)]
 pub enum LiveMessage {
@@ -39,6 +50,8 @@ pub enum LiveMessage {
     Samples(Bytes),
     /// An event.
     Event(Arc<EventView>),
+    /// The response of the stage so far.
+    Response(Arc<ResponseView>),
 }
 
 /// The status at one moment.
@@ -56,6 +69,17 @@ pub struct LiveSnapshot {
     pub trips: BTreeMap<&'static str, u64>,
     /// The last events, oldest first.
     pub events: VecDeque<Arc<EventView>>,
+    /// The response of the stage during the last chirp.
+    pub response: Option<Arc<ResponseView>>,
+}
+
+/// The run to which the next messages belong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LiveRun {
+    /// Its number.
+    pub number: u32,
+    /// Its kind.
+    pub kind: RunKind,
 }
 
 /// The hub. Dropping it ends its thread.
@@ -67,13 +91,14 @@ pub struct LiveHub {
 struct Shared {
     snapshot: Mutex<LiveSnapshot>,
     messages: broadcast::Sender<LiveMessage>,
+    history: Mutex<History>,
     ticks: AtomicU64,
-    run: AtomicU64,
+    run: Mutex<Option<LiveRun>>,
     ends: AtomicBool,
 }
 
 impl LiveHub {
-    /// Starts the thread. `sender` counts the messages that it could not take.
+    /// Starts the thread. `sender` counts the messages that it could not take. `viewer` takes what recordings contain.
     ///
     /// # Errors
     /// When the system refuses the thread.
@@ -81,15 +106,17 @@ impl LiveHub {
         config: &Config,
         feeds: Receiver<Feed>,
         sender: FeedSender,
+        viewer: Option<Box<dyn Viewer>>,
     ) -> std::io::Result<LiveHub> {
         let shared = Arc::new(Shared {
             snapshot: Mutex::default(),
             messages: broadcast::Sender::new(BACKLOG),
+            history: Mutex::default(),
             ticks: AtomicU64::new(0),
-            run: AtomicU64::new(0),
+            run: Mutex::default(),
             ends: AtomicBool::new(false),
         });
-        let mut follower = Follower::new(config, sender, Arc::clone(&shared));
+        let mut follower = Follower::new(config, sender, viewer, Arc::clone(&shared));
         follower.show();
         let builder = std::thread::Builder::new().name("bench-live".into());
         let thread = builder.spawn(move || follower.serve(&feeds))?;
@@ -109,14 +136,19 @@ impl LiveHub {
         self.shared.messages.subscribe()
     }
 
+    /// The last ten minutes as messages with samples, oldest first.
+    pub fn history(&self) -> Vec<Bytes> {
+        lock(&self.shared.history).encode()
+    }
+
     /// Ticks of the loop so far, to see whether it goes on.
     pub fn ticks(&self) -> u64 {
         self.shared.ticks.load(Ordering::Relaxed)
     }
 
-    /// Sets the number of the run to which the next messages belong.
-    pub fn set_run(&self, run: u64) {
-        self.shared.run.store(run, Ordering::Relaxed);
+    /// Sets the run to which the next messages belong.
+    pub fn set_run(&self, run: LiveRun) {
+        *lock(&self.shared.run) = Some(run);
     }
 
     /// The operator has seen the trip.
@@ -136,26 +168,47 @@ impl Drop for LiveHub {
 
 impl Shared {
     fn snapshot(&self) -> MutexGuard<'_, LiveSnapshot> {
-        self.snapshot.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.snapshot)
     }
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A feed that is being read, with its place in the time of the daemon.
 struct OpenFeed {
     feed: Feed,
-    run: u32,
+    /// `None` between two runs.
+    run: Option<LiveRun>,
     /// Time of its tick 0 in seconds since the daemon started; `None` before its first tick.
     begin_s: Option<f64>,
+    /// Encodes its messages for the viewer.
+    encoder: LiveEncoder,
+}
+
+impl OpenFeed {
+    /// Number of the run; 0 between two runs.
+    fn number(&self) -> u32 {
+        self.run.map_or(0, |run| run.number)
+    }
+
+    fn is_of(&self, kind: RunKind) -> bool {
+        self.run.is_some_and(|run| run.kind == kind)
+    }
 }
 
 /// The state of the thread.
 struct Follower {
     status: Status,
     sender: FeedSender,
+    viewer: Option<Box<dyn Viewer>>,
     shared: Arc<Shared>,
     started: Instant,
     feeds: Vec<OpenFeed>,
     frame: Option<Frame>,
+    /// The response of the stage during a chirp.
+    growing: Option<GrowingResponse>,
     /// End of the last tick in seconds since the daemon started.
     end_s: f64,
     framed: Instant,
@@ -163,15 +216,22 @@ struct Follower {
 }
 
 impl Follower {
-    fn new(config: &Config, sender: FeedSender, shared: Arc<Shared>) -> Follower {
+    fn new(
+        config: &Config,
+        sender: FeedSender,
+        viewer: Option<Box<dyn Viewer>>,
+        shared: Arc<Shared>,
+    ) -> Follower {
         let started = Instant::now();
         Follower {
             status: Status::new(config),
             sender,
+            viewer,
             shared,
             started,
             feeds: Vec::new(),
             frame: None,
+            growing: None,
             end_s: 0.0,
             framed: started,
             shown: started,
@@ -199,17 +259,23 @@ impl Follower {
 
     fn open(&mut self, feed: Feed) {
         let run = match feed.source {
-            FeedSource::Run => self.shared.run.load(Ordering::Relaxed) as u32,
-            FeedSource::Idle => 0,
+            FeedSource::Run => *lock(&self.shared.run),
+            FeedSource::Idle => None,
         };
         if feed.source == FeedSource::Run {
             self.shared.snapshot().trip = None;
         }
-        self.feeds.push(OpenFeed {
+        let feed = OpenFeed {
+            encoder: LiveEncoder::new(feed.period_s, unix_ns(SystemTime::now())),
             feed,
             run,
             begin_s: None,
-        });
+        };
+        if feed.is_of(RunKind::Chirp) {
+            self.growing = Some(GrowingResponse::new(1.0 / feed.feed.period_s));
+            self.shared.snapshot().response = None;
+        }
+        self.feeds.push(feed);
     }
 
     /// Reads everything that is in the rings. A ring that is empty and abandoned is closed.
@@ -217,6 +283,7 @@ impl Follower {
         let mut feeds = std::mem::take(&mut self.feeds);
         for feed in &mut feeds {
             while let Ok(message) = feed.feed.messages.pop() {
+                self.show_viewer(&message, feed);
                 match message {
                     LoopMessage::Tick(tick) => self.tick(&tick, feed),
                     LoopMessage::Event(event) => self.event(&event, feed),
@@ -225,6 +292,15 @@ impl Follower {
         }
         feeds.retain(|feed| !feed.feed.messages.is_abandoned() || !feed.feed.messages.is_empty());
         self.feeds = feeds;
+    }
+
+    fn show_viewer(&self, message: &LoopMessage, feed: &mut OpenFeed) {
+        let Some(viewer) = &self.viewer else {
+            return;
+        };
+        for encoded in feed.encoder.encode(message) {
+            viewer.show(&encoded);
+        }
     }
 
     /// The time of a tick since the daemon started. Each run counts its ticks from 0: its first tick has the time of its arrival, or
@@ -247,25 +323,41 @@ impl Follower {
             feed.begin_s = None;
             time_s = self.time_s(tick.tick, feed);
         }
-        self.status.tick(tick);
-        self.add_sample(tick, time_s, feed);
+        let is_closed = feed.is_of(RunKind::Control);
+        self.status.tick(tick, is_closed);
+        self.add_sample(sample(tick, is_closed), time_s, feed);
+        if feed.is_of(RunKind::Chirp) {
+            self.add_to_response(tick, feed.number());
+        }
         self.end_s = time_s + feed.feed.period_s;
     }
 
     /// Adds a tick to the frame; a gap or another run begins a new frame.
-    fn add_sample(&mut self, tick: &TickRecord, time_s: f64, feed: &OpenFeed) {
-        let period_s = feed.feed.period_s;
-        let follows = self.frame.as_ref().is_some_and(|frame| {
-            let expected_s = frame.start_s + frame.ticks() as f64 * period_s;
-            frame.run == feed.run && (time_s - expected_s).abs() < 0.5 * period_s
-        });
-        if !follows {
+    fn add_sample(&mut self, sample: Sample, time_s: f64, feed: &OpenFeed) {
+        let (period_s, run) = (feed.feed.period_s, feed.number());
+        lock(&self.shared.history).push(sample, time_s, period_s, run);
+        let frame = self.frame.as_ref();
+        if !frame.is_some_and(|frame| frame.continues(time_s, run)) {
             self.send_frame();
         }
         let frame = self
             .frame
-            .get_or_insert_with(|| Frame::new(time_s, period_s, feed.run));
-        frame.push(sample(tick));
+            .get_or_insert_with(|| Frame::new(time_s, period_s, run));
+        frame.push(sample);
+    }
+
+    /// Adds a tick of a chirp to the response, while the excitation is on.
+    fn add_to_response(&mut self, tick: &TickRecord, run: u32) {
+        let Some(growing) = self.growing.as_mut() else {
+            return;
+        };
+        let is_usable = tick.flags & flag::ACTIVE != 0 && tick.position_m.is_finite();
+        if !is_usable || !growing.push(tick.command_a, tick.position_m) {
+            return;
+        }
+        let view = Arc::new(ResponseView::of(&growing.points(), run));
+        self.shared.snapshot().response = Some(Arc::clone(&view));
+        let _ = self.shared.messages.send(LiveMessage::Response(view));
     }
 
     fn send_frame(&mut self) {
@@ -284,7 +376,7 @@ impl Follower {
             EventKind::Trip(trip) => {
                 let mut snapshot = self.shared.snapshot();
                 *snapshot.trips.entry(trip.reason()).or_default() += 1;
-                snapshot.trip = Some(TripView::of(&trip, time_s, feed.run));
+                snapshot.trip = Some(TripView::of(&trip, time_s, feed.number()));
             }
             // Between two runs nothing is recorded.
             EventKind::Lost { records } if feed.feed.source == FeedSource::Run => {
@@ -297,7 +389,7 @@ impl Follower {
             | EventKind::Completed
             | EventKind::Clock(_) => {}
         }
-        let Some(view) = EventView::of(event, time_s, feed.run).map(Arc::new) else {
+        let Some(view) = EventView::of(event, time_s, feed.number()).map(Arc::new) else {
             return;
         };
         let _ = self

@@ -7,5 +7,7 @@
 
 pub mod event_text;
 pub mod frame;
+mod history;
 pub mod hub;
+pub mod response;
 pub mod status;

@@ -207,6 +207,8 @@ pub struct Status {
     limits: Limits,
     rate_hz: f64,
     last: TickRecord,
+    /// Whether the last tick belongs to a closed loop.
+    is_closed: bool,
     ticks: u64,
     overruns: u64,
     lost_records: u64,
@@ -237,6 +239,7 @@ impl Status {
             },
             rate_hz,
             last: TickRecord::default(),
+            is_closed: false,
             ticks: 0,
             overruns: 0,
             lost_records: 0,
@@ -265,8 +268,8 @@ impl Status {
         self.compute.clear();
     }
 
-    /// Takes a tick. thermal(n) = thermal(n-1) + (i^2 - thermal(n-1)) T / tau, as in the interlocks.
-    pub fn tick(&mut self, tick: &TickRecord) {
+    /// Takes a tick of a closed loop or of another run. thermal(n) = thermal(n-1) + (i^2 - thermal(n-1)) T / tau, as in the interlocks.
+    pub fn tick(&mut self, tick: &TickRecord, is_closed: bool) {
         self.ticks += 1;
         self.overruns += u64::from(tick.missed_ticks);
         let current_a = tick.actual_a.unwrap_or(tick.command_a);
@@ -280,6 +283,7 @@ impl Status {
         self.lateness_totals.add(late_ns);
         self.compute.add(tick.done_ns.saturating_sub(tick.woke_ns));
         self.last = *tick;
+        self.is_closed = is_closed && tick.flags & flag::ACTIVE != 0;
     }
 
     /// Records that did not fit into the ring.
@@ -296,7 +300,6 @@ impl Status {
     pub fn view(&self) -> LoopView {
         let tick = &self.last;
         let is_valid = tick.validity == bench_hal::Validity::Valid && tick.position_m.is_finite();
-        let is_active = tick.flags & flag::ACTIVE != 0;
         let position_m = is_valid.then_some(tick.position_m);
         LoopView {
             state: tick.state.name().into(),
@@ -307,7 +310,7 @@ impl Status {
             reference_m: tick.reference_m,
             position_m,
             error_m: position_m
-                .filter(|_| is_active)
+                .filter(|_| self.is_closed)
                 .map(|position_m| tick.reference_m - position_m),
             current_a: tick.command_a,
             probe_age_s: tick.probe_age_ns as f64 * 1e-9,
