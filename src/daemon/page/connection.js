@@ -38,7 +38,7 @@ export async function ask(method, path, body, lease) {
 export function follow(handler) {
   let failures = 0;
   const open = () => {
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/v1/live`);
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/api/v1/live?history=true`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { failures = 0; handler.onopen(); };
     socket.onmessage = (message) => {

@@ -1,11 +1,26 @@
 // Axes and colours of the plots on canvas.
 
-/** The colour of a name in page.css. */
+const probe = document.createElement("span");
+probe.hidden = true;
+document.documentElement.append(probe);
+
+const colours = new Map();
+
+/** The colour of a name in page.css, in the theme of the page. */
 export function colour(name) {
-  return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+  if (!colours.has(name)) {
+    probe.style.color = `var(--${name})`;
+    colours.set(name, getComputedStyle(probe).color);
+  }
+  return colours.get(name);
 }
 
-/** The context of a canvas in the pixels of the screen, with its size in CSS pixels. */
+/** The theme has changed. */
+export function forgetColours() {
+  colours.clear();
+}
+
+/** The context of a canvas in the pixels of the screen, with its size and the size of its font in CSS pixels. */
 export function begin(canvas) {
   const scale = window.devicePixelRatio || 1;
   const width = canvas.clientWidth, height = canvas.clientHeight;
@@ -16,8 +31,9 @@ export function begin(canvas) {
   const context = canvas.getContext("2d");
   context.setTransform(scale, 0, 0, scale, 0, 0);
   context.clearRect(0, 0, width, height);
-  context.font = `${getComputedStyle(canvas).fontSize} system-ui, sans-serif`;
-  return { context, width, height };
+  const em = parseFloat(getComputedStyle(canvas).fontSize);
+  context.font = `${em}px system-ui, sans-serif`;
+  return { context, width, height, em };
 }
 
 /** Round values that divide a range into about `count` parts. */
@@ -46,7 +62,7 @@ export function axes(context, box, x, y) {
   context.fillStyle = colour("soft");
   context.textAlign = "right";
   context.textBaseline = "middle";
-  const rows = ticks(y.from, y.to, Math.max(2, box.height / 40));
+  const rows = ticks(y.from, y.to, Math.max(4, box.height / 40));
   for (const value of rows) {
     line(context, box.left, toY(value), box.left + box.width, toY(value));
     context.fillText(y.text ? y.text(value) : label(value, rows.length > 1 ? rows[1] - rows[0] : 1), box.left - 6, toY(value));

@@ -1,9 +1,10 @@
 // The live page: connects the panels with the daemon.
 
 import { ask, follow, token } from "/page/connection.js";
-import { quantity } from "/page/drawing.js";
+import { forgetColours, quantity } from "/page/drawing.js";
 import { Lease } from "/page/lease.js";
-import { showRecordings, showResult } from "/page/recordings.js";
+import { compare, showRecordings, showResult } from "/page/recordings.js";
+import { Response } from "/page/response.js";
 import { formArguments, planRows, showFields, table } from "/page/run_form.js";
 import { Samples } from "/page/samples.js";
 import { Scope } from "/page/scope.js";
@@ -21,6 +22,7 @@ const TWICE_MS = 1500;
 const samples = new Samples();
 const scope = new Scope(byId("scope"), byId("scope-readout"), samples);
 const spectrum = new Spectrum(byId("spectrum"), byId("spectrum-readout"), byId("spectrum-text"), samples);
+const response = new Response(byId("response"), byId("response-readout"));
 const lease = new Lease();
 let state = null, receivedMs = 0, waitsUntilMs = 0, planned = "", finishedRun = null, stoppedMs = -Infinity;
 
@@ -30,6 +32,7 @@ function onMessage(message) {
   receivedMs = performance.now();
   if (message.type === "state") showState(message.state);
   if (message.type === "event") addEvent(message);
+  if (message.type === "response") showResponse(message.response);
   if (message.type === "lagged") addEvent({ time_s: samples.endS, kind: "lost", text: `this page was too slow: ${message.frames} frames are not shown; the recording is complete` });
 }
 
@@ -63,6 +66,12 @@ function addEvent(event) {
 }
 
 /* --- panels --- */
+
+function showResponse(next) {
+  byId("response-panel").hidden = false;
+  setText("response-text", `Chirp of run ${next.run}: estimate so far, with the delay of the loop. The result is computed after the run.`);
+  response.show(next);
+}
 
 function setText(id, text) {
   const element = byId(id);
@@ -147,7 +156,7 @@ function showRun() {
 }
 
 function showQueue() {
-  const list = byId("queue"), key = JSON.stringify(state.queue.map((run) => [run.id, run.phase]));
+  const list = byId("queue"), key = JSON.stringify(state.queue.map((run) => [run.id, run.phase, run.estimated_s]));
   if (list.dataset.key === key) return;
   list.dataset.key = key;
   list.replaceChildren(...state.queue.map((run) => {
@@ -312,7 +321,10 @@ function onKey(event) {
   }
   if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
   const actions = { p: () => byId("pause").click(), l: () => byId("lease-button").click(), "?": () => document.querySelector("footer").scrollIntoView() };
-  actions[event.key]?.();
+  const action = actions[event.key];
+  if (!action) return;
+  event.preventDefault(); // the key is not typed into the dialog that it opens
+  action();
 }
 
 /* --- start --- */
@@ -325,12 +337,39 @@ function showAge() {
   else setText("age", receivedMs === 0 ? "no connection to the daemon yet" : `these data are ${(ageMs / 1000).toFixed(0)} s old${waits > 0 ? `; next attempt in ${waits} s` : ""}`);
 }
 
+/** The span of the scope after a zoom: one of the list, or another one. */
+function showSpan() {
+  const text = `${+scope.spanS.toPrecision(3)} s`, other = byId("span-other");
+  const listed = [...byId("span").options].find((option) => option !== other && Number(option.value) === scope.spanS);
+  other.hidden = Boolean(listed);
+  if (!listed) { other.value = scope.spanS; other.textContent = text; }
+  byId("span").value = (listed ?? other).value;
+}
+
+/** The theme of the system, or the one that the operator chose. */
+function useTheme() {
+  const theme = byId("theme").value;
+  localStorage.setItem("theme", theme);
+  document.documentElement.dataset.theme = theme;
+  forgetColours();
+  response.draw();
+  if (state) showTiming();
+}
+
+/** After a new connection everything is sent again; another daemon counts its time anew. */
+function forgetOldData() {
+  samples.clear();
+  scope.events.length = 0;
+  byId("events").replaceChildren();
+  if (scope.isPaused) scope.pause(false);
+}
+
 function connectControls() {
   byId("stop").onclick = stop;
   byId("lease-button").onclick = () => (lease.isHeld ? attempt(() => lease.release()).then(refresh) : takeLease());
   byId("pause").onclick = () => scope.pause(!scope.isPaused);
   scope.onpause = () => { byId("pause").setAttribute("aria-pressed", scope.isPaused); setText("pause", scope.isPaused ? "Follow" : "Pause"); };
-  scope.onzoom = () => { byId("span").value = [...byId("span").options].find((option) => Number(option.value) === scope.spanS)?.value ?? ""; };
+  scope.onzoom = showSpan;
   byId("span").onchange = () => { scope.spanS = Number(byId("span").value); };
   byId("trigger").onchange = () => { setText("level-unit", byId("trigger").value === "current" ? "A" : "um"); };
   byId("cursors").onclick = () => byId("cursors").setAttribute("aria-pressed", scope.toggleCursors());
@@ -338,6 +377,11 @@ function connectControls() {
   byId("run-form").onsubmit = start;
   byId("run-form").oninput = () => { showFields(); byId("start").disabled = JSON.stringify(request()) !== planned; };
   byId("tune-apply").onclick = tune;
+  byId("compare").onclick = () => attempt(compare);
+  byId("theme").value = localStorage.getItem("theme") ?? "auto";
+  byId("theme").onchange = useTheme;
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", useTheme);
+  useTheme();
   document.addEventListener("keydown", onKey);
 }
 
@@ -358,7 +402,7 @@ token.takeFromAddress();
 connectControls();
 showFields();
 follow({
-  onopen: () => attempt(() => showRecordings(recordingActions)),
+  onopen: () => { forgetOldData(); attempt(() => showRecordings(recordingActions)); },
   onclose: (waitS) => { waitsUntilMs = performance.now() + waitS * 1000; },
   onsamples: onSamples,
   onmessage: onMessage,

@@ -13,6 +13,11 @@ export async function showRecordings(actions) {
 function row(recording, actions) {
   const made = document.createElement("tr");
   const cell = (text) => { made.insertCell().textContent = text ?? ""; };
+  const choice = document.createElement("input");
+  choice.type = "checkbox";
+  choice.value = recording.file;
+  choice.setAttribute("aria-label", `compare ${recording.file}`);
+  made.insertCell().append(choice);
   cell(recording.file);
   cell([recording.name, recording.note].filter(Boolean).join(": "));
   cell(recording.operator);
@@ -52,14 +57,39 @@ export async function showResult(recording) {
     box.append(text);
   }
   const report = recording.files.find((file) => file.endsWith("_report.html"));
-  if (report) {
-    const frame = document.createElement("iframe");
-    frame.src = `/api/v1/recordings/${encodeURIComponent(report)}`;
-    // The report draws its plots with a script of its own, which gets no access to this page.
-    frame.sandbox = "allow-scripts";
-    frame.title = `Report of ${recording.file}`;
-    box.append(frame);
+  const address = report ? `/api/v1/recordings/${encodeURIComponent(report)}` : reportOf([recording.file]);
+  await showFrame(box, address, `Report of ${recording.file}`);
+}
+
+/** Shows the selected recordings in one plot. */
+export async function compare() {
+  const files = [...document.querySelectorAll("#recordings input:checked")].map((choice) => choice.value);
+  const box = byId("result"), heading = document.createElement("h3");
+  heading.textContent = files.length ? `Comparison: ${files.join(", ")}` : "Select recordings in the list first.";
+  box.replaceChildren(heading);
+  if (files.length) await showFrame(box, reportOf(files), heading.textContent);
+  byId("result-heading").scrollIntoView();
+}
+
+function reportOf(files) {
+  return `/api/v1/report?files=${files.map(encodeURIComponent).join(",")}`;
+}
+
+/** A page of the daemon in a frame, or the reason why there is none. */
+async function showFrame(box, address, title) {
+  const answer = await fetch(address);
+  if (!answer.ok) {
+    const text = document.createElement("p"), { error } = await answer.json();
+    text.textContent = error.message;
+    box.append(text);
+    return;
   }
+  const frame = document.createElement("iframe");
+  // The page draws its plots with a script of its own, which gets no access to this page.
+  frame.sandbox = "allow-scripts";
+  frame.title = title;
+  frame.src = address;
+  box.append(frame);
 }
 
 const um = (metres) => `${(metres * 1e6).toPrecision(4)} um`;

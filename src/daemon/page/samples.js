@@ -6,6 +6,8 @@ export const SIGNALS = ["reference", "position", "error", "current"];
 const FINE_S = 65;
 const COARSE_S = 610;
 const COARSE_TICKS = 64;
+/** Most missing values of a spectrum. */
+const MISSING_SHARE = 0.01;
 
 /** A ring of bins with minimum and maximum of each signal. A bin knows the number of its time, so that old bins are not drawn. */
 class Bins {
@@ -50,12 +52,22 @@ class Bins {
 
 export class Samples {
   constructor() {
+    this.clear();
+  }
+
+  /** Forgets everything: another daemon counts its time anew. */
+  clear() {
     this.periodS = 0;
     this.endS = 0;
+    this.fine = null;
+    this.coarse = null;
+    /** Time of the first sample at full rate. */
+    this.fineFromS = Infinity;
   }
 
   begin(periodS) {
     this.periodS = periodS;
+    this.fineFromS = Infinity;
     this.fine = new Bins(Math.ceil(FINE_S / periodS), periodS);
     this.coarse = new Bins(Math.ceil(COARSE_S / (periodS * COARSE_TICKS)), periodS * COARSE_TICKS);
   }
@@ -72,19 +84,22 @@ export class Samples {
     for (let signal = 0; signal < signals; signal++) {
       const minima = new Float32Array(buffer, 32 + 4 * count * signal, count);
       const maxima = blockTicks > 1 ? new Float32Array(buffer, 32 + 4 * count * (signals + signal), count) : minima;
-      this.addSignal(signal, startS, blockS, blockTicks, minima, maxima);
+      this.addSignal(signal, startS, blockTicks, minima, maxima);
     }
+    if (blockTicks < COARSE_TICKS) this.fineFromS = Math.min(this.fineFromS, startS);
     this.endS = Math.max(this.endS, startS + count * blockS);
     return { startS, blockS, count, run };
   }
 
-  addSignal(signal, startS, blockS, blockTicks, minima, maxima) {
+  addSignal(signal, startS, blockTicks, minima, maxima) {
     const firstTick = Math.round(startS / this.periodS);
     for (let block = 0; block < minima.length; block++) {
       if (Number.isNaN(minima[block])) continue;
       const tick = firstTick + block * blockTicks;
-      // A block of many ticks fills all fine bins that it covers: its extremes are somewhere in them.
-      for (let part = 0; part < blockTicks; part++) this.fine.add(tick + part, signal, minima[block], maxima[block]);
+      // A block of some ticks fills all fine bins that it covers: its extremes are somewhere in them.
+      if (blockTicks < COARSE_TICKS) {
+        for (let part = 0; part < blockTicks; part++) this.fine.add(tick + part, signal, minima[block], maxima[block]);
+      }
       const coarse = Math.floor(tick / COARSE_TICKS), coarseEnd = Math.floor((tick + blockTicks - 1) / COARSE_TICKS);
       for (let number = coarse; number <= coarseEnd; number++) this.coarse.add(number, signal, minima[block], maxima[block]);
     }
@@ -94,22 +109,26 @@ export class Samples {
   columns(signal, fromS, toS, columns) {
     if (!this.fine) return [];
     const widthS = (toS - fromS) / columns;
-    const isFine = widthS < this.coarse.widthS && fromS > this.endS - FINE_S + 1;
-    const bins = isFine ? this.fine : this.coarse;
-    return Array.from({ length: columns }, (_, column) => bins.extremes(signal, fromS + column * widthS, fromS + (column + 1) * widthS));
+    const fineFromS = widthS < this.coarse.widthS ? Math.max(this.fineFromS, this.endS - FINE_S + 1) : Infinity;
+    return Array.from({ length: columns }, (_, column) => {
+      const startS = fromS + column * widthS;
+      const bins = startS >= fineFromS ? this.fine : this.coarse;
+      return bins.extremes(signal, startS, startS + widthS);
+    });
   }
 
-  /** The last `count` values of a signal at full rate, oldest first; null if one is missing. */
+  /** The last `count` values of a signal at full rate, oldest first. A missing one is that before it; null if more than 1 % are missing. */
   last(signal, count) {
     if (!this.fine) return null;
     const end = Math.round(this.endS / this.periodS);
     const values = new Float64Array(count);
+    let missing = 0, before = 0;
     for (let back = 0; back < count; back++) {
       const number = end - count + back, at = number % this.fine.count;
-      if (number < 0 || this.fine.numbers[at] !== number) return null;
-      const value = this.fine.maxima[signal][at];
-      if (Number.isNaN(value)) return null;
-      values[back] = value;
+      const isKnown = number >= 0 && this.fine.numbers[at] === number && !Number.isNaN(this.fine.maxima[signal][at]);
+      if (isKnown) before = this.fine.maxima[signal][at];
+      else if (++missing > MISSING_SHARE * count) return null;
+      values[back] = before;
     }
     return values;
   }

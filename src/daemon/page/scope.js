@@ -99,13 +99,13 @@ export class Scope {
 
   draw() {
     this.checkTrigger();
-    const { context, width, height } = begin(this.canvas);
+    const { context, width, height, em } = begin(this.canvas);
     const [fromS, toS] = this.range();
-    const left = 64, bottom = 26, titles = 20;
+    const left = 4 * em, bottom = 1.7 * em, titles = 1.3 * em;
     let top = 0;
     for (const [index, strip] of STRIPS.entries()) {
       const room = (height - bottom) * strip.share;
-      const box = { left, top: top + titles, width: width - left - 28, height: room - titles - 4 };
+      const box = { left, top: top + titles, width: width - left - 1.8 * em, height: room - titles - 4 };
       this.box = box;
       this.drawStrip(context, box, strip, fromS, toS, index === STRIPS.length - 1);
       top += room;

@@ -1,6 +1,7 @@
 // Amplitude spectral density of the error: Hann window, mean of half-overlapping segments [Welch 1967].
 
-import { axes, begin, colour, quantity } from "/page/drawing.js";
+import { axes, begin, colour, line, quantity } from "/page/drawing.js";
+import { FrequencyAxis } from "/page/frequency_axis.js";
 
 const SEGMENT = 4096;
 const SEGMENTS = 7;
@@ -50,59 +51,61 @@ export function density(values, rateHz, segment = SEGMENT) {
 export class Spectrum {
   constructor(canvas, readout, hint, samples) {
     Object.assign(this, { canvas, readout, hint, samples });
-    canvas.addEventListener("pointermove", (event) => { this.pointer = event.offsetX; this.showReadout(); });
-    canvas.addEventListener("pointerleave", () => { this.pointer = null; });
-    canvas.addEventListener("keydown", (event) => {
-      const step = { ArrowLeft: -8, ArrowRight: 8 }[event.key];
-      if (!step) return;
-      event.preventDefault();
-      this.pointer = (this.pointer ?? canvas.clientWidth / 2) + step;
-      this.showReadout();
-    });
+    this.axis = new FrequencyAxis(canvas, () => this.paint());
   }
 
+  /** Computes the density anew and draws it. */
   draw() {
     const values = this.samples.last(ERROR, SEGMENT / 2 * (SEGMENTS + 1));
-    if (!values) {
-      this.density = null;
-      this.readout.textContent = "";
-    }
     this.hint.hidden = values !== null;
     this.canvas.hidden = values === null;
+    this.density = null;
+    this.readout.textContent = "";
     if (!values) return;
-    const { context, width, height } = begin(this.canvas);
     const rateHz = 1 / this.samples.periodS;
     this.density = density(values, rateHz);
     this.stepHz = rateHz / SEGMENT;
+    this.axis.setLimits(2 * this.stepHz, rateHz / 2);
+    this.paint();
+  }
+
+  paint() {
+    if (!this.density) return;
+    const { context, width, height, em } = begin(this.canvas);
     const shown = [...this.density].slice(2).map((value) => Math.log10(Math.max(value, 1e-15) * 1e9));
     const y = { from: Math.floor(Math.min(...shown)), to: Math.ceil(Math.max(...shown)), text: (value) => Number.isInteger(value) ? `1e${value}` : "" };
-    const decades = [-1, 0, 1, 2, 3, 4].filter((power) => power >= Math.log10(2 * this.stepHz) && power <= Math.log10(rateHz / 2));
-    const x = { from: Math.log10(2 * this.stepHz), to: Math.log10(rateHz / 2), ticks: decades, show: true, text: (value) => `${10 ** value} Hz` };
-    this.box = { left: 52, top: 22, width: width - 64, height: height - 48 };
-    this.x = x;
-    const { toX, toY } = axes(context, this.box, x, y);
+    const box = { left: 3.3 * em, top: 1.4 * em, width: width - 5.1 * em, height: height - 3.1 * em };
+    this.axis.box = box;
+    const { toX, toY } = axes(context, box, this.axis.describe(true), y);
     context.fillStyle = colour("text");
     context.textAlign = "left";
     context.textBaseline = "top";
-    context.fillText("nm/sqrt(Hz)", this.box.left, 2);
+    context.fillText("nm/sqrt(Hz)", box.left, 2);
+    context.save();
+    context.beginPath();
+    context.rect(box.left, box.top, box.width, box.height);
+    context.clip();
     context.strokeStyle = colour("error");
     context.lineWidth = 1.5;
     context.beginPath();
     shown.forEach((value, index) => context.lineTo(toX(Math.log10((index + 2) * this.stepHz)), toY(value)));
     context.stroke();
+    context.restore();
+    if (this.axis.cursor !== null) {
+      context.strokeStyle = colour("soft");
+      line(context, toX(this.axis.cursor), box.top, toX(this.axis.cursor), box.top + box.height);
+    }
     this.showReadout();
   }
 
   showReadout() {
-    if (!this.density) return;
-    if (this.pointer === null || this.pointer === undefined) {
+    const hz = this.axis.cursorHz;
+    if (hz === null) {
       const rms = Math.sqrt(this.density.reduce((sum, value) => sum + value * value, 0) * this.stepHz);
       this.readout.textContent = `rms ${quantity(rms, "m")} from ${this.stepHz.toFixed(2)} Hz to half the sampling rate`;
       return;
     }
-    const share = Math.min(1, Math.max(0, (this.pointer - this.box.left) / this.box.width));
-    const hz = 10 ** (this.x.from + share * (this.x.to - this.x.from));
-    const value = this.density[Math.min(this.density.length - 1, Math.round(hz / this.stepHz))];
+    const value = this.density[Math.min(this.density.length - 1, Math.max(0, Math.round(hz / this.stepHz)))];
     this.readout.textContent = `${hz.toPrecision(4)} Hz: ${quantity(value, "m")}/sqrt(Hz)`;
   }
 }

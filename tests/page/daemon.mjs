@@ -1,0 +1,69 @@
+// A daemon on the simulated stage for a test, and a browser.
+
+import { spawn } from "node:child_process";
+import { mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { chromium } from "playwright-core";
+
+const PROGRAM = resolve(process.env.BENCH_PROGRAM ?? "target/release/bench");
+/** A folder with the files of the page, to try changes without building. */
+const SOURCE = process.env.BENCH_PAGE_SOURCE;
+const BROWSER = process.env.BENCH_BROWSER ?? "/usr/bin/chromium";
+
+export class Daemon {
+  constructor() {
+    this.folder = mkdtempSync(join(tmpdir(), "bench-page-"));
+  }
+
+  /** Starts the daemon; the first time at a free port, later at the same one. A busy machine misses ticks: they do not trip. */
+  async start() {
+    const settings = ["--set", "interlock.overruns_per_s=1000000"];
+    this.process = spawn(PROGRAM, ["serve", "--listen", `127.0.0.1:${this.port ?? 0}`, "--out", "recordings", ...settings], {
+      cwd: this.folder, env: { ...process.env, BENCH_SOCKET: join(this.folder, "bench.sock") }, stdio: ["ignore", "pipe", "inherit"],
+    });
+    this.ended = new Promise((done) => this.process.once("exit", done));
+    this.url = await new Promise((found, failed) => {
+      let text = "";
+      this.process.stdout.on("data", (piece) => {
+        text += piece;
+        const address = /http:\/\/\S+/.exec(text);
+        if (address) found(address[0]);
+      });
+      this.process.once("exit", () => failed(new Error(`the daemon has ended: ${text}`)));
+    });
+    this.port = new URL(this.url).port;
+  }
+
+  async end(signal = "SIGTERM") {
+    this.process.kill(signal);
+    await this.ended;
+  }
+
+  async get(path) {
+    return (await fetch(`http://127.0.0.1:${this.port}/api/v1${path}`)).json();
+  }
+
+  remove() {
+    rmSync(this.folder, { recursive: true, force: true });
+  }
+}
+
+export function browser() {
+  return chromium.launch({ executablePath: BROWSER, args: ["--no-sandbox", "--enable-precise-memory-info"] });
+}
+
+/** A page; its faults are collected: errors on the console, refused requests, and requests to other hosts. */
+export async function openPage(chrome, url, size, colorScheme = "light") {
+  const context = await chrome.newContext({ viewport: size, colorScheme });
+  const page = await context.newPage();
+  page.faults = [];
+  // A refused request is also an error on the console, without its address.
+  page.on("console", (message) => { if (message.type() === "error" && !message.text().startsWith("Failed to load resource")) page.faults.push(message.text()); });
+  page.on("response", (answer) => { if (answer.status() >= 400) page.faults.push(`${answer.status()} ${new URL(answer.url()).pathname}`); });
+  page.on("pageerror", (error) => page.faults.push(error.message));
+  page.on("request", (request) => { if (new URL(request.url()).host !== new URL(url).host) page.faults.push(`another host: ${request.url()}`); });
+  if (SOURCE) await page.route("**/page/*", (route) => route.fulfill({ path: join(SOURCE, new URL(route.request().url()).pathname.slice("/page/".length)) }));
+  await page.goto(url);
+  return page;
+}
