@@ -1,6 +1,8 @@
 //! The daemon as a process: its interface, its queue, its end, and the commands that use it.
 mod common;
 mod crash;
+#[cfg(feature = "foxglove")]
+mod foxglove;
 mod interface;
 mod queue;
 mod same_command;
