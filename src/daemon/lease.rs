@@ -48,6 +48,14 @@ impl Lease {
         }
     }
 
+    /// Whether a client keeps it valid at this moment.
+    pub fn is_of_client(&self, now: Instant) -> bool {
+        match self.keeper {
+            Keeper::Client { expires } => now < expires,
+            Keeper::Run(_) => false,
+        }
+    }
+
     /// Seconds until it expires without a renewal; `None` for the lease of a run.
     pub fn expires_in_s(&self, now: Instant) -> Option<f64> {
         match self.keeper {

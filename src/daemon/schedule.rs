@@ -199,8 +199,9 @@ impl Schedule {
     /// Renews a lease.
     ///
     /// # Errors
-    /// When `secret` is not that of the lease.
+    /// When `secret` is not that of the lease, or the lease has expired.
     pub fn renew_lease(&mut self, secret: &str, now: Now) -> Result<(), ScheduleError> {
+        self.expire(now);
         let lease = self.lease.as_mut();
         let lease = lease.filter(|lease| lease.secret.is(secret));
         lease.ok_or(ScheduleError::NoLease)?.renew(now.instant);
@@ -210,20 +211,21 @@ impl Schedule {
     /// Releases a lease. A run that ends with its client is stopped, another one keeps the lease.
     ///
     /// # Errors
-    /// When `secret` is not that of the lease.
+    /// When `secret` is not that of the lease, or the lease has expired.
     pub fn release_lease(&mut self, secret: &str, now: Now) -> Result<(), ScheduleError> {
-        self.require_lease(secret)?;
+        self.require_lease(secret, now)?;
         self.lose_lease(now);
         Ok(())
     }
 
-    /// Whether `secret` is that of the lease.
+    /// The lease of a client, if `secret` is that of the lease. A client that has lost its lease to its run must renew it first.
     ///
     /// # Errors
-    /// When it is not.
-    pub fn require_lease(&self, secret: &str) -> Result<&Lease, ScheduleError> {
+    /// When `secret` is not that of the lease, or the lease has expired.
+    pub fn require_lease(&self, secret: &str, now: Now) -> Result<&Lease, ScheduleError> {
         let lease = self.lease.as_ref();
-        let lease = lease.filter(|lease| lease.secret.is(secret));
+        let lease =
+            lease.filter(|lease| lease.is_of_client(now.instant) && lease.secret.is(secret));
         lease.ok_or(ScheduleError::NoLease)
     }
 
@@ -267,7 +269,7 @@ impl Schedule {
             return Err(ScheduleError::Full);
         }
         if let Some(secret) = &new.lease {
-            self.require_lease(secret.reveal())?;
+            self.require_lease(secret.reveal(), now)?;
         }
         self.last_id += 1;
         self.open.push_back(RunEntry {

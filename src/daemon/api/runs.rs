@@ -21,7 +21,7 @@ use crate::daemon::output::{OutputPiece, RunOutput};
 use crate::daemon::run_entry::{Carrier, Command, RunRequest};
 use crate::daemon::schedule::{NewEntry, StopKind};
 use crate::daemon::secret::Secret;
-use crate::daemon::shared::Daemon;
+use crate::daemon::shared::{Daemon, now};
 use crate::daemon::worker::{self, check_args};
 use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
 use crate::rt::tuning::{Factors, Tune};
@@ -70,7 +70,7 @@ pub async fn start(
         )));
     }
     let operator = daemon.read(|schedule| {
-        let lease = schedule.require_lease(&lease)?;
+        let lease = schedule.require_lease(&lease, now())?;
         Ok::<_, ApiError>(lease.operator.clone())
     })?;
     check_args(&request.args)?;
@@ -144,7 +144,7 @@ pub async fn clear(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
 ) -> Result<StatusCode, ApiError> {
-    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     daemon.live.acknowledge_trip();
     Ok(StatusCode::NO_CONTENT)
 }
@@ -208,7 +208,7 @@ pub async fn tune(
     LeaseHeader(lease): LeaseHeader,
     Body(request): Body<TuneRequest>,
 ) -> Result<StatusCode, ApiError> {
-    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     let Some(plan) = daemon.plan() else {
         return Err(ApiError::conflict(
             "no run goes on; start `control` first, then change its reference or gain",
@@ -240,7 +240,7 @@ pub async fn tune(
         }
     }
     // Checked again after the computation: the lease may have ended.
-    daemon.read(|schedule| schedule.require_lease(&lease).map(drop))?;
+    daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     let _ = daemon.owner.tuner().send(tune); // without a receiver nothing runs
     Ok(StatusCode::NO_CONTENT)
 }

@@ -311,6 +311,36 @@ fn queued_commands_are_cancelled_with_their_lease() {
 }
 
 #[test]
+fn expired_lease_that_a_run_keeps_queues_nothing_until_it_is_renewed() {
+    let mut bench = bench_with_lease();
+    bench.take(&Step::Queue(0, Command::Chirp, OnDisconnect::Continue));
+    bench.take(&Step::Advance);
+    bench.take(&Step::Wait(10_000));
+    bench.take(&Step::Queue(0, Command::Chirp, OnDisconnect::Continue));
+    assert_eq!(bench.schedule.open().count(), 1, "only the run in progress");
+    bench.take(&Step::Renew(0));
+    bench.take(&Step::Queue(0, Command::Chirp, OnDisconnect::Continue));
+    assert_eq!(bench.schedule.open().count(), 2);
+}
+
+#[test]
+fn lease_is_invalid_at_its_expiry_also_before_anyone_has_looked() {
+    let mut bench = bench_with_lease();
+    let secret = bench.known(0);
+    bench.now.instant += Duration::from_secs(10);
+    let (schedule, now) = (&mut bench.schedule, bench.now);
+    assert!(schedule.require_lease(&secret, now).is_err());
+    assert_eq!(
+        schedule.release_lease(&secret, now),
+        Err(ScheduleError::NoLease)
+    );
+    assert_eq!(
+        schedule.renew_lease(&secret, now),
+        Err(ScheduleError::NoLease)
+    );
+}
+
+#[test]
 fn terminal_of_another_operator_waits_for_the_lease() {
     let mut bench = bench_with_lease();
     bench.take(&Step::Attach(1, Command::Chirp));
