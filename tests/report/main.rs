@@ -2,6 +2,7 @@
 
 mod attributes;
 mod bode;
+mod comparison;
 mod nyquist;
 mod overlay;
 mod phase;
