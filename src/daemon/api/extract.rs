@@ -1,15 +1,26 @@
 //! Parts of a request; what cannot be read is answered with an error object.
 
+use std::convert::Infallible;
+use std::time::Duration;
+
 use aide::OperationInput;
 use aide::generate::GenContext;
-use aide::openapi::Operation;
+use aide::openapi::{Operation, ReferenceOr};
 use axum::Json;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::http::StatusCode;
 use axum::http::request::Parts;
+use bytes::Bytes;
 use schemars::JsonSchema;
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::error::ApiError;
+use crate::daemon::schedule::StopKind;
+use crate::experiment::ErrorKind;
+
+/// Longest time in which a client sends its body.
+const BODY_TIME: Duration = Duration::from_secs(10);
 
 /// A JSON body.
 pub struct Body<T>(pub T);
@@ -18,18 +29,23 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
-        match Json::<T>::from_request(request, state).await {
-            Ok(Json(body)) => Ok(Body(body)),
-            Err(rejection) => {
+        let read = Json::<T>::from_request(request, state);
+        match tokio::time::timeout(BODY_TIME, read).await {
+            Err(_) => Err(ApiError::new(
+                StatusCode::REQUEST_TIMEOUT,
+                ErrorKind::Usage,
+                format!(
+                    "the body of the request did not arrive within {} s; send it again",
+                    BODY_TIME.as_secs()
+                ),
+            )),
+            Ok(Ok(Json(body))) => Ok(Body(body)),
+            Ok(Err(rejection)) => {
                 let message = format!(
                     "the body of the request cannot be used: {}; see /api/v1/openapi.json for its form",
                     rejection.body_text()
                 );
-                Err(ApiError::new(
-                    rejection.status(),
-                    crate::experiment::ErrorKind::Usage,
-                    message,
-                ))
+                Err(ApiError::new(rejection.status(), ErrorKind::Usage, message))
             }
         }
     }
@@ -38,6 +54,40 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
 impl<T: JsonSchema> OperationInput for Body<T> {
     fn operation_input(context: &mut GenContext, operation: &mut Operation) {
         Json::<T>::operation_input(context, operation);
+    }
+}
+
+/// How a run is stopped.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+pub struct Stop {
+    /// `settle`: current to zero along a ramp. `cut`: zero current at once.
+    #[serde(default)]
+    how: StopKind,
+}
+
+/// How a run is stopped. A stop is never refused because of its body: without a body, or with one that cannot be read, it settles.
+pub struct StopBody(pub StopKind);
+
+impl<S: Send + Sync> FromRequest<S> for StopBody {
+    type Rejection = Infallible;
+
+    async fn from_request(request: Request, state: &S) -> Result<Self, Infallible> {
+        let read = Bytes::from_request(request, state);
+        let body = match tokio::time::timeout(BODY_TIME, read).await {
+            Ok(Ok(body)) => body,
+            Ok(Err(_)) | Err(_) => Bytes::new(),
+        };
+        let stop: Stop = serde_json::from_slice(&body).unwrap_or_default();
+        Ok(StopBody(stop.how))
+    }
+}
+
+impl OperationInput for StopBody {
+    fn operation_input(context: &mut GenContext, operation: &mut Operation) {
+        Json::<Stop>::operation_input(context, operation);
+        if let Some(ReferenceOr::Item(body)) = &mut operation.request_body {
+            body.required = false;
+        }
     }
 }
 

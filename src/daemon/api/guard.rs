@@ -98,9 +98,10 @@ impl Guard {
 
     /// A browser states which page makes a request; only the page of the daemon may.
     fn check_origin(&self, headers: &HeaderMap) -> Result<(), ApiError> {
-        let Some(origin) = text(headers, header::ORIGIN) else {
+        let Some(origin) = headers.get(header::ORIGIN) else {
             return Ok(());
         };
+        let origin = String::from_utf8_lossy(origin.as_bytes());
         let host = text(headers, header::HOST).unwrap_or_default();
         match origin.strip_prefix("http://") == Some(host) {
             true => Ok(()),

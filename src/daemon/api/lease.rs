@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use axum::Json;
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::response::NoContent;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::error::ApiError;
 use super::extract::{Body, LeaseHeader};
+use super::reply::{Created, Reply};
 use super::views::Operator;
 use crate::daemon::lease::LEASE;
 use crate::daemon::secret::Secret;
@@ -39,7 +40,7 @@ pub struct RenewedLease {
 pub async fn take(
     State(daemon): State<Arc<Daemon>>,
     Body(operator): Body<Operator>,
-) -> Result<(StatusCode, Json<GivenLease>), ApiError> {
+) -> Result<Created<GivenLease>, ApiError> {
     let name = operator.operator.trim();
     if name.is_empty() || name.chars().count() > MAX_NAME {
         return Err(ApiError::bad_request(format!(
@@ -53,7 +54,7 @@ pub async fn take(
         lease: secret.reveal().into(),
         expires_in_s: LEASE.as_secs_f64(),
     };
-    Ok((StatusCode::CREATED, Json(given)))
+    Ok(Reply(given))
 }
 
 /// Renews the lease.
@@ -71,10 +72,10 @@ pub async fn renew(
 pub async fn release(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
-) -> Result<StatusCode, ApiError> {
+) -> Result<NoContent, ApiError> {
     daemon.change(|schedule, now| schedule.release_lease(&lease, now))?;
     tracing::info!("the arm lease was released");
-    Ok(StatusCode::NO_CONTENT)
+    Ok(NoContent)
 }
 
 /// A new secret.

@@ -7,7 +7,9 @@ use std::time::Duration;
 use aide::NoApi;
 use axum::Json;
 use axum::extract::State;
+use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
+use axum::http::StatusCode;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use futures_util::stream;
@@ -17,6 +19,7 @@ use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
+use super::error::ApiError;
 use super::extract::InQuery;
 use super::views::{StateView, state};
 use crate::daemon::live::event_text::EventView;
@@ -24,6 +27,7 @@ use crate::daemon::live::hub::LiveMessage;
 use crate::daemon::live::response::ResponseView;
 use crate::daemon::session;
 use crate::daemon::shared::Daemon;
+use crate::experiment::ErrorKind;
 
 /// Time between two states.
 const STATE: Duration = Duration::from_millis(200);
@@ -72,17 +76,34 @@ pub async fn response(State(daemon): State<Arc<Daemon>>) -> Json<Option<Response
 pub async fn web_socket(
     State(daemon): State<Arc<Daemon>>,
     InQuery(query): InQuery<LiveQuery>,
-    NoApi(upgrade): NoApi<WebSocketUpgrade>,
-) -> Response {
-    upgrade.on_upgrade(move |socket| serve(daemon, socket, query))
+    NoApi(upgrade): NoApi<Upgrade>,
+) -> Result<Response, ApiError> {
+    let upgrade = upgrade.map_err(no_web_socket)?;
+    Ok(upgrade.on_upgrade(move |socket| serve(daemon, socket, query)))
+}
+
+/// The request for a WebSocket, or why it is none.
+type Upgrade = Result<WebSocketUpgrade, WebSocketUpgradeRejection>;
+
+fn no_web_socket(rejection: WebSocketUpgradeRejection) -> ApiError {
+    let message = format!(
+        "this request must open a WebSocket: {}; GET /api/v1/events gives the same without samples",
+        rejection.body_text()
+    );
+    let status = match rejection.status() {
+        status if status.is_client_error() => status,
+        _ => StatusCode::BAD_REQUEST,
+    };
+    ApiError::new(status, ErrorKind::Usage, message)
 }
 
 /// Upgrades to the connection of a command of this machine.
 pub async fn command(
     State(daemon): State<Arc<Daemon>>,
-    NoApi(upgrade): NoApi<WebSocketUpgrade>,
-) -> Response {
-    upgrade.on_upgrade(|socket| session::serve(daemon, socket))
+    NoApi(upgrade): NoApi<Upgrade>,
+) -> Result<Response, ApiError> {
+    let upgrade = upgrade.map_err(no_web_socket)?;
+    Ok(upgrade.on_upgrade(|socket| session::serve(daemon, socket)))
 }
 
 async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {

@@ -7,6 +7,7 @@ mod lease;
 mod live;
 mod page;
 mod recordings;
+mod reply;
 mod routes;
 mod runs;
 mod tools;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use axum::Json;
 use axum::extract::{Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, NoContent, Response};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tower::ServiceExt;
@@ -25,6 +25,13 @@ const MAX_TEXT: usize = 10_000;
 const MAX_COMPARED: usize = 12;
 /// The script of a report gets no access to the token of the page.
 const REPORT_POLICY: &str = "sandbox allow-scripts";
+
+/// The part of a path that names a file.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct FileName {
+    /// Name of a file in the folder of the recordings.
+    file: String,
+}
 
 /// The recordings, newest first.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -50,7 +57,7 @@ pub async fn list(State(daemon): State<Arc<Daemon>>) -> Result<Json<Recordings>,
 /// Downloads a recording or a file computed from it. Understands `Range`.
 pub async fn download(
     State(daemon): State<Arc<Daemon>>,
-    InPath(file): InPath<String>,
+    InPath(FileName { file }): InPath<FileName>,
     request: Request,
 ) -> Result<Response, ApiError> {
     let path = daemon
@@ -62,6 +69,9 @@ pub async fn download(
         Ok(response) => response.map(axum::body::Body::new).into_response(),
         Err(never) => match never {},
     };
+    if let Some(error) = unserved(response.status(), &file) {
+        return Ok(with_range(error.into_response(), &response));
+    }
     // The script of a report cannot use the token of the page.
     let policy = HeaderValue::from_static(REPORT_POLICY);
     let headers = response.headers_mut();
@@ -99,11 +109,41 @@ pub async fn report(
     Ok((headers, page).into_response())
 }
 
+/// The error of an answer without the file.
+fn unserved(status: StatusCode, file: &str) -> Option<ApiError> {
+    let message = match status {
+        StatusCode::NOT_FOUND => return Some(unknown(file)),
+        StatusCode::RANGE_NOT_SATISFIABLE => {
+            format!("{file} does not contain this range; ask for one range within the file")
+        }
+        StatusCode::PRECONDITION_FAILED => {
+            format!("{file} has changed since; ask for it without a condition")
+        }
+        status if status.is_server_error() => {
+            return Some(file_error(format!(
+                "{file} cannot be read; look at the log of the system"
+            )));
+        }
+        status if status.is_client_error() => format!("{file} cannot be sent: {status}"),
+        _ => return None,
+    };
+    Some(ApiError::new(status, ErrorKind::Usage, message))
+}
+
+/// An error with the length of the file [RFC 9110, 15.5.17].
+fn with_range(mut error: Response, served: &Response) -> Response {
+    if let Some(range) = served.headers().get(header::CONTENT_RANGE) {
+        let headers = error.headers_mut();
+        headers.insert(header::CONTENT_RANGE, range.clone());
+    }
+    error
+}
+
 /// Removes a recording and the files computed from it.
 pub async fn remove(
     State(daemon): State<Arc<Daemon>>,
-    InPath(file): InPath<String>,
-) -> Result<StatusCode, ApiError> {
+    InPath(FileName { file }): InPath<FileName>,
+) -> Result<NoContent, ApiError> {
     let is_open = daemon.read(|schedule| {
         let current = schedule.current();
         current.is_some_and(|entry| entry.recording.as_ref().is_none_or(|name| *name == file))
@@ -123,7 +163,7 @@ pub async fn remove(
         })
     })
     .await?;
-    Ok(StatusCode::NO_CONTENT)
+    Ok(NoContent)
 }
 
 /// Name and note of a recording.
@@ -141,9 +181,9 @@ pub struct Note {
 /// Changes name and note of a recording.
 pub async fn note(
     State(daemon): State<Arc<Daemon>>,
-    InPath(file): InPath<String>,
+    InPath(FileName { file }): InPath<FileName>,
     Body(note): Body<Note>,
-) -> Result<StatusCode, ApiError> {
+) -> Result<NoContent, ApiError> {
     if note.name.len().max(note.note.len()) > MAX_TEXT {
         return Err(ApiError::bad_request(format!(
             "name or note has more than {MAX_TEXT} bytes; shorten it"
@@ -165,13 +205,13 @@ pub async fn note(
         })
     })
     .await?;
-    Ok(StatusCode::NO_CONTENT)
+    Ok(NoContent)
 }
 
 /// The results that the command added to the recording.
 pub async fn results(
     State(daemon): State<Arc<Daemon>>,
-    InPath(file): InPath<String>,
+    InPath(FileName { file }): InPath<FileName>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     let path = daemon
         .catalogue()

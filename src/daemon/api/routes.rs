@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use aide::axum::ApiRouter;
 use aide::axum::routing::{get_with, post_with, put_with};
-use aide::openapi::{Info, OpenApi};
+use aide::openapi::{
+    Info, MediaType, OpenApi, Operation, ReferenceOr, Response, SecurityScheme, StatusCode,
+};
 use aide::transform::TransformOperation;
 use axum::extract::DefaultBodyLimit;
 use axum::extract::State;
@@ -12,7 +14,6 @@ use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use axum::routing::get;
 use axum::{Extension, Json, Router};
-use tower_http::limit::RequestBodyLimitLayer;
 
 use super::error::ApiError;
 use super::{lease, live, page, recordings, runs, tools};
@@ -43,7 +44,7 @@ pub fn router(daemon: Arc<Daemon>, reach: Reach) -> Router {
         },
         ..OpenApi::default()
     };
-    let api = api().finish_api(&mut description);
+    let api = api().finish_api_with(&mut description, |api| api.security_scheme(TOKEN, token()));
     let mut router = api
         .route("/", get(page::index))
         .route("/metrics", get(metrics))
@@ -56,7 +57,6 @@ pub fn router(daemon: Arc<Daemon>, reach: Reach) -> Router {
         .method_not_allowed_fallback(wrong_method)
         .layer(Extension(Arc::new(description)))
         .layer(DefaultBodyLimit::max(MAX_BODY))
-        .layer(RequestBodyLimitLayer::new(MAX_BODY))
         .with_state(daemon)
 }
 
@@ -85,12 +85,97 @@ async fn description(Extension(description): Extension<Arc<OpenApi>>) -> Json<Op
     Json((*description).clone())
 }
 
-/// Name and summary of a request.
+/// Name of the security scheme of the token.
+const TOKEN: &str = "token";
+
+fn token() -> SecurityScheme {
+    SecurityScheme::Http {
+        scheme: "bearer".into(),
+        bearer_format: None,
+        description: Some("The token that the daemon prints. Only TCP needs it.".into()),
+        extensions: Default::default(),
+    }
+}
+
+/// Name and summary of a request that needs no token.
 fn named(
     id: &'static str,
     summary: &'static str,
 ) -> impl FnOnce(TransformOperation<'_>) -> TransformOperation<'_> {
-    move |operation| operation.id(id).summary(summary)
+    move |operation| with_errors(operation.id(id).summary(summary))
+}
+
+/// Name and summary of a request that needs the token over TCP.
+fn change(
+    id: &'static str,
+    summary: &'static str,
+) -> impl FnOnce(TransformOperation<'_>) -> TransformOperation<'_> {
+    move |operation| named(id, summary)(operation).security_requirement(TOKEN)
+}
+
+/// Every request may be refused: for its rate, its host or its form.
+fn with_errors(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    let responses = operation.inner_mut().responses.as_ref();
+    let errors = StatusCode::Range(4);
+    match responses.is_some_and(|responses| responses.responses.contains_key(&errors)) {
+        true => operation,
+        false => operation.response_range::<4, ApiError>(),
+    }
+}
+
+/// Adds an answer whose body is not JSON.
+fn answers(operation: &mut Operation, status: u16, description: &str, media_type: Option<&str>) {
+    let content = media_type.map(|media_type| (media_type.into(), MediaType::default()));
+    let response = Response {
+        description: description.into(),
+        content: content.into_iter().collect(),
+        ..Response::default()
+    };
+    let responses = operation.responses.get_or_insert_default();
+    let code = StatusCode::Code(status);
+    responses
+        .responses
+        .insert(code, ReferenceOr::Item(response));
+}
+
+fn web_socket(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    answers(operation.inner_mut(), 101, "The WebSocket is open.", None);
+    operation
+}
+
+fn event_stream(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    let media_type = Some("text/event-stream");
+    answers(
+        operation.inner_mut(),
+        200,
+        "Events until the client closes the connection.",
+        media_type,
+    );
+    operation
+}
+
+fn json_lines(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    let media_type = Some("application/x-ndjson");
+    answers(
+        operation.inner_mut(),
+        200,
+        "One JSON object a line until the command has ended.",
+        media_type,
+    );
+    operation
+}
+
+fn file(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    let any = Some("*/*");
+    answers(operation.inner_mut(), 200, "The file.", any);
+    answers(operation.inner_mut(), 206, "A part of the file.", any);
+    answers(
+        operation.inner_mut(),
+        304,
+        "The file has not changed.",
+        None,
+    );
+    operation
 }
 
 fn api() -> ApiRouter<Arc<Daemon>> {
@@ -101,20 +186,20 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         )
         .api_route(
             "/api/v1/live",
-            get_with(
-                live::web_socket,
-                named(
+            get_with(live::web_socket, |operation| {
+                web_socket(named(
                     "live",
                     "WebSocket: states and events as text, samples as binary messages",
-                ),
-            ),
+                )(operation))
+            }),
         )
         .api_route(
             "/api/v1/events",
-            get_with(
-                live::events,
-                named("events", "States and events as server-sent events"),
-            ),
+            get_with(live::events, |operation| {
+                event_stream(named("events", "States and events as server-sent events")(
+                    operation,
+                ))
+            }),
         )
         .api_route(
             "/api/v1/response",
@@ -128,18 +213,18 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         )
         .api_route(
             "/api/v1/lease",
-            post_with(lease::take, named("takeLease", "Take the arm lease"))
-                .put_with(lease::renew, named("renewLease", "Renew the arm lease"))
+            post_with(lease::take, change("takeLease", "Take the arm lease"))
+                .put_with(lease::renew, change("renewLease", "Renew the arm lease"))
                 .delete_with(
                     lease::release,
-                    named("releaseLease", "Release the arm lease"),
+                    change("releaseLease", "Release the arm lease"),
                 ),
         )
         .api_route(
             "/api/v1/runs",
             get_with(runs::list, named("runs", "List the commands")).post_with(
                 runs::start,
-                named("startRun", "Queue a command; needs the lease"),
+                change("startRun", "Queue a command; needs the lease"),
             ),
         )
         .api_route(
@@ -148,17 +233,16 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         )
         .api_route(
             "/api/v1/runs/{id}/stop",
-            post_with(runs::stop, named("stopRun", "Stop or cancel a command")),
+            post_with(runs::stop, change("stopRun", "Stop or cancel a command")),
         )
         .api_route(
             "/api/v1/runs/{id}/output",
-            get_with(
-                runs::output,
-                named(
+            get_with(runs::output, |operation| {
+                json_lines(named(
                     "runOutput",
                     "What a command prints, as one JSON object a line",
-                ),
-            ),
+                )(operation))
+            }),
         )
         .api_route(
             "/api/v1/stop",
@@ -171,14 +255,14 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             "/api/v1/clear",
             post_with(
                 runs::clear,
-                named("clear", "Acknowledge a trip; needs the lease"),
+                change("clear", "Acknowledge a trip; needs the lease"),
             ),
         )
         .api_route(
             "/api/v1/plan",
             post_with(
                 runs::plan,
-                named(
+                change(
                     "plan",
                     "Predict travel, current, heat and duration; nothing moves",
                 ),
@@ -188,7 +272,7 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             "/api/v1/tune",
             post_with(
                 runs::tune,
-                named(
+                change(
                     "tune",
                     "Change reference and gain of the running loop; needs the lease",
                 ),
@@ -210,13 +294,14 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         )
         .api_route(
             "/api/v1/recordings/{file}",
-            get_with(
-                recordings::download,
-                named("download", "Download a file; understands Range"),
-            )
+            get_with(recordings::download, |operation| {
+                file(named("download", "Download a file; understands Range")(
+                    operation,
+                ))
+            })
             .delete_with(
                 recordings::remove,
-                named(
+                change(
                     "removeRecording",
                     "Remove a recording and the files computed from it",
                 ),
@@ -226,7 +311,7 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             "/api/v1/recordings/{file}/note",
             put_with(
                 recordings::note,
-                named("noteRecording", "Change name and note of a recording"),
+                change("noteRecording", "Change name and note of a recording"),
             ),
         )
         .api_route(
@@ -244,7 +329,7 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             "/api/v1/config/check",
             post_with(
                 tools::check,
-                named("checkConfig", "Check settings; nothing is changed"),
+                change("checkConfig", "Check settings; nothing is changed"),
             ),
         )
         .api_route(

@@ -6,19 +6,20 @@ use std::sync::Arc;
 use axum::Json;
 use axum::body::Body as HttpBody;
 use axum::extract::State;
-use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::header;
+use axum::response::{IntoResponse, NoContent, Response};
 use bytes::Bytes;
 use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::ApiError;
-use super::extract::{Body, InPath, LeaseHeader};
+use super::extract::{Body, InPath, LeaseHeader, StopBody};
 use super::lease::random;
+use super::reply::{Accepted, Reply};
 use super::views::RunView;
 use crate::daemon::output::{OutputPiece, RunOutput};
-use crate::daemon::run_entry::{Carrier, Command, RunRequest};
+use crate::daemon::run_entry::{Carrier, Command, Phase, RunRequest};
 use crate::daemon::schedule::{NewEntry, StopKind};
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::{Daemon, now};
@@ -28,6 +29,13 @@ use crate::rt::tuning::{Factors, Tune};
 
 /// Longest name and note of a run in bytes.
 const MAX_TEXT: usize = 10_000;
+
+/// The part of a path that names a command.
+#[derive(Debug, Deserialize, JsonSchema)]
+pub struct RunId {
+    /// Number of the command.
+    id: u64,
+}
 
 /// All commands that the daemon knows.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -52,7 +60,7 @@ pub async fn list(State(daemon): State<Arc<Daemon>>) -> Json<Runs> {
 /// One command.
 pub async fn one(
     State(daemon): State<Arc<Daemon>>,
-    InPath(id): InPath<u64>,
+    InPath(RunId { id }): InPath<RunId>,
 ) -> Result<Json<RunView>, ApiError> {
     let view = daemon.read(|schedule| schedule.entry(id).map(RunView::from))?;
     Ok(Json(view))
@@ -63,7 +71,7 @@ pub async fn start(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
     Body(request): Body<RunRequest>,
-) -> Result<(StatusCode, Json<RunView>), ApiError> {
+) -> Result<Accepted<RunView>, ApiError> {
     if request.name.len().max(request.note.len()) > MAX_TEXT {
         return Err(ApiError::bad_request(format!(
             "name or note has more than {MAX_TEXT} bytes; shorten it"
@@ -86,7 +94,7 @@ pub async fn start(
         schedule.entry(id).map(RunView::from)
     })?;
     tokio::spawn(estimate(daemon, view.id, command, args));
-    Ok((StatusCode::ACCEPTED, Json(view)))
+    Ok(Reply(view))
 }
 
 /// Adds the length of a command by its plan. A command without a plan has none.
@@ -102,26 +110,17 @@ async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<
     });
 }
 
-/// How a run is stopped.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Stop {
-    /// `settle`: current to zero along a ramp. `cut`: zero current at once.
-    #[serde(default)]
-    how: StopKind,
-}
-
 /// Stops one command.
 pub async fn stop(
     State(daemon): State<Arc<Daemon>>,
-    InPath(id): InPath<u64>,
-    Body(stop): Body<Stop>,
+    InPath(RunId { id }): InPath<RunId>,
+    StopBody(how): StopBody,
 ) -> Result<Json<RunView>, ApiError> {
     let view = daemon.change(|schedule, now| {
-        schedule.stop(id, stop.how, now)?;
+        schedule.stop(id, how, now)?;
         schedule.entry(id).map(RunView::from)
     })?;
-    tracing::warn!(run = id, how = ?stop.how, "the run was stopped by a client");
+    tracing::warn!(run = id, ?how, "the run was stopped by a client");
     Ok(Json(view))
 }
 
@@ -130,23 +129,25 @@ pub async fn stop(
 pub struct Stopped {
     /// Number of the run; `null` if nothing had its turn.
     run: Option<u64>,
+    /// How it was stopped.
+    how: StopKind,
 }
 
 /// Stops whatever runs. Needs neither lease nor token.
-pub async fn stop_all(State(daemon): State<Arc<Daemon>>, Body(stop): Body<Stop>) -> Json<Stopped> {
-    let run = daemon.change(|schedule, _| schedule.stop_current(stop.how));
-    tracing::warn!(run, how = ?stop.how, "a client stopped the bench");
-    Json(Stopped { run })
+pub async fn stop_all(State(daemon): State<Arc<Daemon>>, StopBody(how): StopBody) -> Json<Stopped> {
+    let run = daemon.change(|schedule, _| schedule.stop_current(how));
+    tracing::warn!(run, ?how, "a client stopped the bench");
+    Json(Stopped { run, how })
 }
 
 /// Acknowledges a trip.
 pub async fn clear(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
-) -> Result<StatusCode, ApiError> {
+) -> Result<NoContent, ApiError> {
     daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     daemon.live.acknowledge_trip();
-    Ok(StatusCode::NO_CONTENT)
+    Ok(NoContent)
 }
 
 /// What a command would do.
@@ -166,8 +167,9 @@ pub async fn plan(
     Body(request): Body<PlanRequest>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     check_args(&request.args)?;
+    // In front of the others, so that none of them takes it as its value.
     let mut args = request.args;
-    args.push("--plan".into());
+    args.insert(0, "--plan".into());
     let computed = worker::compute(&daemon, &[request.command.name()], &args).await?;
     match computed.get("error") {
         Some(_) => Err(ApiError::of_command(&computed)),
@@ -207,7 +209,7 @@ pub async fn tune(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
     Body(request): Body<TuneRequest>,
-) -> Result<StatusCode, ApiError> {
+) -> Result<NoContent, ApiError> {
     daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     let Some(plan) = daemon.plan() else {
         return Err(ApiError::conflict(
@@ -242,17 +244,19 @@ pub async fn tune(
     // Checked again after the computation: the lease may have ended.
     daemon.read(|schedule| schedule.require_lease(&lease, now()).map(drop))?;
     let _ = daemon.owner.tuner().send(tune); // without a receiver nothing runs
-    Ok(StatusCode::NO_CONTENT)
+    Ok(NoContent)
 }
 
 /// Follows what a command prints, as one JSON object a line. The last line is its exit code.
 pub async fn output(
     State(daemon): State<Arc<Daemon>>,
-    InPath(id): InPath<u64>,
+    InPath(RunId { id }): InPath<RunId>,
 ) -> Result<Response, ApiError> {
     daemon.read(|schedule| schedule.entry(id).map(drop))?;
     let follower = Follower {
         output: daemon.output(id),
+        daemon,
+        id,
         next: 0,
         is_done: false,
     };
@@ -266,19 +270,32 @@ pub async fn output(
 
 /// A client that follows the output of a command.
 struct Follower {
+    daemon: Arc<Daemon>,
+    id: u64,
     output: Arc<RunOutput>,
     next: usize,
     is_done: bool,
 }
 
 impl Follower {
-    /// The next lines; `None` after the exit code.
+    /// Whether the command has ended. One that was cancelled, or that another process carried out, has no exit code.
+    fn has_ended(&self) -> bool {
+        self.daemon.read(|schedule| {
+            let entry = schedule.entry(self.id);
+            entry.map_or(true, |entry| entry.phase == Phase::Finished)
+        })
+    }
+
+    /// The next lines; `None` after the exit code, or when the command has ended without one.
     async fn lines(&mut self) -> Option<Bytes> {
         if self.is_done {
             return None;
         }
-        let mut changes = self.output.changes();
+        let mut printed = self.output.changes();
+        let mut changes = self.daemon.changes();
         loop {
+            // Before the pieces are read: the exit code is the last of them.
+            let has_ended = self.has_ended();
             let pieces = self.output.from(self.next);
             if !pieces.is_empty() {
                 self.next += pieces.len();
@@ -291,7 +308,13 @@ impl Follower {
                 let text: String = lines.map(|line| line + "\n").collect();
                 return Some(text.into());
             }
-            changes.changed().await.ok()?;
+            if has_ended {
+                return None;
+            }
+            tokio::select! {
+                changed = printed.changed() => changed.ok()?,
+                changed = changes.changed() => changed.ok()?,
+            }
         }
     }
 }
