@@ -3,6 +3,7 @@
 mod api;
 mod catalogue;
 pub mod client;
+mod connections;
 mod dispatch;
 #[cfg(feature = "foxglove")]
 mod foxglove;

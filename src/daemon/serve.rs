@@ -14,6 +14,7 @@ use tokio::net::{TcpListener, UnixListener};
 
 use super::api::guard::{Guard, guard};
 use super::api::{Reach, router};
+use super::connections::{serve_tcp, serve_unix};
 use super::dispatch;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
@@ -330,10 +331,7 @@ fn spawn_tasks(
     let mut tasks = vec![
         tokio::spawn(dispatch::serve(Arc::clone(daemon))),
         tokio::spawn(watch_loop(Arc::clone(daemon))),
-        tokio::spawn(async move {
-            // It ends only with the listener.
-            let _ = axum::serve(unix, local).await;
-        }),
+        tokio::spawn(serve_unix(unix, local)),
     ];
     if let (Some(listener), Some(token)) = (tcp, token) {
         tasks.push(spawn_tcp(daemon, listener, token)?);
@@ -350,16 +348,13 @@ fn spawn_tcp(
     let address = listener.local_addr().map_err(system)?;
     let checks = Arc::new(Guard::new(token.clone(), address));
     let remote = router(Arc::clone(daemon), Reach::Network)
-        .layer(middleware::from_fn_with_state(checks, guard))
-        .into_make_service_with_connect_info::<SocketAddr>();
+        .layer(middleware::from_fn_with_state(checks, guard));
     let own = std::os::fd::AsFd::as_fd(listener)
         .try_clone_to_owned()
         .map_err(system)?;
     let own = std::net::TcpListener::from(own);
     let listener = TcpListener::from_std(own).map_err(system)?;
-    Ok(tokio::spawn(async move {
-        let _ = axum::serve(listener, remote).await;
-    }))
+    Ok(tokio::spawn(serve_tcp(listener, remote)))
 }
 
 /// Tells systemd that all is well, as long as ticks pass.
