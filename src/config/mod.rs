@@ -51,6 +51,7 @@ pub use interlock::*;
 pub use load::{Source, load, whole};
 pub(crate) use load::{text_of, text_of_file, typed, validate};
 pub use overrides::OptionSetting;
+pub(crate) use overrides::texts_of_set;
 pub use purpose::Purpose;
 pub use rig::*;
 pub use servo::*;

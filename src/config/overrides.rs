@@ -111,6 +111,24 @@ pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
     })
 }
 
+/// All texts in the value of `KEY=VALUE`, as a configuration reads them; none if it is no such assignment.
+pub(crate) fn texts_of_set(set: &str) -> Vec<String> {
+    let mut texts = Vec::new();
+    if let Ok((_, value)) = key_and_value(set) {
+        texts_in(&value, &mut texts);
+    }
+    texts
+}
+
+fn texts_in(value: &Value, texts: &mut Vec<String>) {
+    match value {
+        Value::String(text) => texts.push(text.clone()),
+        Value::Array(items) => items.iter().for_each(|item| texts_in(item, texts)),
+        Value::Table(table) => table.values().for_each(|item| texts_in(item, texts)),
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) | Value::Datetime(_) => {}
+    }
+}
+
 fn key_and_value(set: &str) -> Result<(&str, Value), &'static str> {
     let split = set.split_once('=');
     let (key, text) = split.ok_or("there is no `=`")?;

@@ -65,6 +65,11 @@ pub fn own(name: &str, kind: &str) -> Option<PathBuf> {
     files.find(|file| file.is_file())
 }
 
+/// Whether an embedded profile or one of the user has this name.
+pub fn is_known(name: &str) -> bool {
+    find(PROFILES, name).is_some() || own(name, "").is_some()
+}
+
 /// Names and files of all own profiles.
 pub fn own_profiles() -> Vec<(String, PathBuf)> {
     let folders = own_folders().into_iter();

@@ -6,13 +6,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
 
-use tokio::sync::watch;
+use tokio::sync::{Semaphore, watch};
 
 use super::catalogue::Catalogue;
 use super::live::hub::LiveHub;
 use super::output::RunOutput;
 use super::owner::Owner;
 use super::schedule::{Now, Schedule};
+use super::worker::MAX_COMPUTATIONS;
 use crate::config::{Config, Source};
 use crate::experiment::Plan;
 use crate::util::timestamp::unix_ns;
@@ -47,6 +48,8 @@ pub struct Daemon {
     verdicts: Mutex<BTreeMap<String, u64>>,
     /// Open connections of commands.
     sessions: AtomicUsize,
+    /// Places for computations that move nothing.
+    pub computations: Semaphore,
     /// Folder of the recordings.
     pub recordings: PathBuf,
     /// The socket of this daemon.
@@ -96,6 +99,7 @@ impl Daemon {
             plan: Mutex::new(None),
             verdicts: Mutex::default(),
             sessions: AtomicUsize::new(0),
+            computations: Semaphore::new(MAX_COMPUTATIONS),
             recordings: parts.recordings,
             socket: parts.socket,
             started_unix_s: now().unix_s,

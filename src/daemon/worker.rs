@@ -14,15 +14,17 @@ use super::run_entry::Command;
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
-use crate::config::Source;
+use crate::config::{Source, texts_of_set};
 use crate::experiment::option_in;
 
 /// Longest time of a computation without motion.
 const COMPUTATION: Duration = Duration::from_secs(60);
 /// Most arguments of a command.
 const MAX_ARGS: usize = 200;
-/// Longest argument in bytes.
-const MAX_ARG_BYTES: usize = 4096;
+/// Longest arguments of a command together, in bytes.
+const MAX_ARG_BYTES: usize = 16 << 10;
+/// Computations that run at the same time. More of them would take the processor from the loop.
+pub const MAX_COMPUTATIONS: usize = 2;
 
 /// Arguments that a client may not give.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -37,7 +39,7 @@ pub enum ArgsError {
     Outside(String),
     /// Too many, or too long.
     #[error(
-        "a command has at most {MAX_ARGS} arguments of at most {MAX_ARG_BYTES} bytes; shorten it"
+        "a command has at most {MAX_ARGS} arguments of together at most {MAX_ARG_BYTES} bytes, without a zero byte; shorten it"
     )]
     TooLong,
 }
@@ -50,8 +52,9 @@ const RESERVED: [&str; 3] = ["--connect", "--out", "--plan"];
 /// # Errors
 /// With the first argument that is refused.
 pub fn check_args(args: &[String]) -> Result<(), ArgsError> {
-    let is_long = |arg: &String| arg.len() > MAX_ARG_BYTES || arg.contains('\0');
-    if args.len() > MAX_ARGS || args.iter().any(is_long) {
+    let bytes: usize = args.iter().map(String::len).sum();
+    let has_zero = args.iter().any(|arg| arg.contains('\0'));
+    if args.len() > MAX_ARGS || bytes > MAX_ARG_BYTES || has_zero {
         return Err(ArgsError::TooLong);
     }
     for arg in args {
@@ -69,12 +72,23 @@ pub fn check_args(args: &[String]) -> Result<(), ArgsError> {
 
 /// Whether an argument may be a path that leaves the folder. Quantities such as `0.1mm/s` are not paths.
 fn is_outside(arg: &str) -> bool {
-    let value = arg.rsplit('=').next().unwrap_or(arg);
-    let value = value.trim_matches(['"', '\'']);
-    value.starts_with(['/', '~'])
-        || Path::new(value)
-            .components()
-            .any(|part| part.as_os_str() == "..")
+    let after_option = match arg.strip_prefix("--") {
+        Some(option) => option.split_once('=').map_or("", |(_, value)| value),
+        None => arg,
+    };
+    let last = arg.rsplit('=').next().unwrap_or(arg);
+    let plain = [after_option, last].map(String::from);
+    let in_settings = texts_of_set(after_option);
+    plain
+        .iter()
+        .chain(&in_settings)
+        .any(|text| leaves_folder(text))
+}
+
+fn leaves_folder(text: &str) -> bool {
+    let path = text.trim().trim_matches(['"', '\'']);
+    let mut parts = Path::new(path).components();
+    path.starts_with(['/', '~']) || parts.any(|part| part.as_os_str() == "..")
 }
 
 /// Commands that take the configuration from the recording.
@@ -172,6 +186,12 @@ pub enum ComputeError {
     /// The system refuses the process.
     #[error("the computation cannot be started: {0}; look at the limits of the daemon's processes")]
     Start(#[from] io::Error),
+    /// Others go on.
+    #[error(
+        "{MAX_COMPUTATIONS} computations go on, and none of them ended within {} s; ask again later",
+        COMPUTATION.as_secs()
+    )]
+    Busy,
     /// It takes too long.
     #[error("the computation took more than {} s; start it on the command line", COMPUTATION.as_secs())]
     TooLong,
@@ -190,8 +210,10 @@ pub async fn compute(
     args: &[String],
 ) -> Result<serde_json::Value, ComputeError> {
     let (name, more) = command.split_first().unwrap_or((&"doctor", &[]));
-    let mut process = process_with(daemon, name, more, args)?;
-    let output = printed(process.arg("--json")).await?;
+    // In front of the others, so that none of them takes it as its value.
+    let args = [&["--json".to_string()], args].concat();
+    let mut process = process_with(daemon, name, more, &args)?;
+    let output = printed(daemon, &mut process).await?;
     serde_json::from_slice(&output.stdout).map_err(|_| ComputeError::of(&output))
 }
 
@@ -201,15 +223,17 @@ pub async fn compute(
 /// When the process cannot be started, takes too long, or draws nothing.
 pub async fn page(daemon: &Daemon, files: &[String]) -> Result<String, ComputeError> {
     let mut process = process(daemon, "report", files)?;
-    let output = printed(process.args(["--out", "-"])).await?;
+    let output = printed(daemon, process.args(["--out", "-"])).await?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
         false => Err(ComputeError::of(&output)),
     }
 }
 
-/// Runs a process to its end, and ends it if it takes too long.
-async fn printed(process: &mut Process) -> Result<Output, ComputeError> {
+/// Runs a process to its end when it has its turn, and ends it if it takes too long.
+async fn printed(daemon: &Daemon, process: &mut Process) -> Result<Output, ComputeError> {
+    let turn = tokio::time::timeout(COMPUTATION, daemon.computations.acquire());
+    let _turn = turn.await.map_err(|_| ComputeError::Busy)?;
     let child: Child = process.spawn()?;
     let ended = tokio::time::timeout(COMPUTATION, child.wait_with_output()).await;
     Ok(ended.map_err(|_| ComputeError::TooLong)??)
@@ -264,6 +288,11 @@ mod tests {
             &["--config", "/etc/passwd"][..],
             &["--config=/etc/passwd"],
             &["--set", "calibration.file=\"/etc/passwd\""],
+            &["--set", "calibration.file= /etc/passwd"],
+            &["--set", "calibration.file=\"/etc/passwd\" # =x"],
+            &["--set", "calibration.file=\"\\u002fetc/passwd\""],
+            &["--set=interlock.heat_file= ../x"],
+            &["--set", "a={b=[\"x\", \"../c\"], d=1}"],
             &["--controller", "../secret.toml"],
             &["--reference", "a/../../b.csv"],
             &["--controller", "~/x.toml"],
@@ -276,6 +305,17 @@ mod tests {
     }
 
     #[test]
+    fn refuses_arguments_that_are_too_many_or_too_long() {
+        assert!(checked(&vec!["x"; MAX_ARGS]).is_ok());
+        assert_eq!(checked(&vec!["x"; MAX_ARGS + 1]), Err(ArgsError::TooLong));
+        let long = "x".repeat(MAX_ARG_BYTES / 2);
+        let long = long.as_str();
+        assert!(checked(&[long, long]).is_ok());
+        assert_eq!(checked(&[long, long, "x"]), Err(ArgsError::TooLong));
+        assert_eq!(checked(&["a\0b"]), Err(ArgsError::TooLong));
+    }
+
+    #[test]
     fn accepts_quantities_profiles_and_files_of_the_folder() {
         for args in [
             &["--amplitude", "0.2A", "--band", "1Hz..200Hz"][..],
@@ -283,6 +323,9 @@ mod tests {
             &["--operating-point", "-3.8mm"],
             &["--config", "stage", "--set", "loop.rate_hz=5000"],
             &["--controller", "own.toml"],
+            &["--set=chirp.stop_hz=200"],
+            &["--set", "sim.noise=[1e-9, 2e-9]"],
+            &["--reference=step"],
         ] {
             assert_eq!(checked(args), Ok(()), "{args:?}");
         }

@@ -115,7 +115,16 @@ impl From<ArgsError> for ApiError {
 
 impl From<ComputeError> for ApiError {
     fn from(error: ComputeError) -> ApiError {
-        ApiError::refused(ErrorKind::Failed, error.to_string())
+        match error {
+            ComputeError::Busy => ApiError::new(
+                StatusCode::TOO_MANY_REQUESTS,
+                ErrorKind::Usage,
+                error.to_string(),
+            ),
+            ComputeError::Start(_) | ComputeError::TooLong | ComputeError::NoResult(_) => {
+                ApiError::refused(ErrorKind::Failed, error.to_string())
+            }
+        }
     }
 }
 

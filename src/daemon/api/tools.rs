@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::ApiError;
 use super::extract::Body;
-use crate::config::{self, Config, Source, load};
+use crate::config::{self, Config, Source, load, profiles};
 use crate::daemon::shared::{Daemon, DaemonConfig};
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
@@ -93,12 +93,23 @@ pub async fn check(
     config_view(&checked).map(Json)
 }
 
+/// The name of a profile, or the path of a file in the folder of the recordings, as for a command.
+fn in_folder(daemon: &Daemon, name: String) -> String {
+    match profiles::is_known(&name) {
+        true => name,
+        false => daemon.recordings.join(name).display().to_string(),
+    }
+}
+
 fn checked(daemon: &Daemon, new: NewConfig) -> Result<DaemonConfig, ApiError> {
     worker::check_args(&new.sets)?;
     worker::check_args(new.profile.as_slice())?;
     let own = daemon.configuration().source.clone();
     let source = Source {
-        config: new.profile.or(own.config),
+        config: new
+            .profile
+            .map(|name| in_folder(daemon, name))
+            .or(own.config),
         sets: new.sets,
         ..own
     };
