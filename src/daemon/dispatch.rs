@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::output::RunOutput;
-use super::run_entry::{Carrier, RunOutcome};
+use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome};
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::worker;
@@ -52,8 +52,8 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
     let daemon = Arc::clone(daemon);
     tokio::spawn(async move {
         let output = daemon.output(id);
-        let request = entry.request;
-        let ended = worker::run(&daemon, request.command, &request.args, &ticket, &output).await;
+        let stopped = stopped_before_its_run(&daemon, id);
+        let ended = worker::run(&daemon, &entry.request, &ticket, &output, stopped).await;
         finish(
             &daemon,
             id,
@@ -61,6 +61,17 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
             &output,
         );
     });
+}
+
+/// Waits until somebody stops a command whose run has not begun, or that has none: a calculation, or a run in its own process.
+async fn stopped_before_its_run(daemon: &Daemon, id: u64) {
+    let mut changes = daemon.changes();
+    let is_stopped = |entry: &RunEntry| entry.is_stopped && entry.phase == Phase::Starting;
+    while !daemon.read(|schedule| schedule.entry(id).is_ok_and(is_stopped)) {
+        if changes.changed().await.is_err() {
+            return;
+        }
+    }
 }
 
 /// Ends a command whose process has ended.
@@ -74,6 +85,7 @@ fn finish(daemon: &Daemon, id: u64, ended: &Result<i32, String>, output: &RunOut
         let (outcome, message) = match (ended, noted) {
             (Ok(0 | 3), _) => (RunOutcome::Completed, None),
             (Ok(_), Some(noted @ (RunOutcome::Tripped | RunOutcome::Stopped))) => (noted, None),
+            (Ok(_), None) if entry.is_stopped => (RunOutcome::Stopped, None),
             (Ok(_), _) => (RunOutcome::Failed, Some(output.last_errors(3))),
             (Err(why), _) => (
                 RunOutcome::Failed,

@@ -2,15 +2,17 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::{Output, Stdio};
+use std::process::{ExitStatus, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
 use tokio::io::{AsyncRead, AsyncReadExt};
 use tokio::process::{Child, Command as Process};
 
 use super::output::{OutputPiece, RunOutput};
-use super::run_entry::Command;
+use super::run_entry::{Command, RunRequest};
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
@@ -19,6 +21,8 @@ use crate::experiment::option_in;
 
 /// Longest time of a computation without motion.
 const COMPUTATION: Duration = Duration::from_secs(60);
+/// Longest time in which a stopped process ends by itself.
+const END_TIME: Duration = Duration::from_secs(5);
 /// Most arguments of a command.
 const MAX_ARGS: usize = 200;
 /// Longest arguments of a command together, in bytes.
@@ -126,18 +130,19 @@ fn source_args(source: &Source, args: &[String]) -> Vec<String> {
     config.chain(sets).collect()
 }
 
-/// Runs a command to its end; returns its exit code.
+/// Runs a command to its end, or ends its process when `stopped` is ready; returns its exit code.
 ///
 /// # Errors
 /// When the system refuses the process.
 pub async fn run(
     daemon: &Daemon,
-    command: Command,
-    args: &[String],
+    request: &RunRequest,
     ticket: &Secret,
     output: &Arc<RunOutput>,
+    stopped: impl Future<Output = ()>,
 ) -> io::Result<i32> {
-    let mut process = process(daemon, command.name(), args)?;
+    let command = request.command;
+    let mut process = process(daemon, command.name(), &request.args)?;
     process.env(TICKET_VARIABLE, ticket.reveal());
     if command != Command::Identify {
         process.arg("--out").arg(&daemon.recordings);
@@ -151,13 +156,29 @@ pub async fn run(
         .stderr
         .take()
         .map(|pipe| copy(pipe, OutputPiece::Stderr, output));
-    let status = child.wait().await?;
+    let status = tokio::select! {
+        status = child.wait() => status?,
+        () = stopped => end(&mut child).await?,
+    };
     for copied in [stdout, stderr].into_iter().flatten() {
         let _ = copied.await; // what was printed before the end
     }
     let code = status.code().unwrap_or(1);
     output.add(OutputPiece::Exit(code));
     Ok(code)
+}
+
+/// Asks a process to end, and kills it if it does not.
+async fn end(child: &mut Child) -> io::Result<ExitStatus> {
+    let number = child.id().and_then(|number| i32::try_from(number).ok());
+    if let Some(number) = number {
+        let _ = kill(Pid::from_raw(number), Signal::SIGTERM); // a process that has ended needs no signal
+    }
+    if let Ok(status) = tokio::time::timeout(END_TIME, child.wait()).await {
+        return status;
+    }
+    child.kill().await?;
+    child.wait().await
 }
 
 /// Copies a pipe into the output.
