@@ -21,13 +21,15 @@ import tempfile
 import threading
 import time
 
+import cyclictest
+
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 600.0
 BENCH = os.path.abspath(sys.argv[2] if len(sys.argv) > 2 else "target/release/bench")
-RATE_HZ, PRIORITY = 5000, 80
+RATE_HZ = 5000
 CLIENTS, REQUESTS_PER_S = 20, 200
 PATHS = ("/api/v1/state", "/api/v1/runs", "/api/v1/recordings", "/api/v1/response", "/metrics")
 # A stall of the machine is measured; it does not end the run.
-SETTINGS = ["--set", f"loop.rate_hz={RATE_HZ}", "--set", f"loop.priority={PRIORITY}", "--set", "interlock.overruns_per_s=1000"]
+SETTINGS = ["--set", f"loop.rate_hz={RATE_HZ}", "--set", f"loop.priority={cyclictest.PRIORITY}", "--set", "interlock.overruns_per_s=1000"]
 
 
 def control(seconds, folder, connect):
@@ -47,25 +49,13 @@ def figures(result):
     }
 
 
-def cyclictest(seconds):
-    command = ["cyclictest", "--mlockall", f"--priority={PRIORITY}", "--threads=1", f"--interval={round(1e6 / RATE_HZ)}"]
-    command += [f"--loops={round(seconds * RATE_HZ)}", "--quiet", "--histogram=20000"]
-    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    counts = {int(us): int(n) for us, n in re.findall(r"^(\d+)\s+(\d+)$", output, re.MULTILINE) if int(n)}
+def cyclictest_figures(seconds):
+    counts, largest = cyclictest.run(RATE_HZ, seconds)
     late = sum(n for us, n in counts.items() if us > 1e6 / RATE_HZ)
     return {
-        "p50": quantile(counts, 0.5), "p99": quantile(counts, 0.99), "max": int(re.search(r"Max Latencies:\s*(\d+)", output).group(1)),
+        "p50": cyclictest.quantile(counts, 0.5), "p99": cyclictest.quantile(counts, 0.99), "max": largest,
         "not served": 1e6 * late / sum(counts.values()), "lost records": 0,
     }
-
-
-def quantile(counts, share):
-    wanted, seen = share * sum(counts.values()), 0
-    for value in sorted(counts):
-        seen += counts[value]
-        if seen >= wanted:
-            return value + 0.5
-    raise ValueError("no counts")
 
 
 class Clients:
@@ -157,11 +147,11 @@ def daemon_round(seconds, folder):
 with tempfile.TemporaryDirectory() as folder:
     alone, theirs = [], []
     alone.append(figures(control(SECONDS / 4, folder, "none")))
-    theirs.append(cyclictest(SECONDS / 4))
+    theirs.append(cyclictest_figures(SECONDS / 4))
     result = daemon_round(SECONDS, folder)
     served = figures(result)
     alone.append(figures(control(SECONDS / 4, folder, "none")))
-    theirs.append(cyclictest(SECONDS / 4))
+    theirs.append(cyclictest_figures(SECONDS / 4))
     scheduling = {name: result["timing"][name] for name in ("policy", "memory_locked", "idle_states_off", "cpu")}
     print(f"scheduling of the loop: {scheduling}")
     for name in served:

@@ -9,23 +9,23 @@ and the ratios. Run it on an idle machine.
 """
 
 import json
-import re
 import statistics
 import subprocess
 import sys
 import tempfile
 
+import cyclictest
+
 RATES_HZ = (1000, 2000, 5000)
 ROUNDS = 5
 SECONDS = float(sys.argv[1]) if len(sys.argv) > 1 else 300.0
 BENCH = sys.argv[2] if len(sys.argv) > 2 else "target/release/bench"
-PRIORITY = 80
 
 
 def bench_round(rate_hz, seconds, folder):
     """p50, p99 and maximum of the loop in microseconds, and how it was scheduled."""
     command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", f"{seconds}s", "--json", "--out", folder]
-    command += ["--set", f"loop.rate_hz={rate_hz}", "--set", f"loop.priority={PRIORITY}"]
+    command += ["--set", f"loop.rate_hz={rate_hz}", "--set", f"loop.priority={cyclictest.PRIORITY}"]
     command += ["--set", "interlock.overruns_per_s=1000"]  # a stall of the machine is measured; it does not end the run
     answer = subprocess.run(command, capture_output=True, text=True)
     if answer.returncode not in (0, 3):  # 3: ticks were missed
@@ -39,23 +39,8 @@ def bench_round(rate_hz, seconds, folder):
 
 def cyclictest_round(rate_hz, seconds):
     """p50, p99 and maximum of cyclictest in microseconds."""
-    period_us = round(1e6 / rate_hz)
-    command = ["cyclictest", "--mlockall", f"--priority={PRIORITY}", "--threads=1", f"--interval={period_us}"]
-    command += [f"--loops={round(seconds * rate_hz)}", "--quiet", "--histogram=20000"]
-    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    counts = {int(us): int(n) for us, n in re.findall(r"^(\d+)\s+(\d+)$", output, re.MULTILINE) if int(n)}
-    maximum = int(re.search(r"Max Latencies:\s*(\d+)", output).group(1))
-    return [quantile(counts, 0.5), quantile(counts, 0.99), maximum]
-
-
-def quantile(counts, share):
-    """The value below which a share of the counts lies, in the middle of its bin of one microsecond."""
-    wanted, seen = share * sum(counts.values()), 0
-    for value in sorted(counts):
-        seen += counts[value]
-        if seen >= wanted:
-            return value + 0.5
-    raise ValueError("no counts")
+    counts, largest = cyclictest.run(rate_hz, seconds)
+    return [cyclictest.quantile(counts, 0.5), cyclictest.quantile(counts, 0.99), largest]
 
 
 def over_rounds(rounds):

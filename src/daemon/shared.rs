@@ -13,10 +13,12 @@ use super::live::hub::LiveHub;
 use super::output::RunOutput;
 use super::owner::Owner;
 use super::schedule::{Now, Schedule};
-use super::worker::MAX_COMPUTATIONS;
 use crate::config::{Config, Source};
 use crate::experiment::Plan;
 use crate::util::timestamp::unix_ns;
+
+/// Computations that run at the same time. More of them would take the processor from the loop.
+pub const MAX_COMPUTATIONS: usize = 2;
 
 /// Commands whose output is kept.
 const KEPT_OUTPUTS: usize = 100;

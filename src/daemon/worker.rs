@@ -1,7 +1,7 @@
 //! Commands as processes of their own: they send their plan to the owner of the rig and analyse the recording in their own memory.
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{ExitStatus, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
@@ -14,7 +14,7 @@ use tokio::process::{Child, Command as Process};
 use super::output::{OutputPiece, RunOutput};
 use super::run_entry::{Command, RunRequest};
 use super::secret::Secret;
-use super::shared::Daemon;
+use super::shared::{Daemon, MAX_COMPUTATIONS};
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
 use crate::config::{Source, texts_of_set};
 use crate::experiment::option_in;
@@ -27,8 +27,6 @@ const END_TIME: Duration = Duration::from_secs(5);
 const MAX_ARGS: usize = 200;
 /// Longest arguments of a command together, in bytes.
 const MAX_ARG_BYTES: usize = 16 << 10;
-/// Computations that run at the same time. More of them would take the processor from the loop.
-pub const MAX_COMPUTATIONS: usize = 2;
 
 /// Arguments that a client may not give.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -98,12 +96,13 @@ fn leaves_folder(text: &str) -> bool {
 /// Commands that take the configuration from the recording.
 const WITHOUT_CONFIG: [&str; 2] = ["identify", "report"];
 
-/// The program of the daemon itself, with arguments. The configuration of the daemon applies unless the client names another.
-fn process(daemon: &Daemon, command: &str, args: &[String]) -> io::Result<Process> {
+/// The program of the daemon itself, with a command (`chirp`, or `model modes`) and arguments. The configuration of the daemon
+/// applies unless the client names another.
+fn process(daemon: &Daemon, command: &[&str], args: &[String]) -> io::Result<Process> {
     let program = std::env::current_exe()?;
     let mut process = Process::new(program);
-    process.arg(command);
-    if !WITHOUT_CONFIG.contains(&command) {
+    process.args(command);
+    if !command.iter().any(|word| WITHOUT_CONFIG.contains(word)) {
         process.args(source_args(&daemon.configuration().source, args));
     }
     process
@@ -142,7 +141,7 @@ pub async fn run(
     stopped: impl Future<Output = ()>,
 ) -> io::Result<i32> {
     let command = request.command;
-    let mut process = process(daemon, command.name(), &request.args)?;
+    let mut process = process(daemon, &[command.name()], &request.args)?;
     process.env(TICKET_VARIABLE, ticket.reveal());
     if command != Command::Identify {
         process.arg("--out").arg(&daemon.recordings);
@@ -230,10 +229,9 @@ pub async fn compute(
     command: &[&str],
     args: &[String],
 ) -> Result<serde_json::Value, ComputeError> {
-    let (name, more) = command.split_first().unwrap_or((&"doctor", &[]));
     // In front of the others, so that none of them takes it as its value.
     let args = [&["--json".to_string()], args].concat();
-    let mut process = process_with(daemon, name, more, &args)?;
+    let mut process = process(daemon, command, &args)?;
     let output = printed(daemon, &mut process).await?;
     serde_json::from_slice(&output.stdout).map_err(|_| ComputeError::of(&output))
 }
@@ -243,7 +241,7 @@ pub async fn compute(
 /// # Errors
 /// When the process cannot be started, takes too long, or draws nothing.
 pub async fn page(daemon: &Daemon, files: &[String]) -> Result<String, ComputeError> {
-    let mut process = process(daemon, "report", files)?;
+    let mut process = process(daemon, &["report"], files)?;
     let output = printed(daemon, process.args(["--out", "-"])).await?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
@@ -264,33 +262,6 @@ impl ComputeError {
     fn of(output: &Output) -> ComputeError {
         let errors = String::from_utf8_lossy(&output.stderr);
         ComputeError::NoResult(errors.lines().last().unwrap_or("no output").into())
-    }
-}
-
-fn process_with(
-    daemon: &Daemon,
-    name: &str,
-    more: &[&str],
-    args: &[String],
-) -> io::Result<Process> {
-    match more {
-        [] => process(daemon, name, args),
-        more => {
-            let program: PathBuf = std::env::current_exe()?;
-            let mut process = Process::new(program);
-            process
-                .arg(name)
-                .args(more)
-                .args(source_args(&daemon.configuration().source, args))
-                .args(args)
-                .current_dir(&daemon.recordings)
-                .env(SOCKET_VARIABLE, &daemon.socket)
-                .stdin(Stdio::null())
-                .stdout(Stdio::piped())
-                .stderr(Stdio::piped())
-                .kill_on_drop(true);
-            Ok(process)
-        }
     }
 }
 
