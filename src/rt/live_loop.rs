@@ -133,6 +133,13 @@ impl Drop for LiveLoop {
     }
 }
 
+/// Idle ticks before a run. Locking memory takes milliseconds; on a computer with one processor nothing is read meanwhile, and the
+/// first reading of the run would be stale.
+fn catch_up_ticks(period_s: f64) -> u64 {
+    const CATCH_UP_S: f64 = 0.01;
+    (CATCH_UP_S / period_s).ceil() as u64
+}
+
 /// The loop's ends of the rings.
 struct LoopEnds {
     runs: Consumer<Box<ServoRun>>,
@@ -144,7 +151,7 @@ impl LoopEnds {
     fn serve_virtual(mut self, mut servo: Servo, period_s: f64) {
         while !self.runs.is_abandoned() {
             match self.runs.pop() {
-                Ok(run) => self.serve(&mut servo, run, || Virtual { period_s }),
+                Ok(run) => self.serve(&mut servo, run, Virtual { period_s }),
                 Err(_) => std::thread::park(),
             }
         }
@@ -155,9 +162,13 @@ impl LoopEnds {
         while !self.runs.is_abandoned() {
             match self.runs.pop() {
                 Ok(run) => {
-                    self.serve(&mut servo, run, || {
-                        Realtime::new(period_s).awake_before_ticks(awake_s)
-                    });
+                    let privileges = self.scheduling.hold();
+                    for _ in 0..catch_up_ticks(period_s) {
+                        number = tick(&mut servo, &mut idle, number);
+                    }
+                    let clock = Realtime::new(period_s).awake_before_ticks(awake_s);
+                    self.serve(&mut servo, run, clock);
+                    drop(privileges);
                     (idle, number) = (Realtime::new(period_s), 0);
                 }
                 Err(_) => number = tick(&mut servo, &mut idle, number),
@@ -165,12 +176,10 @@ impl LoopEnds {
         }
     }
 
-    /// One run, with its privileges. The clock of the run starts afterwards, because locking memory takes milliseconds.
-    fn serve<C: Clock>(&mut self, servo: &mut Servo, run: Box<ServoRun>, clock: impl Fn() -> C) {
+    /// One run.
+    fn serve(&mut self, servo: &mut Servo, run: Box<ServoRun>, clock: impl Clock) {
         let idle = servo.exchange(run);
-        let privileges = self.scheduling.hold();
-        run_to_end(servo, clock());
-        drop(privileges);
+        run_to_end(servo, clock);
         let ended = servo.exchange(idle);
         // The ring holds one run, and the next one begins after this one was taken.
         let _ = self.ended.push(ended);
