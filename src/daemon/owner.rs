@@ -20,8 +20,12 @@ use crate::rt::supervision::StopFlags;
 use crate::rt::thread::{Pace, Scheduling};
 use crate::util::progress::Progress;
 
-/// Pause between two attempts to open the devices.
+/// Pause between two attempts to open the devices, and between two checks of open devices without a command.
 const RETRY: Duration = Duration::from_secs(2);
+/// Devices with a defect are opened again after this number of checks.
+const REOPENED_AT: u32 = 2;
+/// Checks until they are opened once more, if the defect remains, for example a stored fault of the amplifier.
+const REOPENED_EVERY: u32 = 15;
 
 /// A plan for the owner.
 pub struct OwnerOrder {
@@ -55,7 +59,7 @@ pub struct RigStatus {
     pub pace: Pace,
     /// Counts of the serial port of the probe; `None` on a simulated stage.
     pub serial: Option<StatisticsHandle>,
-    /// Why the rig is not open.
+    /// Why the rig is not open, or cannot be used.
     pub fault: Option<String>,
     /// Whether the devices are being opened, which takes up to some seconds.
     pub is_opening: bool,
@@ -90,6 +94,7 @@ impl Owner {
             config,
             hooks,
             idle: None,
+            defects: 0,
             command: None,
             status: Arc::clone(&status),
         };
@@ -148,6 +153,8 @@ struct OwnerThread {
     hooks: RunHooks,
     /// The rig between two commands.
     idle: Option<OpenBench>,
+    /// Checks in a row in which a device of the rig was not usable.
+    defects: u32,
     /// The command that has its turn.
     command: Option<(u64, Runner)>,
     status: Arc<Mutex<RigStatus>>,
@@ -160,7 +167,7 @@ impl OwnerThread {
             match messages.recv_timeout(RETRY) {
                 Ok(Message::Run(order)) => self.run(*order),
                 Ok(Message::EndCommand) => self.end_command(),
-                Err(RecvTimeoutError::Timeout) => self.open_idle(),
+                Err(RecvTimeoutError::Timeout) => self.check_idle(),
                 Err(RecvTimeoutError::Disconnected) => return,
             }
         }
@@ -171,6 +178,27 @@ impl OwnerThread {
             stage: Stage::of(&self.config),
             pace: Pace::Realtime,
             clear_fault: false,
+        }
+    }
+
+    /// Checks the rig between two commands. A rig with a device that lost its cable or its supply is opened again.
+    fn check_idle(&mut self) {
+        let Some(bench) = &self.idle else {
+            return self.open_idle();
+        };
+        let Some(defect) = bench.defect().filter(|_| !self.is_simulated()) else {
+            self.defects = 0;
+            lock(&self.status).fault = None;
+            return;
+        };
+        if self.defects == 0 {
+            tracing::warn!("between two runs: {defect}");
+        }
+        self.defects = self.defects.saturating_add(1);
+        lock(&self.status).fault = Some(defect.to_string());
+        if self.defects % REOPENED_EVERY == REOPENED_AT {
+            self.idle = None;
+            self.open_idle();
         }
     }
 
@@ -257,6 +285,7 @@ impl OwnerThread {
     }
 
     fn end_command(&mut self) {
+        self.defects = 0;
         if let Some((_, runner)) = self.command.take() {
             let bench = runner.into_bench();
             self.idle = bench.filter(|_| !self.is_simulated());

@@ -369,7 +369,8 @@ async fn watch_loop(daemon: Arc<Daemon>) {
         }
         let status = daemon.owner.status();
         // While the devices are closed, no tick passes; the owner tries again to open them.
-        let may_wait = status.fault.is_some() || passed.elapsed() < OPENING && status.is_opening;
+        let is_closed = status.fault.is_some() && status.names.is_none();
+        let may_wait = is_closed || passed.elapsed() < OPENING && status.is_opening;
         if passed.elapsed() < 2 * period || may_wait {
             notify(&[NotifyState::Watchdog]);
         }

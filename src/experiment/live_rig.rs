@@ -18,11 +18,12 @@ use super::run_recording::{create_recording, metadata, recording_bytes, require_
 use super::run_supervisor::Supervisor;
 use crate::config::{Config, LoopSettings};
 use crate::recording::{self, DiskWatch, Recorder, free_bytes};
+use crate::rt::device_defect::DeviceDefect;
 use crate::rt::interlock::Interlocks;
 use crate::rt::live_loop::LiveLoop;
 use crate::rt::program::Program;
 use crate::rt::request::{Request, RequestSender};
-use crate::rt::servo_run::{Connections, ServoRun};
+use crate::rt::servo_run::{Connections, Progress, ServoRun};
 use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
 use crate::rt::tuning::Tune;
@@ -41,6 +42,8 @@ pub struct LiveRig {
     live: LiveLoop,
     pace: Pace,
     hooks: RunHooks,
+    /// Progress of the loop between two runs.
+    idle: Arc<Progress>,
 }
 
 impl LiveRig {
@@ -62,10 +65,22 @@ impl LiveRig {
         pace: Pace,
         hooks: RunHooks,
     ) -> Result<LiveRig, RunError> {
-        let idle = ServoRun::new(interlocks(config), idle_connections(config, &hooks));
-        let live = LiveLoop::open(rig, Box::new(idle), &config.servo, pace);
+        let connections = idle_connections(config, &hooks);
+        let idle = Arc::clone(&connections.progress);
+        let run = ServoRun::new(interlocks(config), connections);
+        let live = LiveLoop::open(rig, Box::new(run), &config.servo, pace);
         let live = live.map_err(RunError::system("start the thread of the loop"))?;
-        Ok(LiveRig { live, pace, hooks })
+        Ok(LiveRig {
+            live,
+            pace,
+            hooks,
+            idle,
+        })
+    }
+
+    /// The device that cannot be used, as of the last tick between two runs.
+    pub fn defect(&self) -> Option<DeviceDefect> {
+        self.idle.defect.get()
     }
 
     /// Replaces the hooks for the next run.

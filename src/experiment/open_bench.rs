@@ -9,6 +9,7 @@ use super::loop_check::Stage;
 use super::run_hooks::RunHooks;
 use crate::config::Config;
 use crate::rig::devices;
+use crate::rt::device_defect::DeviceDefect;
 use crate::rt::thread::{Pace, Scheduling};
 
 /// Which rig is opened, and how.
@@ -89,6 +90,11 @@ impl OpenBench {
             && open.probe == config.probe
             && open.interlock == config.interlock
             && open.sim == config.sim
+    }
+
+    /// The device that cannot be used, as of the last tick between two runs.
+    pub fn defect(&self) -> Option<DeviceDefect> {
+        self.rig.defect()
     }
 
     /// Identities of the devices.

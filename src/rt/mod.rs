@@ -9,11 +9,12 @@
 //!
 //! [`servo`] is the loop itself, [`servo_run`] what belongs to one run of it, [`live_loop`] its thread, which serves runs as long as
 //! the rig is open, [`thread`] how the system schedules it. [`interlock`], [`residual`] and [`arming`] are its safety, [`settling`] the end of a
-//! run, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
+//! run, [`device_defect`] whether the devices can be used, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
 //! [`supervision`] what ends a run without a request, [`tuning`] what changes a run in progress.
 
 pub mod arming;
 pub mod clock;
+pub mod device_defect;
 mod following_error;
 pub mod interlock;
 pub mod live_loop;

@@ -7,6 +7,7 @@ use bench_hal::{AmplifierStatus, DeviceError, Reading, Rig, Tick, Validity};
 
 use super::arming::{State, Transition, Trip};
 use super::clock::{Clock, TickTiming, scheduled_ns};
+use super::device_defect::DeviceDefect;
 use super::program::{Decision, Program, ProgramInput};
 use super::record::{
     EventKind, Origin, REQUESTS_PER_TICK, Refusal, RequestEvent, RequestKind, TickRecord, flag,
@@ -141,7 +142,10 @@ impl Servo {
         let motion = self.check_motion(reading.position_m, timing.missed);
         let actual_a = self.rig.actual_current_a().filter(|_| !self.is_off());
         let current = self.run.interlocks.check_current(actual_a, timing.tick);
-        match self.rig.status() {
+        let status = self.rig.status();
+        let defect = &self.run.connections.progress.defect;
+        defect.set(DeviceDefect::of(status, raw));
+        match status {
             AmplifierStatus::Fault(code) => Err(Trip::Amplifier {
                 code: i64::from(code),
                 text: self.rig.explain(code),

@@ -8,6 +8,7 @@ use rtrb::{Consumer, Producer};
 use serde::{Deserialize, Serialize};
 
 use super::arming::Trip;
+use super::device_defect::DefectCell;
 use super::interlock::Interlocks;
 use super::program::Program;
 use super::publisher::Publisher;
@@ -25,6 +26,8 @@ pub struct Progress {
     pub run_ticks: AtomicU64,
     /// Ticks without a record since the last recorded one.
     pub unrecorded_ticks: AtomicU64,
+    /// Whether the devices can be used.
+    pub defect: DefectCell,
 }
 
 /// The loop's ends of the rings.

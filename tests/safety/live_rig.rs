@@ -8,6 +8,7 @@ use bench::config::Config;
 use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
+use bench::rt::device_defect::DeviceDefect;
 use bench::rt::live_loop::{LiveLoop, LoopPanicked};
 use bench::rt::program::Program;
 use bench::rt::publisher::Publisher;
@@ -280,4 +281,27 @@ fn runner_opens_the_rig_again_after_a_trip() {
     assert!(tripped.ended.trip.is_some(), "{:?}", tripped.ended);
     let again = runner.run(&tripping, "control").expect("a run");
     assert!(again.ended.trip.is_some(), "not refused: {:?}", again.ended);
+}
+
+#[test]
+fn names_the_device_that_fails_between_two_runs() {
+    for (fault, defect) in [
+        (Fault::AmplifierFault(7), DeviceDefect::Amplifier),
+        (Fault::Validity(Validity::Faulty), DeviceDefect::Probe),
+        (Fault::Age(u64::MAX), DeviceDefect::Probe),
+    ] {
+        let rig = FaultyRig::new(StillRig::default(), &[(10..u64::MAX, fault)]);
+        let live = LiveRig::open(Box::new(rig), &stage(), Pace::Realtime).expect("a thread");
+        assert_eq!(wait_for_defect(&live), Some(defect), "{fault:?}");
+    }
+}
+
+fn wait_for_defect(live: &LiveRig) -> Option<DeviceDefect> {
+    for _ in 0..60_000 {
+        if let Some(defect) = live.defect() {
+            return Some(defect);
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    None
 }

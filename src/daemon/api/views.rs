@@ -50,7 +50,7 @@ pub struct DaemonView {
     pub amplifier: Option<String>,
     /// The probe; `null` while it is not open.
     pub probe: Option<String>,
-    /// Why the rig is not open.
+    /// Why the rig is not open, or cannot be used.
     pub fault: Option<String>,
     /// Folder of the recordings.
     pub recordings: String,

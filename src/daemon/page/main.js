@@ -131,7 +131,7 @@ function showAlert() {
   alert.replaceChildren();
   if (!key) return;
   const paragraph = (text) => { const made = document.createElement("p"); made.textContent = text; alert.append(made); };
-  paragraph(trip ? `Tripped: ${trip.text}` : `The rig is not open: ${fault}`);
+  paragraph(trip ? `Tripped: ${trip.text}` : `The rig is not ready: ${fault}`);
   if (trip) {
     paragraph(`Remedy: ${trip.remedy}`);
     const button = document.createElement("button");
