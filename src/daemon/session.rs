@@ -52,7 +52,11 @@ pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket) {
 /// Number of the entry, and whether it belongs to the connection.
 fn enter(daemon: &Daemon, open: &OpenCommand) -> Result<(u64, bool), ScheduleError> {
     if let Some(ticket) = &open.ticket {
-        let id = daemon.read(|schedule| schedule.by_ticket(ticket))?;
+        let id = daemon.change(|schedule, _| {
+            let id = schedule.by_ticket(ticket)?;
+            schedule.open_entry(id)?.estimated_s = open.estimated_s;
+            Ok(id)
+        })?;
         return Ok((id, false));
     }
     let id = daemon.change(|schedule, now| {
