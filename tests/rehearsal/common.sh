@@ -1,0 +1,32 @@
+# Sourced by the scripts inside the virtual machine: $1 is the program, $2 a folder for the results. All files are in memory: a
+# file of the host would make the machine wait, and its clock leaps while it waits.
+set -u
+out=$2
+mkdir -p /tmp/bench && cp "$1" /tmp/bench/bench && cp "$(dirname "$0")"/*.toml /tmp/bench/ && cd /tmp/bench || exit 1
+export XDG_STATE_HOME=/tmp/bench/state
+ip link add vcan0 type vcan && ip link set vcan0 up || exit 1
+
+# run NAME ARGUMENT...: a run of the bench; report, messages and exit code are stored under this name.
+run() {
+  name=$1
+  shift
+  ./bench "$@" --config real.toml --out recordings --json >"$name.json" 2>"$name.err"
+  echo $? >"$name.code"
+}
+
+# act NAME [OPTION...]: emulated amplifier and probe.
+act() {
+  log=$1
+  shift
+  rm -f /tmp/probe # of an emulator that was killed
+  ./bench emulate amplifier probe --config real.toml --pty /tmp/probe --log "$log.jsonl" "$@" >"$log.out" 2>&1 &
+  device=$!
+  sleep 1
+}
+leave() { kill -INT "$device"; wait "$device"; echo $? >"$1.device.code"; }
+
+# store: the results, for the checks on the host.
+store() {
+  rm -f bench
+  cp -r . "$out/"
+}
