@@ -106,6 +106,24 @@ fn oversized_and_unknown_requests_are_refused() {
     }
 }
 
+#[test]
+fn rejects_array_in_place_of_an_object() {
+    let daemon = Daemon::start();
+    let lease = daemon.take_lease("anna");
+    for (path, body) in [
+        ("/api/v1/runs", json!(["control", []])),
+        ("/api/v1/tune", json!([0.5])),
+        ("/api/v1/plan", json!(["chirp"])),
+        ("/api/v1/config/check", json!([])),
+        ("/api/v1/lease", json!(["bert"])),
+    ] {
+        let answer = daemon.ask("POST", path, &lease, Some(body));
+        assert_eq!(answer.status, 422, "{path}");
+    }
+    assert_eq!(daemon.get("/api/v1/runs")["finished"], json!([]));
+    assert!(daemon.state()["run"].is_null());
+}
+
 /// Any JSON, with the names that the interface knows.
 fn any_json() -> impl Strategy<Value = Value> {
     let leaf = prop_oneof![

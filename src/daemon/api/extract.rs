@@ -29,26 +29,49 @@ impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
-        let read = Json::<T>::from_request(request, state);
-        match tokio::time::timeout(BODY_TIME, read).await {
-            Err(_) => Err(ApiError::new(
+        let read = tokio::time::timeout(BODY_TIME, object(request, state));
+        let read = read.await.unwrap_or_else(|_| {
+            let message = format!(
+                "the body of the request did not arrive within {} s; send it again",
+                BODY_TIME.as_secs()
+            );
+            Err(ApiError::new(
                 StatusCode::REQUEST_TIMEOUT,
                 ErrorKind::Usage,
-                format!(
-                    "the body of the request did not arrive within {} s; send it again",
-                    BODY_TIME.as_secs()
-                ),
-            )),
-            Ok(Ok(Json(body))) => Ok(Body(body)),
-            Ok(Err(rejection)) => {
-                let message = format!(
-                    "the body of the request cannot be used: {}; see /api/v1/openapi.json for its form",
-                    rejection.body_text()
-                );
-                Err(ApiError::new(rejection.status(), ErrorKind::Usage, message))
-            }
-        }
+                message,
+            ))
+        });
+        read.map(Body)
     }
+}
+
+async fn object<T: DeserializeOwned>(
+    request: Request,
+    state: &(impl Send + Sync),
+) -> Result<T, ApiError> {
+    let (parts, body) = request.into_parts();
+    let limited = Request::from_parts(parts.clone(), body);
+    let read = Bytes::from_request(limited, state).await;
+    let bytes = read.map_err(|rejection| unusable(rejection.status(), &rejection.body_text()))?;
+    let parsed = Json::<T>::from_request(Request::from_parts(parts, bytes.clone().into()), state);
+    let Json(body) = parsed
+        .await
+        .map_err(|rejection| unusable(rejection.status(), &rejection.body_text()))?;
+    // An array of the fields can be read as the object, too.
+    match bytes.trim_ascii_start().starts_with(b"{") {
+        true => Ok(body),
+        false => Err(unusable(
+            StatusCode::UNPROCESSABLE_ENTITY,
+            "it is no object",
+        )),
+    }
+}
+
+fn unusable(status: StatusCode, why: &str) -> ApiError {
+    let message = format!(
+        "the body of the request cannot be used: {why}; see /api/v1/openapi.json for its form"
+    );
+    ApiError::new(status, ErrorKind::Usage, message)
 }
 
 impl<T: JsonSchema> OperationInput for Body<T> {
