@@ -80,6 +80,14 @@ impl Daemon {
         &self.address
     }
 
+    pub fn token(&self) -> &str {
+        &self.token
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
     pub fn url(&self) -> String {
         format!("http://{}/#token={}", self.address, self.token)
     }

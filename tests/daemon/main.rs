@@ -4,5 +4,8 @@ mod crash;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod interface;
+mod listener;
 mod queue;
 mod same_command;
+mod sequences;
+mod wire;
