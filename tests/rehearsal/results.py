@@ -35,9 +35,14 @@ def journal(name):
     return [json.loads(line) for line in (folder / f"{name}.jsonl").read_text().splitlines()]
 
 
+def stored(path):
+    """The copy of a file of the machine. A command names it in its folder, which is /tmp/bench, the daemon by its whole path."""
+    return folder / path.removeprefix("/tmp/bench/")
+
+
 def recording(name):
     """Ticks and events of a run."""
-    return messages_in(folder / report(name)["recording"])
+    return messages_in(stored(report(name)["recording"]))
 
 
 def messages_in(path):
@@ -66,7 +71,7 @@ def compare_with_simulation(name):
     numbers = [tick.tick for tick in ticks]
     must(numbers == list(range(numbers[0], numbers[0] + len(numbers))), "every tick is in the recording")
     must(any(tick.HasField("actual_a") and tick.actual_a != 0 for tick in ticks), "with the current the drive measures")
-    f, real = frf(folder / chirp["frf_csv"])
+    f, real = frf(stored(chirp["frf_csv"]))
     # The delay of the real chain is fitted, because only a measurement gives it. It is changed in the simulation, not by a
     # rotation of the phase, because aliased components rotate differently.
     delay_s = 0.0008
