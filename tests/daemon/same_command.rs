@@ -55,6 +55,8 @@ fn is_the_same(arguments: &[&str]) {
         .expect("a process");
     assert_eq!(outcome(&output), outcome(&expected), "{arguments:?}");
     assert_eq!(files(attached.path()), files(alone.path()), "{arguments:?}");
+    // The daemon notices the end of the process a moment later.
+    daemon.wait("the command has ended", "", |state| state["run"].is_null());
     let runs = daemon.get("/api/v1/runs");
     let made = runs["finished"].as_array().expect("a list");
     assert_eq!(made.len(), 1, "the daemon made the run: {runs}");
