@@ -11,7 +11,7 @@ const PICTURES = process.env.BENCH_PAGE_PICTURES ?? "target/page-pictures";
 const SCOPE_S = Number(process.env.BENCH_PAGE_SCOPE_S ?? 20);
 const DESK = { width: 1400, height: 1000 };
 /** A step that waits longer than this has failed. It is not a requirement. */
-const PATIENCE = { timeout: 30_000 };
+const PATIENCE = { timeout: 180_000 };
 
 const daemon = new Daemon();
 let chrome;
