@@ -1,4 +1,5 @@
 //! The daemon as a process: its interface, its queue, its end, and the commands that use it.
+mod asks;
 mod common;
 mod crash;
 #[cfg(feature = "foxglove")]
