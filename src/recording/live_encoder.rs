@@ -48,12 +48,16 @@ impl LiveEncoder {
         }
     }
 
+    /// The summary of the last second, after the last message of the loop.
+    pub fn finish(&mut self) -> Option<EncodedMessage> {
+        let (last_ns, timing) = self.tally.close(&self.account)?;
+        Some(self.message(Topic::Timing, last_ns, &timing))
+    }
+
     fn tick(&mut self, tick: &TickRecord) -> Vec<EncodedMessage> {
         let mut encoded = Vec::new();
-        if self.tally.is_over(tick)
-            && let Some((last_ns, timing)) = self.tally.close(&self.account)
-        {
-            encoded.push(self.message(Topic::Timing, last_ns, &timing));
+        if self.tally.is_over(tick) {
+            encoded.extend(self.finish());
         }
         // A loop that counts anew is shown all the same: the recorder refuses it, a viewer does not.
         let _ = self.account.tick(tick);

@@ -193,6 +193,12 @@ impl OpenFeed {
         self.run.map_or(0, |run| run.number)
     }
 
+    /// Whether its ring is empty and will remain so.
+    fn has_ended(&self) -> bool {
+        // In this order: what was pushed before the ring was abandoned is then in it.
+        self.feed.messages.is_abandoned() && self.feed.messages.is_empty()
+    }
+
     fn is_of(&self, kind: RunKind) -> bool {
         self.run.is_some_and(|run| run.kind == kind)
     }
@@ -290,7 +296,9 @@ impl Follower {
                 }
             }
         }
-        feeds.retain(|feed| !feed.feed.messages.is_abandoned() || !feed.feed.messages.is_empty());
+        for mut ended in feeds.extract_if(.., |feed| feed.has_ended()) {
+            self.show_last(&mut ended);
+        }
         self.feeds = feeds;
     }
 
@@ -301,6 +309,14 @@ impl Follower {
         for encoded in feed.encoder.encode(message) {
             viewer.show(&encoded);
         }
+    }
+
+    /// Shows what a recording contains after its last tick.
+    fn show_last(&self, feed: &mut OpenFeed) {
+        let (Some(viewer), Some(last)) = (&self.viewer, feed.encoder.finish()) else {
+            return;
+        };
+        viewer.show(&last);
     }
 
     /// The time of a tick since the daemon started. Each run counts its ticks from 0: its first tick has the time of its arrival, or
