@@ -2,7 +2,7 @@
 use std::process::Command;
 
 #[test]
-fn independent_client_sees_the_channels_and_the_values_of_the_recording() {
+fn independent_client_sees_every_message_of_the_recording_beside_a_client_that_does_not_read() {
     let python = std::env::var("BENCH_PYTHON").unwrap_or_else(|_| "python3".into());
     let packages = Command::new(&python)
         .args(["-c", "import websockets, google.protobuf, mcap_protobuf"])

@@ -2,7 +2,7 @@
 
     python3 foxglove_client.py BENCH FOLDER
 
-Prints the number of compared messages of each channel. Packages: websockets, protobuf, mcap, mcap-protobuf-support.
+Prints the number of compared messages of each channel, and how many a second client lost that did not read. Packages: websockets, protobuf, mcap, mcap-protobuf-support.
 """
 
 import asyncio
@@ -11,6 +11,7 @@ import json
 import os
 import pathlib
 import re
+import socket
 import struct
 import subprocess
 import sys
@@ -24,6 +25,17 @@ BENCH, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
 SETTINGS = ["--set", "loop.rate_hz=5000", "--set", "interlock.overruns_per_s=1000000"]
 ENVIRONMENT = {**os.environ, "BENCH_SOCKET": str(FOLDER / "bench.sock")}
 CHANNELS = {"/loop": "bench.Loop", "/event": "bench.Event", "/timing": "bench.Timing"}
+PROTOCOLS = ["foxglove.sdk.v1"]
+# Binary message with the data of a subscription; level of a status.
+MESSAGE_DATA, ERROR = 1, 2
+# Requests to change something, and the capability that a server would need.
+REQUESTS = {
+    json.dumps({"op": "advertise", "channels": [{"id": 9, "topic": "/loop", "encoding": "json", "schemaName": ""}]}): "clientPublish",
+    json.dumps({"op": "setParameters", "parameters": [{"name": "loop.rate_hz", "value": 1}]}): "parameters",
+    json.dumps({"op": "fetchAsset", "uri": "file:///etc/hostname", "requestId": 1}): "assets",
+}
+# Ticks after which the server has left out some for a client that does not read: three times its queue.
+STALLED_TICKS = 50_000
 
 
 def message_class(channel):
@@ -36,57 +48,119 @@ def message_class(channel):
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(channel["schemaName"]))
 
 
-async def follow(address):
-    """Runs a loop; returns the messages of each channel as (log time, fields)."""
-    received = {topic: [] for topic in CHANNELS}
-    async with websockets.connect(address, subprotocols=["foxglove.sdk.v1"], max_size=None) as socket:
-        topics, classes = {}, {}
-        while len(topics) < len(CHANNELS):
-            message = json.loads(await socket.recv())
-            if message["op"] == "serverInfo":
-                assert message["name"] == "bench" and not message.get("capabilities"), message
-            for channel in message.get("channels", []):
-                assert CHANNELS[channel["topic"]] == channel["schemaName"]
-                topics[channel["id"]], classes[channel["id"]] = channel["topic"], message_class(channel)
-        subscriptions = [{"id": identity, "channelId": identity} for identity in topics]
-        await socket.send(json.dumps({"op": "subscribe", "subscriptions": subscriptions}))
-        # A client cannot publish: the attempt changes nothing.
-        await socket.send(json.dumps({"op": "advertise", "channels": [{"id": 9, "topic": "/loop", "encoding": "json", "schemaName": ""}]}))
-        command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", "3s", "--json"] + SETTINGS
-        run = await asyncio.create_subprocess_exec(*command, cwd=FOLDER, env=ENVIRONMENT, stdout=subprocess.PIPE)
-        output = asyncio.create_task(run.communicate())
-        ended = None
-        while ended is None or asyncio.get_running_loop().time() < ended + 1.0:
-            if ended is None and output.done():
-                ended = asyncio.get_running_loop().time()
-            try:
-                data = await asyncio.wait_for(socket.recv(), 0.1)
-            except TimeoutError:
-                continue
-            if isinstance(data, bytes) and data[0] == 1:
-                identity, log_ns = struct.unpack_from("<IQ", data, 1)
-                received[topics[identity]].append((log_ns, classes[identity].FromString(data[13:])))
-    return received, json.loads((await output)[0])
+async def subscribe(client):
+    """Checks server and channels; returns topic and class of the messages of each subscription."""
+    topics, classes = {}, {}
+    while len(topics) < len(CHANNELS):
+        message = json.loads(await client.recv())
+        if message["op"] == "serverInfo":
+            assert message["name"] == "bench" and not message.get("capabilities"), message
+        for channel in message.get("channels", []):
+            assert CHANNELS[channel["topic"]] == channel["schemaName"]
+            topics[channel["id"]], classes[channel["id"]] = channel["topic"], message_class(channel)
+    subscriptions = [{"id": identity, "channelId": identity} for identity in topics]
+    await client.send(json.dumps({"op": "subscribe", "subscriptions": subscriptions}))
+    return topics, classes
+
+
+async def check_read_only(client):
+    """The server refuses every request to change something."""
+    for request, capability in REQUESTS.items():
+        await client.send(request)
+        while isinstance(answer := await client.recv(), bytes):
+            pass
+        answer = json.loads(answer)
+        assert answer["op"] == "status" and answer["level"] == ERROR and capability in answer["message"], answer
+
+
+def stalled_connection(address):
+    """A client that reads only when it is asked to; nearly everything waits at the server."""
+    host, port = address.removeprefix("ws://").split(":")
+    connection = socket.socket()
+    # A small window: what waits in the buffers of the system is then little.
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    connection.connect((host, int(port)))
+    return websockets.connect(address, sock=connection, subprotocols=PROTOCOLS, max_size=None, max_queue=1)
+
+
+def decoded(data, channels):
+    """Topic, log time and fields of a message; `None` for all others."""
+    if not isinstance(data, bytes) or data[0] != MESSAGE_DATA:
+        return None
+    topics, classes = channels
+    identity, log_ns = struct.unpack_from("<IQ", data, 1)
+    return topics[identity], log_ns, fields(classes[identity].FromString(data[13:]))
 
 
 def fields(message):
-    """The values of a message; the bits of numbers that are not finite differ from themselves, so they become text."""
-    return {field.name: repr(value) for field, value in message.ListFields()}
+    """The values of a message; as text, because a value that is not a number differs from itself, and -0 equals 0."""
+    return tuple((field.name, repr(value)) for field, value in message.ListFields())
+
+
+async def follow(address):
+    """Runs a loop; returns the messages that a client received, those of a client that did not read, and the result of the run."""
+    received = []
+    async with websockets.connect(address, subprotocols=PROTOCOLS, max_size=None) as client, stalled_connection(address) as stalled:
+        stalled_channels, channels = await subscribe(stalled), await subscribe(client)
+        await check_read_only(client)
+        command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", "3s", "--json"] + SETTINGS
+        run = await asyncio.create_subprocess_exec(*command, cwd=FOLDER, env=ENVIRONMENT, stdout=subprocess.PIPE)
+        output = asyncio.create_task(run.communicate())
+        after_end = 0
+        # A second after the end of the run its last messages have arrived.
+        while len(received) < STALLED_TICKS or after_end < 5000:
+            message = decoded(await client.recv(), channels)
+            if message:
+                received.append(message)
+                after_end += output.done()
+        late = await read_until(stalled, stalled_channels, max(log_ns for _, log_ns, _ in received))
+    return received, late, json.loads((await output)[0])
+
+
+async def read_until(client, channels, end_ns):
+    """The messages that the server still has for a client, until a log time."""
+    late = []
+    while not late or late[-1][1] < end_ns:
+        message = decoded(await client.recv(), channels)
+        if message:
+            late.append(message)
+    return late
 
 
 def compare(received, recording):
+    """Every message of the recording was received, and during the run no tick that is not in it."""
     with open(recording, "rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
-        expected = [(channel.topic, message.log_time, decoded) for _, channel, message, decoded in reader.iter_decoded_messages()]
+        recorded = [(channel.topic, message.log_time, fields(content)) for _, channel, message, content in reader.iter_decoded_messages()]
+    seen = set(received)
     for topic in CHANNELS:
-        by_time = {}
-        for log_ns, message in received[topic]:
-            by_time.setdefault(log_ns, []).append(fields(message))
-        wanted = [(log_ns, fields(decoded)) for other, log_ns, decoded in expected if other == topic]
-        missing = [log_ns for log_ns, values in wanted if values not in by_time.get(log_ns, [])]
-        # What is written after the last tick is not part of the loop: the last second of /timing.
-        assert len(missing) <= (topic == "/timing"), f"{topic}: {len(missing)} of {len(wanted)} are missing or differ, first at {missing[0]}"
-        print(topic, len(wanted) - len(missing))
+        wanted = [message for message in recorded if message[0] == topic]
+        missing = [message for message in wanted if message not in seen]
+        assert not missing, f"{topic}: {len(missing)} of {len(wanted)} are missing or differ, first {missing[0]}"
+        print(topic, len(wanted))
+    ticks = [message for message in recorded if message[0] == "/loop"]
+    first_ns, last_ns = ticks[0][1], ticks[-1][1]
+    during = [message for message in received if message[0] == "/loop" and first_ns <= message[1] <= last_ns]
+    assert during == ticks, f"{len(during)} ticks were received in the time of the run; its recording has {len(ticks)}"
+
+
+def compare_late(late, received):
+    """A client that does not read has lost some messages; the others have the values and the order of a client that reads."""
+    times = [log_ns for _, log_ns, _ in received]
+    late = [message for message in late if times[0] <= message[1] <= max(times)]
+    following = iter(received)
+    assert late and all(message in following for message in late), "a client that does not read got other messages"
+    assert len(late) < len(received), f"a client that does not read lost none of {len(received)} messages"
+    print("lost", len(received) - len(late))
+
+
+def check_nothing_dropped():
+    """The live view, which feeds the server, has not waited for any client."""
+    with socket.socket(socket.AF_UNIX) as daemon:
+        daemon.connect(ENVIRONMENT["BENCH_SOCKET"])
+        daemon.sendall(b"GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n")
+        metrics = daemon.makefile().read()
+    assert re.search(r"^bench_live_dropped_total 0$", metrics, re.MULTILINE), metrics
 
 
 daemon = subprocess.Popen([BENCH, "serve", "--foxglove", "127.0.0.1:0"] + SETTINGS, cwd=FOLDER, env=ENVIRONMENT, stdout=subprocess.PIPE, text=True)
@@ -95,8 +169,10 @@ try:
     while address is None:
         found = re.search(r"ws://\S+", daemon.stdout.readline())
         address = found and found.group(0)
-    received, result = asyncio.run(follow(address))
+    received, late, result = asyncio.run(follow(address))
     compare(received, FOLDER / result["recording"])
+    compare_late(late, received)
+    check_nothing_dropped()
 finally:
     daemon.terminate()
     daemon.wait()
