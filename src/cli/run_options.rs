@@ -197,30 +197,28 @@ pub(super) fn run_text(summary: &RunSummary, config: &Config) -> String {
         summary.lost_records,
     );
     wrap(&ending, 0)
-        + &stop_text(summary.stop_cause)
+        + &recording_text(summary)
         + &timing_text(&summary.timing)
         + &trip.unwrap_or_default()
         + &labelled("recording", &summary.recording)
 }
 
-/// Why the run was stopped, if nobody stopped it.
-fn stop_text(cause: Option<StopCause>) -> String {
-    match cause {
-        Some(StopCause::DiskNearlyFull) => labelled(
-            "stopped",
-            "the disk of the recording had less than 100 MB of free space; free some space, or record to another disk with --out",
-        ),
-        Some(StopCause::RecordingTooLarge) => labelled(
-            "stopped",
-            "the recording was more than 10 times as large as the plan predicts; report this with the recording",
-        ),
-        Some(StopCause::RecordsLost) => {
-            let why = "no tick was recorded for 1 s, because the disk is too slow; record on another disk with --out";
-            labelled("stopped", why)
+/// Why the run was stopped if nobody stopped it, or why it went on without a recording.
+fn recording_text(summary: &RunSummary) -> String {
+    match (summary.stop_cause, summary.unrecorded) {
+        (
+            Some(
+                cause @ (StopCause::DiskNearlyFull
+                | StopCause::RecordingTooLarge
+                | StopCause::RecordsLost),
+            ),
+            _,
+        ) => labelled("stopped", cause.text()),
+        (None, Some(cause)) => {
+            let text = format!("the run went on without a recording: {}", cause.text());
+            labelled("recording", &text)
         }
-        Some(StopCause::RecordingFailed | StopCause::Signal | StopCause::LeaseExpired) | None => {
-            String::new()
-        }
+        _ => String::new(),
     }
 }
 

@@ -11,6 +11,17 @@ const DEFAULT_WAKE_EARLY_S: f64 = 80e-6;
 /// Largest share of a period for which the loop waits awake.
 const MAX_AWAKE_SHARE: f64 = 0.4;
 
+/// What happens to a run that cannot be recorded any more, because the disk is full, too slow, or fails.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnRecordingFailure {
+    /// It ends along the ramp of a normal stop.
+    #[default]
+    End,
+    /// It goes on without a recording.
+    Continue,
+}
+
 /// The real-time loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -50,6 +61,10 @@ pub struct LoopSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.001))]
     pub wake_early_s: Option<f64>,
+    /// What happens to a run that cannot be recorded any more, because the disk is full, too slow, or fails: "end" (the default)
+    /// ends it along the ramp of a normal stop, "continue" lets it go on without a recording.
+    #[serde(default)]
+    pub on_recording_failure: OnRecordingFailure,
 }
 
 impl LoopSettings {

@@ -220,6 +220,7 @@ mod tests {
             healthy_s: None,
             arm_lease_s: None,
             wake_early_s: None,
+            on_recording_failure: crate::config::OnRecordingFailure::End,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

@@ -16,7 +16,7 @@ use super::run_error::RunError;
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
-use crate::config::{Config, LoopSettings};
+use crate::config::{Config, LoopSettings, OnRecordingFailure};
 use crate::recording::{self, DiskWatch, Recorder, free_bytes};
 use crate::rt::device_defect::DeviceDefect;
 use crate::rt::interlock::Interlocks;
@@ -183,7 +183,12 @@ impl PreparedRun<'_> {
             retired: _until_the_end,
         } = self.outside;
         let path = self.recorder.path().to_path_buf();
-        let disk = DiskWatch::of(&path, self.recording_bytes).map_err(RunError::Create)?;
+        let on_recording_failure = self.plan.config.servo.on_recording_failure;
+        let mut disk = DiskWatch::of(&path, self.recording_bytes).map_err(RunError::Create)?;
+        if on_recording_failure == OnRecordingFailure::Continue {
+            disk = disk.closing_at_shortage();
+        }
+        rig.hooks.recording_defect.clear();
         let copy = rig.hooks.live_copy(self.plan.config.servo.period_s());
         let recorder = recording::spawn(self.recorder, records, disk, copy);
         let recorder = recorder.map_err(RunError::Create)?;
@@ -193,6 +198,7 @@ impl PreparedRun<'_> {
             health: recorder.health(),
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: self.max_unrecorded_ticks,
+            on_recording_failure,
             cause: None,
             hooks: &rig.hooks,
         };
@@ -200,8 +206,17 @@ impl PreparedRun<'_> {
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
         let ended = supervisor.run_to_end(&mut rig.live, self.run, &self.stop_flags, report)?;
-        let recorder = recorder.join()?;
-        let ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
+        let health = recorder.health();
+        let recorder = recorder.join().map_err(|error| {
+            // A run in virtual time may have ended before the supervisor sees the failure.
+            rig.hooks.recording_defect.set(StopCause::RecordingFailed);
+            match on_recording_failure {
+                OnRecordingFailure::End => RunError::Recording(error),
+                OnRecordingFailure::Continue => RunError::Unrecorded(error),
+            }
+        })?;
+        let mut ended = ended.map_err(|_| RunError::LoopDied(path.clone()))?;
+        ended.lost_records += health.discarded();
         Ok(Run {
             path,
             pace: rig.pace,
@@ -209,6 +224,11 @@ impl PreparedRun<'_> {
             stop_cause: supervisor
                 .cause
                 .or(ended.stopped_by.and_then(StopCause::by)),
+            unrecorded: rig
+                .hooks
+                .recording_defect
+                .get()
+                .filter(|_| on_recording_failure == OnRecordingFailure::Continue),
             ended,
             motor: self.plan.motor.clone(),
             file: RunFile::Own(Box::new(recorder)),

@@ -80,7 +80,7 @@ pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use response_estimate::{ClosedResponses, MeasuredMargins};
 pub use run::{RemoteRecording, Run, StopCause};
 pub use run_error::RunError;
-pub use run_hooks::{Feed, FeedSender, FeedSource, RunHooks};
+pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks};
 pub use run_order::{RigOwner, RunOrder, RunReport};
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};

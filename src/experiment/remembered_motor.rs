@@ -122,7 +122,12 @@ impl RememberedMotor<'_> {
                 | RunError::Space { .. }
                 | RunError::System { .. },
             ) => plan.motor.thermal_a2,
-            Err(RunError::Recording(_) | RunError::AnalysisDied | RunError::LoopDied(_)) => return,
+            Err(
+                RunError::Recording(_)
+                | RunError::Unrecorded(_)
+                | RunError::AnalysisDied
+                | RunError::LoopDied(_),
+            ) => return,
         };
         let stored = (self.memory).store(thermal_a2, self.amplifier, &(self.now)());
         if let Err(error) = stored {

@@ -22,6 +22,8 @@ pub struct Run {
     pub scheduling: Scheduling,
     /// Why it was stopped early; `None` if it was not.
     pub stop_cause: Option<StopCause>,
+    /// Why it is not recorded to its end; `None` if it is.
+    pub unrecorded: Option<StopCause>,
     /// The thermal state of the motor at its start.
     pub motor: MotorStart,
     pub(super) file: RunFile,
@@ -101,6 +103,24 @@ impl From<Shortage> for StopCause {
 }
 
 impl StopCause {
+    /// Description, with the remedy if nobody stopped the run on purpose.
+    pub fn text(self) -> &'static str {
+        match self {
+            StopCause::Signal => "a signal",
+            StopCause::LeaseExpired => "the command line did not respond",
+            StopCause::RecordingFailed => "the recording could not be written",
+            StopCause::RecordsLost => {
+                "no tick was recorded for 1 s, because the disk is too slow; record on another disk with --out"
+            }
+            StopCause::DiskNearlyFull => {
+                "the disk of the recording had less than 100 MB of free space; free some space, or record to another disk with --out"
+            }
+            StopCause::RecordingTooLarge => {
+                "the recording was more than 10 times as large as the plan predicts; report this with the recording"
+            }
+        }
+    }
+
     /// Why the loop ended a run at the request of `origin`. The supervisor knows the reasons of its own requests.
     pub(super) fn by(origin: Origin) -> Option<StopCause> {
         match origin {

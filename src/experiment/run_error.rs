@@ -40,6 +40,11 @@ pub enum RunError {
     /// The recording failed.
     #[error("{0}; the run was stopped with zero current")]
     Recording(#[from] RecordingError),
+    /// The recording failed, and the run went on.
+    #[error(
+        "{0}; the run went on to its end without a recording, as loop.on_recording_failure orders"
+    )]
+    Unrecorded(RecordingError),
     /// The operating system refused a thread or the supervisor.
     #[error("cannot {what}: {why}; raise the limit of processes (ulimit -u)")]
     System {

@@ -2,10 +2,11 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use rtrb::{Consumer, RingBuffer};
 
+use super::run::StopCause;
 use crate::recording::LiveCopy;
 use crate::rt::record::LoopMessage;
 use crate::rt::supervision::StopFlags;
@@ -71,6 +72,34 @@ impl FeedSender {
     }
 }
 
+/// Why the run in progress, or the last one, cannot be recorded. Clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct RecordingDefect(Arc<Mutex<Option<StopCause>>>);
+
+impl RecordingDefect {
+    /// The cause; `None` if there is none.
+    pub fn get(&self) -> Option<StopCause> {
+        *self.lock()
+    }
+
+    /// Sets the first cause of a run. Returns whether it is the first one.
+    pub(super) fn set(&self, cause: StopCause) -> bool {
+        let mut present = self.lock();
+        let is_first = present.is_none();
+        present.get_or_insert(cause);
+        is_first
+    }
+
+    /// A run begins.
+    pub(super) fn clear(&self) {
+        *self.lock() = None;
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<StopCause>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// Handles on the run of a rig. Clones belong to the same rig.
 #[derive(Clone, Debug)]
 pub struct RunHooks {
@@ -79,6 +108,8 @@ pub struct RunHooks {
     tunes: Sender<Tune>,
     sent_tunes: Arc<Mutex<Receiver<Tune>>>,
     feeds: Option<FeedSender>,
+    /// Why the run in progress, or the last one, cannot be recorded.
+    pub recording_defect: RecordingDefect,
     /// Whether the stop signals of this process end the run.
     pub(super) has_signals: bool,
 }
@@ -91,6 +122,7 @@ impl Default for RunHooks {
             tunes,
             sent_tunes: Arc::new(Mutex::new(sent)),
             feeds: None,
+            recording_defect: RecordingDefect::default(),
             has_signals: true,
         }
     }

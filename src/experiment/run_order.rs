@@ -124,6 +124,7 @@ pub struct RunReport {
     pace: Pace,
     scheduling: Scheduling,
     stop_cause: Option<StopCause>,
+    unrecorded: Option<StopCause>,
     motor: MotorStart,
     totals: Totals,
 }
@@ -140,6 +141,7 @@ impl RunReport {
             pace: run.pace,
             scheduling: run.scheduling.clone(),
             stop_cause: run.stop_cause,
+            unrecorded: run.unrecorded,
             motor: run.motor.clone(),
         })
     }
@@ -158,6 +160,7 @@ impl RunReport {
             pace: self.pace,
             scheduling: self.scheduling,
             stop_cause: self.stop_cause,
+            unrecorded: self.unrecorded,
             motor: self.motor,
             file: RunFile::Remote {
                 totals: self.totals,

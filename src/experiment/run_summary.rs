@@ -16,6 +16,9 @@ pub struct RunSummary {
     /// Why it was stopped early.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stop_cause: Option<StopCause>,
+    /// Why it is not recorded to its end.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unrecorded: Option<StopCause>,
     /// The trip that ended it.
     pub trip: Option<TripSummary>,
     /// Recorded ticks.
@@ -96,6 +99,7 @@ impl RunSummary {
         Ok(RunSummary {
             outcome: ending,
             stop_cause: run.stop_cause,
+            unrecorded: run.unrecorded,
             trip: TripSummary::of(ending),
             ticks: totals.ticks,
             overruns: totals.overruns,

@@ -9,6 +9,7 @@ use super::run::StopCause;
 use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
+use crate::config::OnRecordingFailure;
 use crate::recording::Health;
 use crate::rt::live_loop::{LiveLoop, LoopPanicked};
 use crate::rt::record::Origin;
@@ -26,6 +27,7 @@ pub(super) struct Supervisor<'a> {
     pub(super) health: Arc<Health>,
     pub(super) progress: Arc<Progress>,
     pub(super) max_unrecorded_ticks: u64,
+    pub(super) on_recording_failure: OnRecordingFailure,
     /// Why it has requested the end of the run, if it has.
     pub(super) cause: Option<StopCause>,
     /// Changes of the run, to be passed on to the loop.
@@ -80,13 +82,26 @@ impl Supervisor<'_> {
         }
     }
 
-    /// Ends a run that cannot be recorded any more. If there is no room for the request, it is sent again.
+    /// Ends a run that cannot be recorded any more, unless it shall go on. If there is no room for the request, it is sent again.
     fn watch_recording(&mut self) {
-        if let Some(cause) = self.recording_defect()
-            && self.cause.is_none()
-            && self.requests.send(Request::Finish).is_ok()
-        {
-            self.cause = Some(cause);
+        let Some(cause) = self.recording_defect() else {
+            return;
+        };
+        let is_new = self.hooks.recording_defect.set(cause);
+        match self.on_recording_failure {
+            OnRecordingFailure::End => {
+                if self.cause.is_none() && self.requests.send(Request::Finish).is_ok() {
+                    self.cause = Some(cause);
+                }
+            }
+            OnRecordingFailure::Continue => {
+                if is_new {
+                    tracing::warn!(
+                        "the run goes on without a recording, as loop.on_recording_failure orders: {}; the recording ends here",
+                        cause.text()
+                    );
+                }
+            }
         }
     }
 
@@ -135,6 +150,7 @@ mod tests {
                 progress: Arc::new(Progress::default()),
                 max_unrecorded_ticks: 5000,
                 lease: Arc::default(),
+                on_recording_failure: OnRecordingFailure::End,
                 cause: None,
                 hooks: &RunHooks::default(),
             };
@@ -148,6 +164,29 @@ mod tests {
             supervisor.watch_recording();
             assert!(taken.pop().is_err(), "one request");
         }
+    }
+
+    #[test]
+    fn run_goes_on_unrecorded_if_the_configuration_says_so() {
+        let (requests, mut taken) = RequestSender::ring(4);
+        let hooks = RunHooks::default();
+        let mut supervisor = Supervisor {
+            requests,
+            health: health_of_a_recorder(50_000_000, 0),
+            progress: Arc::new(Progress::default()),
+            max_unrecorded_ticks: 5000,
+            lease: Arc::default(),
+            on_recording_failure: OnRecordingFailure::Continue,
+            cause: None,
+            hooks: &hooks,
+        };
+        supervisor.watch_recording();
+        assert!(taken.pop().is_err(), "no request");
+        assert_eq!(supervisor.cause, None);
+        assert_eq!(
+            hooks.recording_defect.get(),
+            Some(StopCause::DiskNearlyFull)
+        );
     }
 
     /// The state of a recorder after 1000 ticks on a disk with these sizes.
@@ -188,6 +227,7 @@ mod tests {
             progress: Arc::clone(&progress),
             max_unrecorded_ticks: 5000,
             lease: Arc::default(),
+            on_recording_failure: OnRecordingFailure::End,
             cause: None,
             hooks: &RunHooks::default(),
         };

@@ -4,6 +4,8 @@
 //!  before the run    free space < predicted size + MIN_FREE_BYTES                      refused
 //!  during the run    free space < MIN_FREE_BYTES, or file > 10 times predicted size    the run is ended, and recorded to its end
 //!                    50 MB later it still goes on                                      nothing more is written
+//!
+//! With DiskWatch::closing_at_shortage the run need not end: the recording ends at once and is complete up to there.
 //! ```
 
 use std::fs::File;
@@ -87,6 +89,7 @@ pub struct DiskWatch {
     max_bytes: u64,
     /// The first shortage, and the size at which nothing more is written.
     short: Option<(Shortage, u64)>,
+    closes_at_shortage: bool,
 }
 
 /// The result of a check.
@@ -96,6 +99,8 @@ pub(super) enum Space {
     Enough,
     /// The run must end.
     Short(Shortage),
+    /// The recording must end, and the run may go on.
+    Closed(Shortage),
     /// The run should have ended: nothing more may be written.
     Exhausted,
 }
@@ -119,6 +124,15 @@ impl DiskWatch {
                 .saturating_mul(MAX_GROWTH)
                 .max(MIN_LIMIT_BYTES),
             short: None,
+            closes_at_shortage: false,
+        }
+    }
+
+    /// Ends the recording at a shortage, for a run that goes on without it.
+    pub fn closing_at_shortage(self) -> DiskWatch {
+        DiskWatch {
+            closes_at_shortage: true,
+            ..self
         }
     }
 
@@ -130,6 +144,7 @@ impl DiskWatch {
         }
         match self.short {
             None => Space::Enough,
+            Some((shortage, _)) if self.closes_at_shortage => Space::Closed(shortage),
             Some((_, end_bytes)) if state.size_bytes >= end_bytes => Space::Exhausted,
             Some((shortage, _)) => Space::Short(shortage),
         }

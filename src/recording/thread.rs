@@ -40,7 +40,7 @@ impl Health {
         self.written.load(Ordering::Relaxed)
     }
 
-    /// Records that were taken from the ring after writing had failed. They are in no file.
+    /// Records that were taken from the ring after the recording had failed or ended. They are in no file.
     pub fn discarded(&self) -> u64 {
         self.discarded.load(Ordering::Relaxed)
     }
@@ -103,7 +103,7 @@ impl LiveCopy {
 ///
 /// If writing fails (for example because the disk is full), the thread continues to empty the ring, so that the loop is not
 /// affected. It counts the lost records and reports the failure in [`Health`] at once. A shortage of disk space is reported there
-/// as well, while the recording goes on to the end of the run.
+/// as well; the recording goes on to the end of the run, or ends at once with [`DiskWatch::closing_at_shortage`].
 pub fn spawn(
     recorder: Recorder,
     ring: Consumer<LoopMessage>,
@@ -136,7 +136,7 @@ fn run(
 ) -> Result<Recorder, RecordingError> {
     let _alarm = Alarm(health);
     lower(NICE);
-    let mut outcome = Ok(());
+    let mut writing = Writing::On;
     loop {
         // Read before the ring is emptied: everything that was pushed before the producer was dropped is then in the ring.
         let ended = ring.is_abandoned();
@@ -144,33 +144,50 @@ fn run(
             if let Some(copy) = &mut copy {
                 copy.push(&published);
             }
-            take(&published, &mut recorder, &mut outcome, health);
-            if outcome.is_ok() && health.written().is_multiple_of(RECORDS_PER_CHECK) {
-                outcome = check_disk(&mut disk, &recorder, health);
+            take(&published, &mut recorder, &mut writing, health);
+            if writing.is_on() && health.written().is_multiple_of(RECORDS_PER_CHECK) {
+                writing = check_disk(&mut disk, &recorder, health);
             }
         }
         if ended {
-            return outcome.map(|()| recorder);
+            return match writing {
+                Writing::On | Writing::Ended => Ok(recorder),
+                Writing::Failed(error) => Err(error),
+            };
         }
         std::thread::sleep(IDLE_PAUSE);
     }
 }
 
+/// Whether records are still written.
+enum Writing {
+    On,
+    /// The recording has ended before the run, and is complete up to there.
+    Ended,
+    Failed(RecordingError),
+}
+
+impl Writing {
+    fn is_on(&self) -> bool {
+        matches!(self, Writing::On)
+    }
+}
+
 /// Reports a shortage. Fails if the run goes on in spite of it.
-fn check_disk(
-    disk: &mut DiskWatch,
-    recorder: &Recorder,
-    health: &Health,
-) -> Result<(), RecordingError> {
+fn check_disk(disk: &mut DiskWatch, recorder: &Recorder, health: &Health) -> Writing {
     match disk.check() {
-        Space::Enough => Ok(()),
+        Space::Enough => Writing::On,
         Space::Short(shortage) => {
             health.shortage.get_or_init(|| shortage);
-            Ok(())
+            Writing::On
+        }
+        Space::Closed(shortage) => {
+            health.shortage.get_or_init(|| shortage);
+            Writing::Ended
         }
         Space::Exhausted => {
             health.failed.store(true, Ordering::Release);
-            Err(RecordingError::Endless {
+            Writing::Failed(RecordingError::Endless {
                 path: recorder.path().into(),
                 ticks: recorder.ticks(),
             })
@@ -189,20 +206,16 @@ impl Drop for Alarm<'_> {
     }
 }
 
-fn take(
-    published: &LoopMessage,
-    recorder: &mut Recorder,
-    outcome: &mut Result<(), RecordingError>,
-    health: &Health,
-) {
-    if outcome.is_ok() {
-        *outcome = recorder.record(published);
-        health.failed.store(outcome.is_err(), Ordering::Release);
+fn take(published: &LoopMessage, recorder: &mut Recorder, writing: &mut Writing, health: &Health) {
+    if writing.is_on()
+        && let Err(error) = recorder.record(published)
+    {
+        *writing = Writing::Failed(error);
+        health.failed.store(true, Ordering::Release);
     }
-    let counter = if outcome.is_ok() {
-        &health.written
-    } else {
-        &health.discarded
+    let counter = match writing.is_on() {
+        true => &health.written,
+        false => &health.discarded,
     };
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -120,6 +120,27 @@ fn nearly_full_disk_is_reported_while_the_recording_goes_on() {
 }
 
 #[test]
+fn recording_that_ends_at_a_shortage_is_whole_up_to_there() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("ended.mcap");
+    let sizes = |ticks| DiskState {
+        free_bytes: Some(if ticks < 10 { 100_000_000 } else { 99_999_999 }),
+        size_bytes: 1_200 * ticks,
+    };
+    let (health, recorder) = record_20_000(&path, DiskWatch::closing_at_shortage, sizes);
+    assert_eq!(health.shortage(), Some(Shortage::DiskNearlyFull));
+    assert!(!health.failed());
+    assert_eq!((health.written(), health.discarded()), (10_000, 10_000));
+    let totals = recorder.expect("no failure").finish(&[]);
+    assert_eq!(totals.expect("complete").ticks, 10_000);
+    let recording = Recording::open(&path).expect("whole");
+    assert_eq!(
+        (recording.truncated(), recording.tick_count()),
+        (false, 10_000)
+    );
+}
+
+#[test]
 fn recording_that_never_ends_is_cut_50_megabytes_after_its_limit() {
     // 20 MB in each check: above 100 MB at the 6th, 50 MB more at the 9th.
     let dir = tempfile::tempdir().expect("temporary directory");
@@ -144,9 +165,17 @@ fn record_20_000_ticks(
     path: &Path,
     state: fn(u64) -> DiskState,
 ) -> (Arc<Health>, Result<Recorder, RecordingError>) {
+    record_20_000(path, |disk| disk, state)
+}
+
+fn record_20_000(
+    path: &Path,
+    change: fn(DiskWatch) -> DiskWatch,
+    state: fn(u64) -> DiskState,
+) -> (Arc<Health>, Result<Recorder, RecordingError>) {
     let checks = AtomicU64::new(0);
     let state = move || state(checks.fetch_add(1, Ordering::Relaxed) + 1);
-    let disk = DiskWatch::over(Box::new(state), 0);
+    let disk = change(DiskWatch::over(Box::new(state), 0));
     let recorder = Recorder::create(path, &header()).expect("a fresh file");
     let (mut ring, consumer) = RingBuffer::new(1024);
     let handle = spawn(recorder, consumer, disk, None).expect("a thread");
