@@ -59,6 +59,12 @@ pub fn text(daemon: &Daemon) -> String {
     write_loop(&mut out, daemon);
     write_devices(&mut out, daemon);
     write_runs(&mut out, daemon);
+    let defect = daemon.owner.recording_defect();
+    out.gauge(
+        "bench_recording_defect",
+        "1 if the run in progress, or the last one, cannot be recorded.",
+        u8::from(defect.is_some()),
+    );
     if let Some(bytes) = free_bytes(&daemon.recordings) {
         let help = "Free space in the folder of the recordings.";
         out.gauge("bench_recording_free_bytes", help, bytes);

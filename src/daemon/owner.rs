@@ -12,8 +12,8 @@ use super::same_rig::require_same_rig;
 use super::warnings::copy_warnings;
 use crate::config::Config;
 use crate::experiment::{
-    DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening, Run, RunHooks,
-    RunOrder, Runner, Setup, Stage,
+    DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening, RecordingDefect,
+    Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause,
 };
 use crate::rig::motor::Moment;
 use crate::rt::supervision::StopFlags;
@@ -70,6 +70,7 @@ pub struct Owner {
     messages: Option<Sender<Message>>,
     status: Arc<Mutex<RigStatus>>,
     tuner: Sender<crate::rt::tuning::Tune>,
+    recording_defect: RecordingDefect,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -82,6 +83,7 @@ impl Owner {
         let (messages, received) = channel();
         let hooks = RunHooks::watched(feeds);
         let tuner = hooks.tuner();
+        let recording_defect = hooks.recording_defect.clone();
         let status = Arc::new(Mutex::new(RigStatus {
             names: None,
             scheduling: Scheduling::default(),
@@ -104,6 +106,7 @@ impl Owner {
             messages: Some(messages),
             status,
             tuner,
+            recording_defect,
             thread: Some(thread),
         })
     }
@@ -116,6 +119,11 @@ impl Owner {
     /// Sends changes of the run in progress to the loop.
     pub fn tuner(&self) -> Sender<crate::rt::tuning::Tune> {
         self.tuner.clone()
+    }
+
+    /// Why the run in progress, or the last one, cannot be recorded.
+    pub fn recording_defect(&self) -> Option<StopCause> {
+        self.recording_defect.get()
     }
 
     /// Orders a run. The order is dropped, and with it the reply, if the thread has ended.
@@ -233,7 +241,7 @@ impl OwnerThread {
     fn run(&mut self, order: OwnerOrder) {
         let _copy = copy_warnings(order.warnings.clone());
         let result = self.run_order(&order);
-        // Without a receiver the client has gone, and the recording is completed when it is dropped.
+        // Without a receiver the client is disconnected, and the recording is completed when it is dropped.
         let _ = order.reply.send(result);
     }
 

@@ -1,4 +1,4 @@
-//! A daemon in a process of its own, and a client that only knows HTTP/1.1.
+//! A daemon in a process of its own, and a minimal client for HTTP/1.1.
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
@@ -43,8 +43,22 @@ impl Daemon {
 
     /// A daemon in a folder that may have recordings.
     pub fn start_in(folder: TempDir) -> Daemon {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_bench"))
+        let program = Command::new(env!("CARGO_BIN_EXE_bench"));
+        Daemon::start_as(program, &[], folder)
+    }
+
+    /// A daemon whose files cannot become larger than `limit_kb`: writing to a larger one fails, as on a full disk.
+    pub fn start_with_file_limit(limit_kb: u64, settings: &[&str]) -> Daemon {
+        let mut program = Command::new("sh");
+        let limited = format!("ulimit -f {}; exec \"$0\" \"$@\"", limit_kb * 2); // blocks of 512 bytes
+        program.args(["-c", &limited, env!("CARGO_BIN_EXE_bench")]);
+        Daemon::start_as(program, settings, tempfile::tempdir().expect("a folder"))
+    }
+
+    fn start_as(mut program: Command, settings: &[&str], folder: TempDir) -> Daemon {
+        let mut child = program
             .args(["serve", "--listen", "127.0.0.1:0", "--out", "recordings"])
+            .args(settings)
             .args(["--set", "loop.rate_hz=1000", "--set", "chirp.stop_hz=200"])
             .args(NO_OVERRUN_LIMIT)
             .current_dir(folder.path())

@@ -4,6 +4,7 @@ mod common;
 mod crash;
 #[cfg(feature = "foxglove")]
 mod foxglove;
+mod full_disk;
 mod interface;
 mod listener;
 mod queue;

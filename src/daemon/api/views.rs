@@ -190,6 +190,10 @@ pub fn state(daemon: &Daemon) -> StateView {
         policy: rig.scheduling.policy,
         memory_locked: rig.scheduling.memory_locked,
         refused: rig.scheduling.refused,
+        recording_defect: daemon
+            .owner
+            .recording_defect()
+            .map(|cause| cause.text().into()),
         ..live.servo
     };
     StateView {

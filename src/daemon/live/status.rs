@@ -26,6 +26,8 @@ pub struct LoopView {
     pub overruns: u64,
     /// Records that did not fit into the ring to the recorder.
     pub lost_records: u64,
+    /// Why the run in progress, or the last one, cannot be recorded; `null` if it is recorded.
+    pub recording_defect: Option<String>,
     /// Messages that the live view did not take in time. The recording has them.
     pub live_dropped: u64,
     /// Reference in metres.

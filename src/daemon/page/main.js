@@ -123,15 +123,17 @@ function showShares(shares) {
 }
 
 function showAlert() {
-  const alert = byId("alert"), trip = state.trip, fault = state.daemon.fault;
-  alert.hidden = !trip && !fault;
-  const key = trip ? trip.text : fault ?? "";
+  const alert = byId("alert"), trip = state.trip, fault = state.daemon.fault, defect = state.loop.recording_defect;
+  alert.hidden = !trip && !fault && !defect;
+  const key = [trip?.text, fault, defect].filter(Boolean).join("; ");
   if (alert.dataset.key === key) return;
   alert.dataset.key = key;
   alert.replaceChildren();
   if (!key) return;
   const paragraph = (text) => { const made = document.createElement("p"); made.textContent = text; alert.append(made); };
-  paragraph(trip ? `Tripped: ${trip.text}` : `The rig is not ready: ${fault}`);
+  if (trip) paragraph(`Tripped: ${trip.text}`);
+  else if (fault) paragraph(`The rig is not ready: ${fault}`);
+  if (defect) paragraph(`Not recorded: ${defect}`);
   if (trip) {
     paragraph(`Remedy: ${trip.remedy}`);
     const button = document.createElement("button");
@@ -147,7 +149,7 @@ function showRun() {
   if (run) {
     const progress = run.progress, isAnalysing = run.phase === "analysing";
     const left = progress?.remaining_s != null && !isAnalysing ? `, ${progress.remaining_s.toFixed(0)} s left` : "";
-    setText("progress-text", `Run ${run.id}, ${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}: ${run.phase}${left}${run.is_orphan ? " (its client has gone)" : ""}`);
+    setText("progress-text", `Run ${run.id}, ${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}: ${run.phase}${left}${run.is_orphan ? " (client disconnected)" : ""}`);
     const bar = byId("progress");
     if (isAnalysing || !progress?.total) bar.removeAttribute("value"); else bar.value = progress.done / progress.total;
   }
