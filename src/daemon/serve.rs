@@ -28,7 +28,7 @@ use crate::util::atomic_file::write_atomic;
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);
-/// Longest time for which the watchdog is told that all is well although no tick passes: the devices are being opened.
+/// Longest time without a tick for which the watchdog is still notified, because the devices are being opened.
 const OPENING: Duration = Duration::from_secs(15);
 /// Permissions of the socket: its owner and its group.
 const SOCKET_MODE: u32 = 0o660;
@@ -162,7 +162,7 @@ async fn serve_clients(
         socket: options.socket.clone(),
         page,
         foxglove,
-        token_file,
+        token_file: token_file.clone(),
         reason,
     });
     tracing::info!(socket = %options.socket.display(), tcp = ?options.listen, "the daemon runs");
@@ -172,7 +172,9 @@ async fn serve_clients(
     shut_down(&daemon, &mut signals).await;
     tasks.abort_all_clients();
     drop(daemon);
-    let _ = std::fs::remove_file(&options.socket);
+    for path in [Some(options.socket), token_file].into_iter().flatten() {
+        let _ = std::fs::remove_file(path); // it may have been removed by hand
+    }
     drop(record);
     Ok(())
 }

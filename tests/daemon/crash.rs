@@ -3,21 +3,22 @@ use bench::recording::Recording;
 
 use crate::common::Daemon;
 
-const MOST_LOST_S: f64 = 1.0;
-
-/// Moments of the kill in milliseconds after the start of the run: 3 in each test run, 20 with BENCH_KILLS=20.
-fn kills() -> impl Iterator<Item = u64> {
-    let count: u64 = std::env::var("BENCH_KILLS")
-        .ok()
-        .and_then(|text| text.parse().ok())
-        .unwrap_or(3);
-    (0..count).map(|number| 300 + (number * 617) % 1900)
+/// Number of kills, and the longest time that may be lost in seconds: 0.2 s on an idle machine, where BENCH_KILLS is set; tests that
+/// run at the same time delay the recorder.
+fn kills() -> (u64, f64) {
+    let count = std::env::var("BENCH_KILLS").ok();
+    match count.and_then(|text| text.parse().ok()) {
+        Some(count) => (count, 0.2),
+        None => (3, 1.0),
+    }
 }
 
 #[test]
 fn kill_at_any_moment_leaves_a_readable_recording_and_a_disarmed_bench() {
     let mut folder = tempfile::tempdir().expect("a folder");
-    for (number, after_ms) in kills().enumerate() {
+    let (kills, most_lost_s) = kills();
+    for number in 0..kills {
+        let after_ms = 300 + (number * 617) % 1900;
         let daemon = Daemon::start_in(folder);
         let lease = daemon.take_lease("anna");
         let args = ["--slow", "--duration", "60s", "--pace", "realtime"];
@@ -41,14 +42,15 @@ fn kill_at_any_moment_leaves_a_readable_recording_and_a_disarmed_bench() {
         assert_eq!(state["loop"]["state"], "disarmed");
         assert!(state["run"].is_null() && state["lease"].is_null());
         let copies = recovered(&next);
-        assert_eq!(copies.len(), number + 1, "one copy for each kill");
+        assert_eq!(copies.len() as u64, number + 1, "one copy for each kill");
         let newest = copies.last().expect("a copy");
         let recording = Recording::open(&next.recordings().join(newest)).expect("readable");
         let lost = ticks.saturating_sub(recording.tick_count());
         assert!(
-            lost as f64 * 1e-3 <= MOST_LOST_S,
+            lost as f64 * 1e-3 <= most_lost_s,
             "{lost} of {ticks} ticks are lost"
         );
+        println!("kill {number}: {lost} of {ticks} ticks are lost");
         folder = next.terminate().1;
     }
     let last = Daemon::start_in(folder);
@@ -57,6 +59,10 @@ fn kill_at_any_moment_leaves_a_readable_recording_and_a_disarmed_bench() {
         "started",
         "after a clean shutdown"
     );
+    let (_, folder) = last.terminate();
+    for left in ["bench.sock", "bench.token"] {
+        assert!(!folder.path().join(left).exists(), "{left} is removed");
+    }
 }
 
 fn recovered(daemon: &Daemon) -> Vec<String> {

@@ -121,6 +121,30 @@ fn calibration_with_its_two_runs_is_the_same_with_a_daemon() {
 }
 
 #[test]
+fn identify_is_the_same_with_a_daemon_and_does_not_wait_for_it() {
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    let chirp = ["chirp", "--seed", "4", "--duration", "20s", "--json"];
+    let recorded = bench_in(folder.path(), &chirp).output().expect("a process");
+    let result: serde_json::Value = serde_json::from_slice(&recorded.stdout).expect("JSON");
+    let recording = result["recording"].as_str().expect("a path");
+    for options in [&[][..], &["--json"]] {
+        let arguments = [&["identify", recording][..], options].concat();
+        let expected = bench_in(folder.path(), &arguments)
+            .output()
+            .expect("a process");
+        let output = daemon
+            .bench(folder.path(), &arguments)
+            .output()
+            .expect("a process");
+        assert!(!expected.stdout.is_empty());
+        assert_eq!(outcome(&output), outcome(&expected), "{arguments:?}");
+    }
+    let runs = daemon.get("/api/v1/runs");
+    assert_eq!(runs["finished"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
 fn refused_run_is_the_same_with_a_daemon() {
     let daemon = Daemon::start();
     let folder = tempfile::tempdir().unwrap();
