@@ -1,4 +1,4 @@
-//! The recordings in the folder of the daemon, with what the daemon knows about them. The knowledge of a recording is in a small file
+//! The recordings in the folder of the daemon, with their data: operator, name, note, verdict. The data of a recording are in a small file
 //! beside it, `NAME.info.json`.
 
 use std::io;
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::util::atomic_file::write_atomic;
 use crate::util::timestamp::unix_ns;
 
-/// What the daemon knows about a recording.
+/// Data of a recording that are not in it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default)]
 pub struct RecordingInfo {
@@ -38,7 +38,7 @@ pub struct ListedRecording {
     pub bytes: u64,
     /// Last change in seconds since 1970.
     pub changed_unix_s: f64,
-    /// What the daemon knows about it.
+    /// Its data.
     #[serde(flatten)]
     pub info: RecordingInfo,
     /// Files that were computed from it.

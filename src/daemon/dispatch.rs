@@ -26,7 +26,7 @@ pub async fn serve(daemon: Arc<Daemon>) {
     }
 }
 
-/// The command whose turn begins now. Nobody is woken when there is none.
+/// The command whose turn begins now; without one, no task is woken.
 fn next(daemon: &Daemon) -> Option<u64> {
     let is_idle =
         daemon.read(|schedule| schedule.lease().is_none() && schedule.open().next().is_none());

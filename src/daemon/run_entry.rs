@@ -23,7 +23,7 @@ pub enum Command {
     Linearity,
     /// A chirp at each point of a grid.
     Campaign,
-    /// Analyse a recording. Nothing moves.
+    /// Analyse a recording, without motion.
     Identify,
 }
 

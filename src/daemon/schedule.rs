@@ -20,7 +20,7 @@ pub const MAX_QUEUED: usize = 100;
 /// Ended commands that are remembered.
 const MAX_FINISHED: usize = 200;
 
-/// A moment by both clocks. Rules use the clock that nobody sets; the wall clock is for display.
+/// A moment by both clocks. Rules use the monotonic clock; the wall clock is for display.
 #[derive(Clone, Copy, Debug)]
 pub struct Now {
     /// The monotonic clock.
@@ -237,7 +237,7 @@ impl Schedule {
         }
     }
 
-    /// The client of the lease has gone.
+    /// The client of the lease is disconnected.
     fn lose_lease(&mut self, now: Now) {
         let Some(lease) = self.lease.take() else {
             return;
@@ -378,7 +378,7 @@ impl Schedule {
         Some(current.id)
     }
 
-    /// The client of a command has gone: its run is stopped or goes on as was asked for at its start. A command that waits is
+    /// The client of a command is disconnected: its run is stopped or goes on, as ordered at its start. A command that waits is
     /// cancelled.
     pub fn lose_client(&mut self, id: u64, now: Now) {
         let Ok(entry) = self.open_entry(id) else {

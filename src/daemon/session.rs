@@ -134,7 +134,7 @@ impl Session {
     /// Waits for the turn; returns whether it has come.
     async fn wait_for_turn(&mut self) -> bool {
         let mut changes = self.daemon.changes();
-        let mut told = String::new();
+        let mut sent_text = String::new();
         loop {
             let (phase, text) = self.daemon.read(|schedule| turn(schedule, self.id));
             match phase {
@@ -150,11 +150,11 @@ impl Session {
             }
             // A command that is next begins at once.
             let is_next = phase == Phase::Queued && text.is_empty();
-            if told != text && !is_next {
+            if sent_text != text && !is_next {
                 self.connection
                     .send(&FromDaemon::Waiting(text.clone()))
                     .await;
-                told = text;
+                sent_text = text;
             }
             tokio::select! {
                 changed = changes.changed() => if changed.is_err() { return false },

@@ -40,7 +40,7 @@ impl<S: Subscriber> Layer<S> for WarningCopies {
             if let Some(receiver) = receiver {
                 let mut message = Message::default();
                 event.record(&mut message);
-                let _ = receiver.send(message.0); // without a receiver the client has gone
+                let _ = receiver.send(message.0); // without a receiver the client is disconnected
             }
         });
     }

@@ -124,7 +124,7 @@ fn rejects_array_in_place_of_an_object() {
     assert!(daemon.state()["run"].is_null());
 }
 
-/// Any JSON, with the names that the interface knows.
+/// Any JSON, with the names of the interface.
 fn any_json() -> impl Strategy<Value = Value> {
     let leaf = prop_oneof![
         Just(Value::Null),

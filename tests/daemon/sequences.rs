@@ -179,13 +179,13 @@ fn check(rights: &Rights, daemon: &Daemon) -> Result<Value, TestCaseError> {
         let id = run["id"].as_u64().unwrap_or_default();
         prop_assert!(
             rights.commands.contains(&id),
-            "nobody may have queued {run}"
+            "{run} was queued without lease"
         );
     }
     let state = daemon.state();
     prop_assert!(
         !rights.commands.is_empty() || is_idle(&state),
-        "nobody may have moved: {state}"
+        "moved without lease: {state}"
     );
     if let Some(holder) = state["lease"]["operator"].as_str() {
         prop_assert_eq!(holder, "anna", "the operator of the test: {}", state);

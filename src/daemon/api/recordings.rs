@@ -21,7 +21,7 @@ use crate::recording::Recording;
 
 /// Longest name and note in bytes.
 const MAX_TEXT: usize = 10_000;
-/// Most recordings on one page: the curves of more cannot be told apart.
+/// Most recordings on one page: the curves of more cannot be distinguished.
 const MAX_COMPARED: usize = 12;
 /// The script of a report gets no access to the token of the page.
 const REPORT_POLICY: &str = "sandbox allow-scripts";

@@ -264,7 +264,7 @@ fn api() -> ApiRouter<Arc<Daemon>> {
                 runs::plan,
                 change(
                     "plan",
-                    "Predict travel, current, heat and duration; nothing moves",
+                    "Predict travel, current, heat and duration, without motion",
                 ),
             ),
         )

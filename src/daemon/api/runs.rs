@@ -37,7 +37,7 @@ pub struct RunId {
     id: u64,
 }
 
-/// All commands that the daemon knows.
+/// All commands since the daemon started.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Runs {
     /// The one that has its turn.

@@ -61,7 +61,7 @@ pub struct LiveSnapshot {
     pub servo: LoopView,
     /// Shares of the interlocks.
     pub shares: Vec<Share>,
-    /// The last trip that nobody acknowledged.
+    /// The last trip that is not acknowledged.
     pub trip: Option<TripView>,
     /// Lateness of all ticks.
     pub lateness: LatenessTotals,
@@ -378,7 +378,7 @@ impl Follower {
 
     fn send_frame(&mut self) {
         if let Some(frame) = self.frame.take().filter(|frame| !frame.is_empty()) {
-            // Without clients nobody receives it.
+            // Without clients there is no receiver.
             let _ = self
                 .shared
                 .messages

@@ -9,7 +9,7 @@ const COARSE_TICKS = 64;
 /** Most missing values of a spectrum. */
 const MISSING_SHARE = 0.01;
 
-/** A ring of bins with minimum and maximum of each signal. A bin knows the number of its time, so that old bins are not drawn. */
+/** A ring of bins with minimum and maximum of each signal. Each bin has the number of its time interval, so that old bins are not drawn. */
 class Bins {
   constructor(count, widthS) {
     this.count = count;
