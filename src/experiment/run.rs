@@ -108,7 +108,9 @@ impl StopCause {
         match self {
             StopCause::Signal => "a signal",
             StopCause::LeaseExpired => "the command line did not respond",
-            StopCause::RecordingFailed => "the recording could not be written",
+            StopCause::RecordingFailed => {
+                "the recording could not be written; check its disk, and complete what was written with `bench recover`"
+            }
             StopCause::RecordsLost => {
                 "no tick was recorded for 1 s, because the disk is too slow; record on another disk with --out"
             }
