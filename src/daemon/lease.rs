@@ -37,6 +37,8 @@ pub struct Lease {
     pub since_unix_s: f64,
     /// Who keeps it valid.
     pub keeper: Keeper,
+    /// Whether a client that has lost it to its run may take it back. One that has released it may not.
+    pub may_return: bool,
 }
 
 impl Lease {

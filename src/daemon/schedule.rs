@@ -192,6 +192,7 @@ impl Schedule {
             keeper: Keeper::Client {
                 expires: now.instant + LEASE,
             },
+            may_return: true,
         });
         Ok(())
     }
@@ -203,7 +204,7 @@ impl Schedule {
     pub fn renew_lease(&mut self, secret: &str, now: Now) -> Result<(), ScheduleError> {
         self.expire(now);
         let lease = self.lease.as_mut();
-        let lease = lease.filter(|lease| lease.secret.is(secret));
+        let lease = lease.filter(|lease| lease.may_return && lease.secret.is(secret));
         lease.ok_or(ScheduleError::NoLease)?.renew(now.instant);
         Ok(())
     }
@@ -215,6 +216,9 @@ impl Schedule {
     pub fn release_lease(&mut self, secret: &str, now: Now) -> Result<(), ScheduleError> {
         self.require_lease(secret, now)?;
         self.lose_lease(now);
+        if let Some(kept) = &mut self.lease {
+            kept.may_return = false;
+        }
         Ok(())
     }
 
@@ -312,6 +316,7 @@ impl Schedule {
                 operator: entry.operator.clone(),
                 since_unix_s: now.unix_s,
                 keeper: Keeper::Run(entry.id),
+                may_return: false,
             };
             entry.lease = Some(lease.secret.clone());
             self.lease = Some(lease);

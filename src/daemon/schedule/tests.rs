@@ -324,6 +324,22 @@ fn expired_lease_that_a_run_keeps_queues_nothing_until_it_is_renewed() {
 }
 
 #[test]
+fn released_lease_that_a_run_keeps_cannot_be_renewed() {
+    let mut bench = bench_with_lease();
+    bench.take(&Step::Queue(0, Command::Chirp, OnDisconnect::Continue));
+    bench.take(&Step::Advance);
+    let secret = bench.known(0);
+    bench.take(&Step::Release(0));
+    assert!(bench.schedule.lease().is_some(), "the run keeps it");
+    let (schedule, now) = (&mut bench.schedule, bench.now);
+    assert_eq!(
+        schedule.renew_lease(&secret, now),
+        Err(ScheduleError::NoLease)
+    );
+    assert!(schedule.require_lease(&secret, now).is_err());
+}
+
+#[test]
 fn lease_is_invalid_at_its_expiry_also_before_anyone_has_looked() {
     let mut bench = bench_with_lease();
     let secret = bench.known(0);
