@@ -34,6 +34,8 @@ REQUESTS = {
     json.dumps({"op": "setParameters", "parameters": [{"name": "loop.rate_hz", "value": 1}]}): "parameters",
     json.dumps({"op": "fetchAsset", "uri": "file:///etc/hostname", "requestId": 1}): "assets",
 }
+# Ticks of the loop between two runs whose times are within the run.
+MAX_OTHER_TICKS = 50
 # Messages for which the second client does not read: more than the queue of the server.
 STALLED_TICKS = 25_000
 
@@ -128,7 +130,7 @@ async def read_until(client, channels, end_ns):
 
 
 def compare(received, recording):
-    """Every message of the recording was received, and during the run no tick that is not in it."""
+    """Every message of the recording was received, in its order, and during the run nearly no tick that is not in it."""
     with open(recording, "rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         recorded = [(channel.topic, message.log_time, fields(content)) for _, channel, message, content in reader.iter_decoded_messages()]
@@ -141,7 +143,11 @@ def compare(received, recording):
     ticks = [message for message in recorded if message[0] == "/loop"]
     first_ns, last_ns = ticks[0][1], ticks[-1][1]
     during = [message for message in received if message[0] == "/loop" and first_ns <= message[1] <= last_ns]
-    assert during == ticks, f"{len(during)} ticks were received in the time of the run; its recording has {len(ticks)}"
+    following = iter(during)
+    assert all(tick in following for tick in ticks), "the ticks of the run are not in the order of the recording"
+    # The last ticks of the loop before the run and the first ones after it may have times of the run, up to 10 ms.
+    others = len(during) - len(ticks)
+    assert others <= MAX_OTHER_TICKS, f"{others} ticks that are not in the recording were received in the time of the run"
 
 
 def compare_late(late, received):
