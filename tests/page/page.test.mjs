@@ -8,7 +8,7 @@ import { Daemon, browser, openPage } from "./daemon.mjs";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 const PICTURES = process.env.BENCH_PAGE_PICTURES ?? "target/page-pictures";
-const SCOPE_S = Number(process.env.BENCH_PAGE_SCOPE_S ?? 20);
+const SCOPE_S = Number(process.env.BENCH_PAGE_SCOPE_S ?? 60);
 const DESK = { width: 1400, height: 1000 };
 /** A step that waits longer than this has failed. It is not a requirement. */
 const PATIENCE = { timeout: 180_000 };
@@ -28,15 +28,16 @@ after(async () => {
   daemon.remove();
 });
 
-// A test that fails leaves no run to the next one.
+// A test that fails leaves no page, no lease and no run to the next one.
 afterEach(async () => {
+  for (const context of chrome.contexts()) await context.close();
   const stop = { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ how: "cut" }) };
   await fetch(`http://127.0.0.1:${daemon.port}/api/v1/stop`, stop).catch(() => {});
 });
 
 const stateIs = (page, wanted) => page.waitForFunction((wanted) => document.getElementById("state").textContent === wanted, wanted, PATIENCE);
 const planSays = (page, pattern) => page.waitForFunction((pattern) => new RegExp(pattern).test(document.getElementById("plan-text").textContent), pattern, PATIENCE);
-
+const median = (values) => values.toSorted((one, other) => one - other)[Math.floor(values.length / 2)];
 
 /** A picture of the whole page, which its bar covers nowhere but at the top. */
 async function picture(page, name) {
@@ -83,7 +84,7 @@ test("every control does its work", async () => {
   await planSays(page, "Travel.*Current.*Duration");
   await click("start");
   await stateIs(page, "running");
-  await page.waitForSelector("#progress-box:not([hidden])", PATIENCE);
+  await page.waitForSelector("#progress-box:not(.is-empty)", PATIENCE);
   used.add("progress");
 
   // The scope.
@@ -110,7 +111,7 @@ test("every control does its work", async () => {
   });
 
   // The spectrum of the error, with zoom and cursor.
-  await page.waitForSelector("#spectrum:not([hidden])", PATIENCE);
+  await page.waitForSelector("#spectrum:not(.is-empty)", PATIENCE);
   await use("spectrum", async (spectrum) => {
     await spectrum.focus();
     for (const key of ["+", "ArrowRight", "-", "ArrowLeft"]) await page.keyboard.press(key);
@@ -173,12 +174,13 @@ test("every control does its work", async () => {
   assert.equal(await rows.count(), 3);
   const steps = rows.nth(0), sine = rows.nth(2);
   assert.match(await sine.textContent(), /first.*anna/s);
+  // The selection survives the new list after the note.
+  await steps.locator("input").check();
   await sine.getByRole("button", { name: "note" }).click();
   await fill("note-name", "renamed");
   await fill("note-text", "another note");
   await page.click("#note-dialog button[value=ok]");
   await page.waitForFunction(() => /renamed: another note/.test(document.getElementById("recordings").textContent), null, PATIENCE);
-  await page.locator("#recordings tr input").nth(0).check();
   await click("compare");
   await page.waitForFunction(() => /^Comparison/.test(document.querySelector("#result h3").textContent), null, PATIENCE);
   await page.frameLocator("#result iframe").locator("svg").first().waitFor(PATIENCE);
@@ -319,14 +321,17 @@ test("the scope at 5 kHz does not grow in memory", async (context) => {
     await session.send("HeapProfiler.collectGarbage");
     return (await session.send("Runtime.getHeapUsage")).usedSize;
   };
-  await page.waitForTimeout(5000);
-  const start = await heap();
-  await page.waitForTimeout(SCOPE_S * 1000);
-  const growth = await heap() - start;
+  const heaps = [];
+  for (let count = 0; count < 10; count++) {
+    await page.waitForTimeout(SCOPE_S * 100);
+    heaps.push(await heap());
+  }
+  const early = median(heaps.slice(0, 5)), growth = median(heaps.slice(5)) - early, seconds = SCOPE_S / 2;
   const paint = await page.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0]?.startTime);
-  context.diagnostic(`heap ${(start / 1e6).toFixed(1)} MB, growth ${(growth / 1e6).toFixed(2)} MB in ${SCOPE_S} s; first paint after ${paint.toFixed(0)} ms`);
-  // A frame has 4 kB; 20 of them a second that are kept would be 80 kB/s.
-  assert.ok(growth < 20e3 * SCOPE_S, `${growth} bytes in ${SCOPE_S} s`);
+  context.diagnostic(`heap ${(early / 1e6).toFixed(2)} MB, growth ${(growth / 1e6).toFixed(2)} MB in ${seconds} s; first paint after ${paint.toFixed(0)} ms`);
+  // A frame has 4 kB; 20 of them a second that are kept would be 80 kB/s. A single figure differs by up to 0.3 MB from the next:
+  // compiled code comes and goes.
+  assert.ok(growth < 20e3 * seconds, `${growth} bytes in ${seconds} s`);
   assert.deepEqual(page.faults, []);
   await page.context().close();
 });

@@ -145,7 +145,7 @@ function showAlert() {
 
 function showRun() {
   const run = state.run;
-  byId("progress-box").hidden = !run;
+  byId("progress-box").classList.toggle("is-empty", !run);
   if (run) {
     const progress = run.progress, isAnalysing = run.phase === "analysing";
     const left = progress?.remaining_s != null && !isAnalysing ? `, ${progress.remaining_s.toFixed(0)} s left` : "";
@@ -297,7 +297,10 @@ async function tune() {
 }
 
 const recordingActions = {
-  show: (recording) => attempt(() => showResult(recording)),
+  show: async (recording) => {
+    byId("result-heading").scrollIntoView();
+    await attempt(() => showResult(recording));
+  },
   note: async (recording) => {
     byId("note-name").value = recording.name;
     byId("note-text").value = recording.note;

@@ -5,17 +5,35 @@ import { table } from "/page/run_form.js";
 
 const byId = (id) => document.getElementById(id);
 
+/** The rows that are shown: the text of the recording, and its row. */
+let shownRows = new Map();
+
+/** Shows the list. The row of an unchanged recording stays the same element: a press of one of its buttons and its selection are not lost. */
 export async function showRecordings(actions) {
   const { recordings } = await ask("GET", "/recordings");
-  byId("recordings").replaceChildren(...recordings.map((recording) => row(recording, actions)));
+  const rows = new Map(), selected = new Set(selectedFiles());
+  for (const recording of recordings) {
+    const text = JSON.stringify(recording);
+    rows.set(text, shownRows.get(text) ?? row(recording, actions, selected.has(recording.file)));
+  }
+  for (const [text, row] of shownRows) if (!rows.has(text)) row.remove();
+  [...rows.values()].forEach(placeRow);
+  shownRows = rows;
 }
 
-function row(recording, actions) {
+/** Puts a row at its place. A row that is there is not touched. */
+function placeRow(row, index) {
+  const list = byId("recordings"), there = list.rows[index];
+  if (there !== row) list.insertBefore(row, there ?? null);
+}
+
+function row(recording, actions, isSelected) {
   const made = document.createElement("tr");
   const cell = (text) => { made.insertCell().textContent = text ?? ""; };
   const choice = document.createElement("input");
   choice.type = "checkbox";
   choice.value = recording.file;
+  choice.checked = isSelected;
   choice.setAttribute("aria-label", `compare ${recording.file}`);
   made.insertCell().append(choice);
   cell(recording.file);
@@ -43,32 +61,47 @@ function row(recording, actions) {
 }
 
 /** Shows the results of a recording: figures and its report. */
-export async function showResult(recording) {
-  const box = byId("result");
-  const heading = document.createElement("h3");
-  heading.textContent = recording.file;
-  box.replaceChildren(heading);
-  try {
-    const results = await ask("GET", `/recordings/${encodeURIComponent(recording.file)}/results`);
-    box.append(table(figures(results)));
-  } catch (error) {
-    const text = document.createElement("p");
-    text.textContent = error.message;
-    box.append(text);
-  }
-  const report = recording.files.find((file) => file.endsWith("_report.html"));
-  const address = report ? `/api/v1/recordings/${encodeURIComponent(report)}` : reportOf([recording.file]);
-  await showFrame(box, address, `Report of ${recording.file}`);
+export function showResult(recording) {
+  return showContent(recording.file, async () => [await figuresOf(recording), await reportFrame(recording)]);
 }
 
 /** Shows the selected recordings in one plot. */
 export async function compare() {
-  const files = [...document.querySelectorAll("#recordings input:checked")].map((choice) => choice.value);
-  const box = byId("result"), heading = document.createElement("h3");
-  heading.textContent = files.length ? `Comparison: ${files.join(", ")}` : "Select recordings in the list first.";
-  box.replaceChildren(heading);
-  if (files.length) await showFrame(box, reportOf(files), heading.textContent);
+  const files = selectedFiles();
+  if (!files.length) return showContent("Select recordings in the list first.", async () => []);
+  const title = `Comparison: ${files.join(", ")}`;
+  await showContent(title, async () => [await frame(reportOf(files), title)]);
   byId("result-heading").scrollIntoView();
+}
+
+function selectedFiles() {
+  return [...document.querySelectorAll("#recordings input:checked")].map((choice) => choice.value);
+}
+
+let newestContent = 0;
+
+/** Shows a title, and the content when it is complete. A result that arrives after a later one was asked for is dropped. */
+async function showContent(title, content) {
+  const number = ++newestContent;
+  const heading = document.createElement("h3");
+  heading.textContent = title;
+  byId("result").replaceChildren(heading, paragraph("Loading."));
+  const parts = await content();
+  if (number === newestContent) byId("result").replaceChildren(heading, ...parts);
+}
+
+async function figuresOf(recording) {
+  try {
+    return table(figures(await ask("GET", `/recordings/${encodeURIComponent(recording.file)}/results`)));
+  } catch (error) {
+    return paragraph(error.message);
+  }
+}
+
+function reportFrame(recording) {
+  const report = recording.files.find((file) => file.endsWith("_report.html"));
+  const address = report ? `/api/v1/recordings/${encodeURIComponent(report)}` : reportOf([recording.file]);
+  return frame(address, `Report of ${recording.file}`);
 }
 
 function reportOf(files) {
@@ -76,20 +109,21 @@ function reportOf(files) {
 }
 
 /** A page of the daemon in a frame, or the reason why there is none. */
-async function showFrame(box, address, title) {
+async function frame(address, title) {
   const answer = await fetch(address);
-  if (!answer.ok) {
-    const text = document.createElement("p"), { error } = await answer.json();
-    text.textContent = error.message;
-    box.append(text);
-    return;
-  }
-  const frame = document.createElement("iframe");
+  if (!answer.ok) return paragraph((await answer.json()).error.message);
+  const made = document.createElement("iframe");
   // The page draws its plots with a script of its own, which gets no access to this page.
-  frame.sandbox = "allow-scripts";
-  frame.title = title;
-  frame.src = address;
-  box.append(frame);
+  made.sandbox = "allow-scripts";
+  made.title = title;
+  made.src = address;
+  return made;
+}
+
+function paragraph(text) {
+  const made = document.createElement("p");
+  made.textContent = text;
+  return made;
 }
 
 const um = (metres) => `${(metres * 1e6).toPrecision(4)} um`;

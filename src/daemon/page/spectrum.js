@@ -57,8 +57,8 @@ export class Spectrum {
   /** Computes the density anew and draws it. */
   draw() {
     const values = this.samples.last(ERROR, SEGMENT / 2 * (SEGMENTS + 1));
-    this.hint.hidden = values !== null;
-    this.canvas.hidden = values === null;
+    this.hint.classList.toggle("is-empty", values !== null);
+    this.canvas.classList.toggle("is-empty", values === null);
     this.density = null;
     this.readout.textContent = "";
     if (!values) return;
