@@ -297,10 +297,7 @@ async function tune() {
 }
 
 const recordingActions = {
-  show: async (recording) => {
-    byId("result-heading").scrollIntoView();
-    await attempt(() => showResult(recording));
-  },
+  show: (recording) => attempt(() => showResult(recording)),
   note: async (recording) => {
     byId("note-name").value = recording.name;
     byId("note-text").value = recording.note;

@@ -71,7 +71,6 @@ export async function compare() {
   if (!files.length) return showContent("Select recordings in the list first.", async () => []);
   const title = `Comparison: ${files.join(", ")}`;
   await showContent(title, async () => [await frame(reportOf(files), title)]);
-  byId("result-heading").scrollIntoView();
 }
 
 function selectedFiles() {
@@ -85,9 +84,14 @@ async function showContent(title, content) {
   const number = ++newestContent;
   const heading = document.createElement("h3");
   heading.textContent = title;
-  byId("result").replaceChildren(heading, paragraph("Loading."));
+  placeContent(heading, paragraph("Loading."));
   const parts = await content();
-  if (number === newestContent) byId("result").replaceChildren(heading, ...parts);
+  if (number === newestContent) placeContent(heading, ...parts);
+}
+
+function placeContent(...parts) {
+  byId("result").replaceChildren(...parts);
+  byId("result-heading").scrollIntoView();
 }
 
 async function figuresOf(recording) {
