@@ -8,14 +8,15 @@ export function drawTiming(canvas, bars) {
   const room = (width - 16) / bars.counts.length, base = height - 40;
   context.font = context.font.replace(/[\d.]+px/, (size) => `${0.85 * parseFloat(size)}px`);
   context.textAlign = "center";
+  // A narrow plot shows every second edge.
+  const everyEdge = context.measureText("more").width + 8 < room;
   bars.counts.forEach((count, index) => {
     const top = base - Math.log10(1 + count) / largest * (base - 24);
     context.fillStyle = colour("position");
     context.fillRect(8 + index * room + 2, top, room - 4, base - top);
     context.fillStyle = colour("text");
     const edge = bars.edges_us[index];
-    // A narrow plot shows every second edge.
-    if (room > 30 || index % 2 === 0) context.fillText(edge === undefined ? "more" : `${edge}`, 8 + (index + 0.5) * room, height - 24);
+    if (everyEdge || index % 2 === 0) context.fillText(edge === undefined ? "more" : `${edge}`, 8 + (index + 0.5) * room, height - 24);
     if (count > 0 && room > 34) context.fillText(short(count), 8 + (index + 0.5) * room, top - 4);
   });
   context.fillStyle = colour("soft");
