@@ -2,11 +2,12 @@
 
 use nalgebra::Complex;
 
+use super::Section;
 use super::controller::continuous_response;
+use super::error::ControllerError;
 use super::law::{ControlDesign, LawInput, LinearLaw};
 use super::margins::{Margins, grid, margins};
 use super::state_space::StateSpace;
-use super::{ControllerError, Section};
 use crate::model::plant::{LoopPlant, Mode};
 use crate::util::units::UM_PER_M;
 

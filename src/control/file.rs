@@ -4,10 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Section;
+use super::error::ControllerError;
 use super::law::ControlDesign;
 use super::laws::LawSettings;
-use super::section::SectionError;
-use crate::config::{self, ConfigError, profiles};
+use crate::config::{self, profiles};
 
 /// A controller file with a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -104,56 +104,6 @@ pub enum SectionSettings {
         #[schemars(range(min = 1e-3, max = 1e6))]
         prewarp_rad_s: Option<f64>,
     },
-}
-
-/// A controller that is refused, before any motion.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ControllerError {
-    /// The file is missing or not TOML, or its keys, types and ranges are wrong.
-    #[error(transparent)]
-    File(#[from] ConfigError),
-    /// An invalid section.
-    #[error("{name}: section {number} {why}")]
-    Section {
-        /// The controller.
-        name: String,
-        /// Number of the section, from 1.
-        number: usize,
-        /// What is wrong.
-        why: SectionError,
-    },
-    /// A prewarping frequency above half the servo rate.
-    #[error(
-        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s, but the limit at this servo rate is {limit_rad_s:.1} rad/s; lower the frequency, or raise loop.rate_hz"
-    )]
-    Prewarp {
-        /// The controller.
-        name: String,
-        /// Number of the section, from 1.
-        number: usize,
-        /// As given.
-        prewarp_rad_s: f64,
-        /// Half the servo rate.
-        limit_rad_s: f64,
-    },
-    /// A law whose settings are inconsistent with each other or with the servo rate.
-    #[error("{name}: `law` {why}")]
-    Law {
-        /// The controller.
-        name: String,
-        /// What is wrong.
-        why: String,
-    },
-    /// A law of another kind where sections are needed.
-    #[error(
-        "the controller is not a cascade of continuous sections; choose one with `[[section]]` tables, which this command needs"
-    )]
-    NotSections,
-    /// A law without a linear description.
-    #[error(
-        "the control law offers no linear description, so its stability and margins cannot be computed; choose another controller"
-    )]
-    NotLinear,
 }
 
 /// A controller as text, as it is stored in a recording.

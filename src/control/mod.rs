@@ -19,6 +19,7 @@
 mod biquad;
 mod closed_loop;
 mod controller;
+mod error;
 mod file;
 mod law;
 mod laws;
@@ -33,7 +34,8 @@ mod tuned;
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::ClosedLoop;
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
-pub use file::{ControllerError, ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use error::ControllerError;
+pub use file::{ControllerFile, ControllerText, LawFile, SectionSettings};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
