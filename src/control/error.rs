@@ -1,6 +1,8 @@
 //! Why a controller is refused.
 
+use super::import::ImportError;
 use super::section::SectionError;
+use super::transfer::TransferError;
 use crate::config::ConfigError;
 
 /// A controller that is refused, before any motion.
@@ -41,9 +43,22 @@ pub enum ControllerError {
         /// What is wrong.
         why: String,
     },
+    /// A transfer function that cannot be used.
+    #[error("{name}: `{table}`: {why}")]
+    Transfer {
+        /// The controller.
+        name: String,
+        /// The table.
+        table: &'static str,
+        /// What is wrong.
+        why: TransferError,
+    },
+    /// A file of another program that cannot be imported.
+    #[error(transparent)]
+    Import(#[from] ImportError),
     /// A law of another kind where sections are needed.
     #[error(
-        "the controller is not a cascade of continuous sections; choose one with `[[section]]` tables, which this command needs"
+        "the controller is not a cascade of continuous sections; choose one with `[[section]]` tables, or with `[tf]`, `[zpk]` or `[ss]` without `rate_hz`, which this command needs"
     )]
     NotSections,
     /// A law without a linear description.
