@@ -13,7 +13,7 @@ pub(super) struct ControllerChoice {
     /// The slow controller of the thesis, Eq. (6-6)
     #[arg(long)]
     slow: bool,
-    /// A controller by name, or a TOML file with sections
+    /// A controller by name, or a TOML file
     #[arg(long, value_name = "NAME|FILE", help = controller_help())]
     controller: Option<String>,
 }
@@ -34,7 +34,7 @@ impl ControllerChoice {
 fn controller_help() -> String {
     let names = profiles::names(profiles::CONTROLLERS);
     let text = format!(
-        "A controller by name ({names}), or a TOML file with a `title` and either [[section]] tables, one for each factor of C(s) (gain, integrator, zero_pole, pole, pole_pair, biquad, coefficients: docs/own-stage.md lists their keys), or a [law] table"
+        "A controller by name ({names}), or a TOML file with a `title` and [[section]] tables, one for each factor of C(s) (gain, integrator, zero_pole, pole, pole_pair, biquad, coefficients: docs/own-stage.md lists their keys), or one of the tables [tf], [zpk], [ss] and [law]"
     );
     with_setting(&text, "control.controller")
 }

@@ -2,6 +2,8 @@
 
 use nalgebra::{Complex, Matrix2, RowVector2, Vector2};
 
+use super::quadratic::quadratic_roots;
+
 /// Coefficients of H(z) = (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2).
 ///
 /// Both signs are those of the transfer function, as in Oppenheim and Schafer, *Discrete-Time Signal Processing*: the
@@ -61,6 +63,14 @@ impl Biquad {
         numerator / ((w * self.a[1] + self.a[0]) * w + 1.0)
     }
 
+    /// Zeros and poles in the z plane, without those at z = 0.
+    pub fn roots(&self) -> Vec<Complex<f64>> {
+        let [a1, a2] = self.a;
+        let polynomials = [self.b, [1.0, a1, a2]];
+        let roots = polynomials.into_iter().flat_map(roots_of);
+        roots.filter(|root| root.norm() > 0.0).collect()
+    }
+
     /// x+ = A x + B u, y = C x + D u, where x is the [`BiquadState`].
     pub fn state_space(&self) -> (Matrix2<f64>, Vector2<f64>, RowVector2<f64>, f64) {
         let [a1, a2] = self.a;
@@ -71,6 +81,15 @@ impl Biquad {
             RowVector2::new(1.0, 0.0),
             b0,
         )
+    }
+}
+
+/// Roots of c0 z^2 + c1 z + c2; none of a constant.
+fn roots_of([c0, c1, c2]: [f64; 3]) -> Vec<Complex<f64>> {
+    match (c0, c1) {
+        (0.0, 0.0) => Vec::new(),
+        (0.0, _) => vec![Complex::new(-c2 / c1, 0.0)],
+        _ => quadratic_roots(c0, c1, c2).to_vec(),
     }
 }
 

@@ -2,11 +2,12 @@
 
 use nalgebra::Complex;
 
+use super::Section;
 use super::controller::continuous_response;
+use super::error::ControllerError;
 use super::law::{ControlDesign, LawInput, LinearLaw};
 use super::margins::{Margins, grid, margins};
 use super::state_space::StateSpace;
-use super::{ControllerError, Section};
 use crate::model::plant::{LoopPlant, Mode};
 use crate::util::units::UM_PER_M;
 
@@ -171,17 +172,17 @@ impl ClosedLoop {
         let modes = modes.map(|mode| (mode.omega_rad_s, mode.damping_ratio));
         let pairs = match self.design.sections() {
             Some(sections) => section_pairs(sections),
-            None => self.law_poles(),
+            None => self.law_roots(),
         };
         let lightly_damped = |(w, zeta): &(f64, f64)| w.is_finite() && *zeta < 0.5;
         let pairs = pairs.into_iter().filter(lightly_damped);
         modes.filter(|(w, _)| *w > 0.0).chain(pairs).collect()
     }
 
-    /// Frequency and damping ratio of the poles of the sampled law: z = exp(s T).
-    fn law_poles(&self) -> Vec<(f64, f64)> {
-        let poles = self.linear.state_space().poles().unwrap_or_default();
-        let continuous = poles.iter().map(|z| z.ln() / self.plant.period_s());
+    /// Frequency and damping ratio of the roots of the sampled law: z = exp(s T).
+    fn law_roots(&self) -> Vec<(f64, f64)> {
+        let roots = self.linear.roots();
+        let continuous = roots.iter().map(|z| z.ln() / self.plant.period_s());
         let pairs = continuous.filter(|s| s.im > 0.0);
         pairs.map(|s| (s.norm(), (s.re / s.norm()).abs())).collect()
     }

@@ -31,9 +31,12 @@ impl Controller {
     /// Discretises continuous sections for a loop of period T, one by one (Tustin).
     pub fn new(sections: &[Section], period_s: f64) -> Controller {
         let discrete = sections.iter().map(|section| section.tustin(period_s));
-        Controller {
-            sections: discrete.collect(),
-        }
+        Controller::of_biquads(discrete.collect())
+    }
+
+    /// A cascade of discrete sections in amperes per micrometre, for the loop for which they were designed.
+    pub fn of_biquads(sections: Vec<Biquad>) -> Controller {
+        Controller { sections }
     }
 
     /// The state at rest. A change to coefficients of as many sections may keep the state: it is then bumpless.
@@ -61,6 +64,10 @@ impl LinearLaw for Controller {
     fn response(&self, z: Complex<f64>) -> Complex<f64> {
         let sections = self.sections.iter().map(|section| section.response(z));
         sections.product::<Complex<f64>>() * UM_PER_M
+    }
+
+    fn roots(&self) -> Vec<Complex<f64>> {
+        self.sections.iter().flat_map(Biquad::roots).collect()
     }
 }
 

@@ -1,13 +1,16 @@
-//! Controllers as TOML: a list of sections in amperes per micrometre, or a control law of another kind.
+//! Controllers as TOML: a list of sections in amperes per micrometre, a transfer function, or a control law of another kind.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Section;
+use super::error::ControllerError;
 use super::law::ControlDesign;
 use super::laws::LawSettings;
-use super::section::SectionError;
-use crate::config::{self, ConfigError, profiles};
+use super::transfer::{
+    Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
+};
+use crate::config::{self, profiles};
 
 /// A controller file with a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -106,54 +109,15 @@ pub enum SectionSettings {
     },
 }
 
-/// A controller that is refused, before any motion.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ControllerError {
-    /// The file is missing or not TOML, or its keys, types and ranges are wrong.
-    #[error(transparent)]
-    File(#[from] ConfigError),
-    /// An invalid section.
-    #[error("{name}: section {number} {why}")]
-    Section {
-        /// The controller.
-        name: String,
-        /// Number of the section, from 1.
-        number: usize,
-        /// What is wrong.
-        why: SectionError,
-    },
-    /// A prewarping frequency above half the servo rate.
-    #[error(
-        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s, but the limit at this servo rate is {limit_rad_s:.1} rad/s; lower the frequency, or raise loop.rate_hz"
-    )]
-    Prewarp {
-        /// The controller.
-        name: String,
-        /// Number of the section, from 1.
-        number: usize,
-        /// As given.
-        prewarp_rad_s: f64,
-        /// Half the servo rate.
-        limit_rad_s: f64,
-    },
-    /// A law whose settings are inconsistent with each other or with the servo rate.
-    #[error("{name}: `law` {why}")]
-    Law {
-        /// The controller.
-        name: String,
-        /// What is wrong.
-        why: String,
-    },
-    /// A law of another kind where sections are needed.
-    #[error(
-        "the controller is not a cascade of continuous sections; choose one with `[[section]]` tables, which this command needs"
-    )]
-    NotSections,
-    /// A law without a linear description.
-    #[error(
-        "the control law offers no linear description, so its stability and margins cannot be computed; choose another controller"
-    )]
-    NotLinear,
+/// The form of a controller file.
+#[derive(Clone, Copy)]
+enum Form {
+    /// `[[section]]`
+    Sections,
+    /// `[law]`
+    Law,
+    /// A transfer function.
+    Transfer(TransferTable),
 }
 
 /// A controller as text, as it is stored in a recording.
@@ -176,9 +140,40 @@ impl ControllerText {
 
     /// The control law, checked for a servo rate.
     pub fn design(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
-        if !self.has_law() {
-            return Ok(Box::new(self.sections(rate_hz)?));
+        match self.form() {
+            Form::Sections => Ok(Box::new(self.listed_sections(rate_hz)?)),
+            Form::Law => self.law(rate_hz),
+            Form::Transfer(table) => {
+                let design = self.cascade(table)?.design(rate_hz);
+                design.map_err(|why| self.transfer_error(table, why))
+            }
         }
+    }
+
+    /// The continuous sections of a controller that is a cascade of them, checked for a servo rate.
+    pub fn sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
+        match self.form() {
+            Form::Sections => self.listed_sections(rate_hz),
+            Form::Law => Err(ControllerError::NotSections),
+            Form::Transfer(table) => match self.cascade(table)? {
+                cascade if cascade.domain == Domain::Continuous => Ok(cascade.sections),
+                _ => Err(ControllerError::NotSections),
+            },
+        }
+    }
+
+    fn form(&self) -> Form {
+        let table: toml::Table = self.text.parse().unwrap_or_default();
+        let has = |key: &str| table.contains_key(key);
+        let mut tables = TransferTable::ALL.into_iter();
+        match tables.find(|table| has(table.key())) {
+            _ if has("law") => Form::Law,
+            Some(table) => Form::Transfer(table),
+            None => Form::Sections,
+        }
+    }
+
+    fn law(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
         let file: LawFile = config::typed(&self.name, &self.text)?;
         let checked = file.law.check(rate_hz);
         checked.map_err(|why| ControllerError::Law {
@@ -188,11 +183,7 @@ impl ControllerText {
         Ok(file.law.design())
     }
 
-    /// The sections of a controller that is a cascade, checked for a servo rate.
-    pub fn sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
-        if self.has_law() {
-            return Err(ControllerError::NotSections);
-        }
+    fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
         let file: ControllerFile = config::typed(&self.name, &self.text)?;
         let numbered = (1..).zip(&file.section);
         numbered
@@ -200,9 +191,22 @@ impl ControllerText {
             .collect()
     }
 
-    fn has_law(&self) -> bool {
-        let table = self.text.parse::<toml::Table>();
-        table.is_ok_and(|table| table.contains_key("law"))
+    fn cascade(&self, table: TransferTable) -> Result<Cascade, ControllerError> {
+        let (name, text) = (&self.name, &self.text);
+        let settings = match table {
+            TransferTable::Tf => TransferSettings::Tf(config::typed::<TfFile>(name, text)?.tf),
+            TransferTable::Zpk => TransferSettings::Zpk(config::typed::<ZpkFile>(name, text)?.zpk),
+            TransferTable::Ss => TransferSettings::Ss(config::typed::<SsFile>(name, text)?.ss),
+        };
+        Cascade::of(&settings).map_err(|why| self.transfer_error(table, why))
+    }
+
+    fn transfer_error(&self, table: TransferTable, why: TransferError) -> ControllerError {
+        ControllerError::Transfer {
+            name: self.name.clone(),
+            table: table.key(),
+            why,
+        }
     }
 
     fn checked_section(

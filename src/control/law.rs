@@ -76,6 +76,11 @@ pub trait LinearLaw: Send + Sync {
     fn response(&self, z: Complex<f64>) -> Complex<f64> {
         self.state_space().response(z)
     }
+
+    /// Roots in the z plane near which C(z) changes quickly: all poles, and the zeros if they are known.
+    fn roots(&self) -> Vec<Complex<f64>> {
+        self.state_space().poles().unwrap_or_default()
+    }
 }
 
 /// Settings of a control law, from which a law at rest is made for a loop. Immutable.

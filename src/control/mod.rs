@@ -7,6 +7,7 @@
 //! ```text
 //!  file -> Section (continuous) -> Biquad (Tustin, section by section) -> SectionController --+
 //!    |          \-> continuous margins                                                       |
+//!    +-> transfer ([tf], [zpk], [ss]) -> Section (continuous), or Biquad (discrete) -----------+
 //!    +-> laws (another kind, `[law]`) -------------------------------------> ControlLaw <-----+
 //!                                                                             |   \-> ClosedLoop: margins, predicted step
 //!                                                                             v
@@ -19,21 +20,30 @@
 mod biquad;
 mod closed_loop;
 mod controller;
+mod error;
 mod file;
+mod import;
 mod law;
 mod laws;
 mod margins;
 mod pole;
+mod quadratic;
 mod section;
 mod state_space;
 mod step_metrics;
 mod swept;
+mod transfer;
 mod tuned;
 
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::ClosedLoop;
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
-pub use file::{ControllerError, ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use error::ControllerError;
+pub use file::{ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use import::{
+    FormatError, ImportError, ImportOptions, Imported, NumericArray, Value, Variables, import,
+    read_variables,
+};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
@@ -43,4 +53,9 @@ pub use section::{Section, SectionError};
 pub use state_space::StateSpace;
 pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};
+pub use transfer::{
+    Agreement, Cascade, DiscreteDesign, Domain, Factors, GainUnit, Roots, SsFile, SsSettings,
+    TfFile, TfSettings, TransferError, TransferSettings, TransferTable, UnstablePole, ZpkFile,
+    ZpkSettings,
+};
 pub use tuned::TunedDesign;

@@ -3,6 +3,7 @@
 use nalgebra::Complex;
 
 use super::Biquad;
+use super::quadratic::quadratic_roots;
 
 /// Coefficients of a section by rising power of s; s in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,21 +128,6 @@ fn second_order(p: &[f64; 3], c: f64) -> [f64; 3] {
 
 fn order(coefficients: &[f64; 3]) -> Option<usize> {
     coefficients.iter().rposition(|c| *c != 0.0)
-}
-
-/// Roots of a x^2 + b x + c without cancellation.
-fn quadratic_roots(a: f64, b: f64, c: f64) -> [Complex<f64>; 2] {
-    let discriminant = b * b - 4.0 * a * c;
-    if discriminant < 0.0 {
-        let (re, im) = (-b / (2.0 * a), (-discriminant).sqrt() / (2.0 * a));
-        return [Complex::new(re, im), Complex::new(re, -im)];
-    }
-    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
-    if q == 0.0 {
-        [Complex::new(0.0, 0.0); 2]
-    } else {
-        [q / a, c / q].map(|root| Complex::new(root, 0.0))
-    }
 }
 
 #[cfg(test)]

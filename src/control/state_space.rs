@@ -127,21 +127,27 @@ impl From<&Section> for StateSpace {
     }
 }
 
-fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+/// The eigenvalues of a matrix. `None` if an entry is not finite or the iteration does not end.
+pub(super) fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.is_empty() {
         return Some(Vec::new());
     }
-    balance(&mut matrix);
+    let order = matrix.nrows();
+    balance(&mut matrix, order);
+    if !matrix.iter().all(|x| x.is_finite()) {
+        return None;
+    }
     let schur = Schur::try_new(matrix, f64::EPSILON, 100_000)?;
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
 /// Scales rows and columns by powers of two until they have similar magnitudes (Osborne 1960). Such a similarity changes no
-/// eigenvalue, not even in its last bit, and the iteration resolves poles beside entries that are many decades larger.
-fn balance(matrix: &mut DMatrix<f64>) {
+/// eigenvalue, not even in its last bit, and the iteration resolves poles beside entries that are many decades larger. Only the
+/// first `count` rows and columns are scaled; inputs and outputs of a system may follow.
+pub(super) fn balance(matrix: &mut DMatrix<f64>, count: usize) {
     for _ in 0..100 {
         let mut settled = true;
-        for i in 0..matrix.nrows() {
+        for i in 0..count {
             settled &= balance_row_and_column(matrix, i);
         }
         if settled {

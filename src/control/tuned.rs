@@ -63,4 +63,8 @@ impl LinearLaw for TunedLinearLaw {
     fn response(&self, z: Complex<f64>) -> Complex<f64> {
         self.linear.response(z) * self.gain
     }
+
+    fn roots(&self) -> Vec<Complex<f64>> {
+        self.linear.roots()
+    }
 }

@@ -5,6 +5,7 @@
 //! same variables, those of recordings in `tests/recording/damage.rs`.
 
 mod checkpoints;
+mod controllers;
 mod damage;
 mod tables;
 mod texts;

@@ -10,6 +10,10 @@ use crate::damage::{check_damaged, check_damaged_text};
 
 const STAGE: &str = include_str!("../../bench-config/stage.toml");
 
+const TF: &str = "title = \"tf\"\n[tf]\ngain_unit = \"A/um\"\nnumerator = [2.5, 300, 4e4]\ndenominator = [1, 800.5, 2e5, 0]\n";
+const ZPK: &str = "title = \"zpk\"\n[zpk]\ngain_unit = \"A/m\"\nrate_hz = 5000\nzeros = [[-1, 0]]\npoles = [[0.9, 0.1], [0.9, -0.1], [1, 0]]\ngain = 0.25\n";
+const SS: &str = "title = \"ss\"\n[ss]\ngain_unit = \"A/m\"\na = [[-30, 400, 0], [-400, -30, 1], [0, 0, -5]]\nb = [0, 1, 2.5]\nc = [1e3, 0, -1]\nd = 0.5\n";
+
 fn stage() -> Config {
     load(&Source::default()).expect("the profile is valid")
 }
@@ -46,6 +50,9 @@ fn damaged_controller_is_refused_or_gives_finite_current() {
     let files = [
         include_str!("../../bench-config/controllers/fast.toml"),
         include_str!("../../bench-config/controllers/slow.toml"),
+        TF,
+        ZPK,
+        SS,
     ];
     check_damaged_text("controller", &files, |text| {
         let controller = ControllerText {

@@ -7,13 +7,23 @@ use std::process::{Command, Stdio};
 
 /// The numbers that a script of `tests/python` prints, line by line. Without scipy: `None`, with the reason on standard output.
 pub fn numbers(script: &str, arguments: &[&str], input: &str) -> Option<Vec<Vec<f64>>> {
+    numbers_with("scipy.signal, scipy.linalg", script, arguments, input)
+}
+
+/// As [`numbers`], for a script that needs other modules.
+pub fn numbers_with(
+    modules: &str,
+    script: &str,
+    arguments: &[&str],
+    input: &str,
+) -> Option<Vec<Vec<f64>>> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or_else(|_| "python3".into());
-    if let Err(why) = scipy(&python) {
+    if let Err(why) = has_modules(&python, modules) {
         assert!(
             std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"),
-            "{why}, but BENCH_REQUIRE_PYTHON=1: install scipy or name another interpreter in BENCH_PYTHON"
+            "{why}, but BENCH_REQUIRE_PYTHON=1: install them or name another interpreter in BENCH_PYTHON"
         );
-        println!("not compared: {why}; install scipy or name another interpreter in BENCH_PYTHON");
+        println!("not compared: {why}; install them or name another interpreter in BENCH_PYTHON");
         return None;
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -51,13 +61,13 @@ pub fn numbers(script: &str, arguments: &[&str], input: &str) -> Option<Vec<Vec<
     )
 }
 
-fn scipy(python: &str) -> Result<(), String> {
+fn has_modules(python: &str, modules: &str) -> Result<(), String> {
     let output = Command::new(python)
-        .args(["-c", "import scipy.signal, scipy.linalg"])
+        .args(["-c", &format!("import {modules}")])
         .output();
     match output {
         Ok(output) if output.status.success() => Ok(()),
-        Ok(_) => Err(format!("{python} has no scipy")),
+        Ok(_) => Err(format!("{python} does not have all of {modules}")),
         Err(error) => Err(format!("{python} does not start ({error})")),
     }
 }
