@@ -1,11 +1,14 @@
 //! `bench margins`: the stability margins of a loop.
 
+use std::path::PathBuf;
+
 use serde::Serialize;
 use serde_json::Value;
 
 use super::controller_choice::ControllerChoice;
 use super::error::CliError;
 use super::help::GLOSSARY;
+use super::measured_margins::{self, Measured};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
@@ -25,8 +28,16 @@ pub(super) struct Args {
     #[command(flatten)]
     choice: ControllerChoice,
     /// Neglect zero-order hold, computing delay and amplifier dynamics, as in the thesis
-    #[arg(long)]
+    #[arg(long, conflicts_with = "frf")]
     continuous: bool,
+    /// Also compute the margins with a measured plant instead of the model, with 95 % confidence intervals: the FRF of
+    /// `bench chirp` (..._frf.csv) or its recording (MCAP); exit code 1 if this loop is not stable. Outside of the
+    /// measured band the model is used
+    #[arg(long, value_name = "FILE|RECORDING")]
+    frf: Option<PathBuf>,
+    /// With --frf: folder for L, S, T, C S and P S as CSV and for Bode plot, Nyquist plot and sensitivities as SVG
+    #[arg(long, value_name = "FOLDER", requires = "frf")]
+    out: Option<PathBuf>,
 }
 
 /// The JSON object of the command. An unstable loop has no margins: they are `null`.
@@ -38,6 +49,9 @@ struct Report {
     poles: Vec<Pole>,
     /// Mean delay from a command to the position that its reading shows, without hold and amplifier lag.
     delay_s: f64,
+    /// The margins with the measured plant.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    measured: Option<Measured>,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -51,6 +65,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         ),
         false => (closed_loop.margins(), closed_loop.poles()),
     };
+    let frf = args.frf.as_deref();
+    let measured = frf
+        .map(|frf| measured_margins::measured(frf, args.out.as_deref(), &closed_loop, &config))
+        .transpose()?;
+    let is_stable = measured
+        .as_ref()
+        .map_or(margins.stable, Measured::is_stable);
     let report = Report {
         margins: margins_json(&margins)?,
         poles: listed_poles(&poles, config.servo.rate_hz),
@@ -58,11 +79,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             true => 0.0,
             false => closed_loop.plant().delay_s(),
         },
+        measured,
     };
     print_result(args.bench.json, &report, |report| {
-        text(&config, &margins, &report.poles)
+        let measured = report.measured.as_ref().map(measured_margins::text);
+        text(&config, &margins, &report.poles) + &measured.unwrap_or_default()
     })?;
-    Ok(match margins.stable {
+    Ok(match is_stable {
         true => Outcome::Done,
         false => Outcome::Failed,
     })

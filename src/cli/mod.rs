@@ -25,6 +25,7 @@ mod linearity;
 mod linearity_output;
 mod loop_output;
 mod margins;
+mod measured_margins;
 mod modal_output;
 mod model;
 mod operator;

@@ -20,6 +20,15 @@ pub struct ClosedLoop {
     linear: Box<dyn LinearLaw>,
 }
 
+/// The poles of an open loop that are not inside the unit circle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct OpenLoopPoles {
+    /// Poles at z = 1: integrators of the control law, and two for each free body of the plant.
+    pub integrators: usize,
+    /// Poles of the control law outside the unit circle.
+    pub unstable: usize,
+}
+
 impl ClosedLoop {
     /// The loop of a control law around `plant`, which is hold, amplifier, delays and probe around `modes`.
     ///
@@ -65,9 +74,28 @@ impl ClosedLoop {
         self.plant.response(omega_rad_s)
     }
 
+    /// C in amperes per metre at z = exp(j w T).
+    pub fn law_response(&self, omega_rad_s: f64) -> Complex<f64> {
+        self.linear.response(self.z(omega_rad_s))
+    }
+
     /// L = P C of the sampled loop.
     pub fn sampled_loop(&self, omega_rad_s: f64) -> Complex<f64> {
-        self.plant.response(omega_rad_s) * self.linear.response(self.z(omega_rad_s))
+        self.plant.response(omega_rad_s) * self.law_response(omega_rad_s)
+    }
+
+    /// The poles of plant and control law that are not stable. `None` if they cannot be computed.
+    pub fn open_loop_poles(&self) -> Option<OpenLoopPoles> {
+        // A double pole at 1 is computed with an error of the square root of the rounding, 1e-8.
+        const AT_ONE: f64 = 1e-6;
+        let law = self.linear.state_space().poles()?;
+        let (at_one, others): (Vec<Complex<f64>>, Vec<Complex<f64>>) =
+            law.into_iter().partition(|z| (*z - 1.0).norm() < AT_ONE);
+        let free_bodies = self.modes.iter().filter(|mode| mode.omega_rad_s == 0.0);
+        Some(OpenLoopPoles {
+            integrators: at_one.len() + 2 * free_bodies.count(),
+            unstable: others.iter().filter(|z| z.norm() > 1.0 + AT_ONE).count(),
+        })
     }
 
     /// L = P C in continuous time, without hold, delay and amplifier; `None` for a law that was not designed as a
@@ -109,6 +137,11 @@ impl ClosedLoop {
         let response = |w| self.continuous_response(sections, w);
         let stable = self.is_stable_in_continuous_time(sections);
         Ok(margins(&response, &grid, stable, true))
+    }
+
+    /// The modes of the plant.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes
     }
 
     /// Frequencies in rad/s that follow every resonance of plant and controller.
@@ -153,12 +186,13 @@ impl ClosedLoop {
         Complex::new(cosine, sine)
     }
 
-    fn nyquist_rad_s(&self) -> f64 {
+    /// Half the sampling rate, pi/T, in rad/s.
+    pub fn nyquist_rad_s(&self) -> f64 {
         std::f64::consts::PI / self.plant.period_s()
     }
 
-    /// The lowest frequency of the search for crossings.
-    fn lowest_rad_s(&self) -> f64 {
+    /// The lowest frequency of the search for crossings in rad/s.
+    pub fn lowest_rad_s(&self) -> f64 {
         let slowest = self.modes.iter().find(|mode| mode.omega_rad_s > 0.0);
         1e-3 * slowest
             .map_or(1.0, |mode| mode.omega_rad_s)

@@ -8,6 +8,7 @@
 use nalgebra::Complex;
 use serde::Serialize;
 
+use super::landmarks::{landmarks, phase_margin_deg};
 use crate::util::numeric::is_within;
 
 /// A frequency at which |L| passes through 1.
@@ -57,106 +58,33 @@ pub(super) fn margins(
     stable: bool,
     continuous: bool,
 ) -> Margins {
-    let values = grid_rad_s.iter().map(|&w| response(w)).collect();
-    let tabulated = Tabulated {
-        response,
-        grid_rad_s,
-        values,
-    };
-    let (crossings, crossover_rad_s) = tabulated.crossings();
-    let phase_margins = crossings.iter().map(|c| c.phase_margin_deg);
-    let peak = tabulated.sensitivity_peak();
+    let places = landmarks(response, grid_rad_s);
+    let crossings: Vec<Crossing> = places
+        .crossings_rad_s
+        .iter()
+        .map(|&rad_s| Crossing {
+            rad_s,
+            phase_margin_deg: phase_margin_deg(response(rad_s)),
+        })
+        .collect();
+    let gain_margin_db = |w: &f64| -20.0 * libm::log10(response(*w).norm());
+    let peak = places.sensitivity_peak.value;
     Margins {
-        crossover_rad_s,
-        phase_margin_deg: smallest(phase_margins),
-        gain_margin_db: smallest(tabulated.gain_margins_db()),
+        crossover_rad_s: places.crossover_rad_s,
+        phase_margin_deg: smallest(crossings.iter().map(|c| c.phase_margin_deg)),
+        gain_margin_db: smallest(places.phase_crossings_rad_s.iter().map(gain_margin_db)),
         modulus_margin: 1.0 / peak,
         sensitivity_peak_db: 20.0 * libm::log10(peak),
-        sensitivity_bandwidth_rad_s: tabulated.sensitivity_bandwidth_rad_s(),
+        sensitivity_bandwidth_rad_s: places.sensitivity_bandwidth_rad_s,
         stable,
         crossings,
         continuous,
     }
 }
 
-/// L and its values on the grid.
-struct Tabulated<'a> {
-    response: &'a dyn Fn(f64) -> Complex<f64>,
-    grid_rad_s: &'a [f64],
-    values: Vec<Complex<f64>>,
-}
-
-impl Tabulated<'_> {
-    /// All crossings of |L| = 1, and the lowest frequency at which |L| falls through 1.
-    fn crossings(&self) -> (Vec<Crossing>, Option<f64>) {
-        let gains: Vec<f64> = self.values.iter().map(|l| l.norm().ln()).collect();
-        let places: Vec<usize> = sign_changes(&gains).collect();
-        let crossings: Vec<Crossing> = places.iter().map(|&i| self.crossing(i)).collect();
-        let falling = places.iter().position(|&i| gains[i] > 0.0);
-        let crossover_rad_s = falling.map(|i| crossings[i].rad_s);
-        (crossings, crossover_rad_s)
-    }
-
-    /// The crossing of |L| = 1 between two points of the grid.
-    fn crossing(&self, i: usize) -> Crossing {
-        let rad_s = self.bisect(i, &|l| libm::log(l.norm()));
-        Crossing {
-            rad_s,
-            phase_margin_deg: phase_margin_deg((self.response)(rad_s)),
-        }
-    }
-
-    /// Distances in decibels of |L| from 1 where L crosses the negative real axis.
-    fn gain_margins_db(&self) -> impl Iterator<Item = f64> {
-        let imaginary: Vec<f64> = self.values.iter().map(|l| l.im).collect();
-        let places: Vec<usize> = sign_changes(&imaginary).collect();
-        let negative = |i: &usize| self.values[*i].re < 0.0 || self.values[*i + 1].re < 0.0;
-        let crossings = places.into_iter().filter(negative);
-        crossings
-            .map(|i| (self.response)(self.bisect(i, &|l| l.im)))
-            .filter(|l| l.re < 0.0)
-            .map(|l| -20.0 * libm::log10(l.norm()))
-    }
-
-    /// max |S|.
-    fn sensitivity_peak(&self) -> f64 {
-        let on_grid: Vec<f64> = self.values.iter().map(|l| (l + 1.0).inv().norm()).collect();
-        let highest = on_grid.iter().copied().fold(0.0, f64::max);
-        let sensitivity = |w: f64| ((self.response)(w) + 1.0).inv().norm();
-        let refined = local_maxima(&on_grid)
-            .filter(|i| on_grid[*i] > 0.9 * highest)
-            .map(|i| maximum(&sensitivity, self.grid_rad_s[i - 1], self.grid_rad_s[i + 1]));
-        refined.fold(highest, f64::max)
-    }
-
-    /// The lowest frequency at which |S| rises through 1/sqrt(2).
-    fn sensitivity_bandwidth_rad_s(&self) -> Option<f64> {
-        const HALF_LN_2: f64 = 0.5 * std::f64::consts::LN_2;
-        let on_grid = self.values.iter();
-        let excess: Vec<f64> = on_grid
-            .map(|l| -(l + 1.0).norm().ln() + HALF_LN_2)
-            .collect();
-        let rising = sign_changes(&excess).find(|&i| excess[i] < 0.0)?;
-        let refined = |l: Complex<f64>| libm::log((l + 1.0).inv().norm()) + HALF_LN_2;
-        Some(self.bisect(rising, &refined))
-    }
-
-    /// The frequency at which a function of L changes its sign between the points `i` and `i + 1` of the grid.
-    fn bisect(&self, i: usize, of: &dyn Fn(Complex<f64>) -> f64) -> f64 {
-        let (low, high) = (self.grid_rad_s[i], self.grid_rad_s[i + 1]);
-        bisect(&|w| of((self.response)(w)), low, high)
-    }
-}
-
 /// The value of smallest magnitude.
 fn smallest(values: impl Iterator<Item = f64>) -> Option<f64> {
     values.min_by(|a, b| a.abs().total_cmp(&b.abs()))
-}
-
-/// Indices of the values that are not below their neighbours.
-fn local_maxima(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
-    (1..values.len().saturating_sub(1))
-        .filter(|&i| values[i] >= values[i - 1] && values[i] >= values[i + 1])
 }
 
 /// A logarithmic grid, with additional points w (1 + zeta sinh x) around each resonance or antiresonance (w, zeta): they are
@@ -178,47 +106,6 @@ pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64
 /// Frequencies around a resonance or antiresonance.
 fn around((w, zeta): (f64, f64)) -> impl Iterator<Item = f64> {
     (-240..=240).map(move |i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0)))
-}
-
-fn phase_margin_deg(l: Complex<f64>) -> f64 {
-    // The argument of -L is that of L turned by 180 deg, within +-180 deg.
-    libm::atan2(-l.im, -l.re).to_degrees()
-}
-
-fn sign_changes(values: &[f64]) -> impl Iterator<Item = usize> + '_ {
-    values
-        .windows(2)
-        .enumerate()
-        .filter(|(_, pair)| (pair[0] > 0.0) != (pair[1] > 0.0))
-        .map(|(i, _)| i)
-}
-
-/// The argument at which `f` changes its sign between `low` and `high`, to the last bits.
-fn bisect(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    let start = f(low) > 0.0;
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if (f(middle) > 0.0) == start {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    0.5 * (low + high)
-}
-
-/// Largest value of `f` between `low` and `high`, by golden section.
-fn maximum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
-    const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    for _ in 0..50 {
-        let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
-        if f(a) > f(b) {
-            high = b;
-        } else {
-            low = a;
-        }
-    }
-    f(0.5 * (low + high))
 }
 
 #[cfg(test)]

@@ -99,6 +99,40 @@ pub fn analyse_with_progress(
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
+    let (estimate, filled_ticks) = estimated(recording, config, progress)?;
+    let analysis = with_modes(estimate, config, filled_ticks, progress)?;
+    let verdict = cautions(recording)
+        .into_iter()
+        .fold(analysis.verdict, |verdict, caution| {
+            verdict.with(Some(caution))
+        });
+    Ok(Analysis {
+        verdict,
+        ..analysis
+    })
+}
+
+/// The frequency response of a recording, from the commanded current to the measured position: [`Analysis::frf`] alone.
+pub(super) fn measured_response(
+    recording: &Recording,
+    config: &Config,
+) -> Result<Frf, AnalysisError> {
+    let (estimate, _) = estimated(recording, config, &mut |_, _| ControlFlow::Continue(()))?;
+    Ok(estimate.frf)
+}
+
+/// Defects of a run that affect its results.
+pub(super) fn cautions(recording: &Recording) -> Vec<String> {
+    let cautions = [Ending::of(recording).caution(), loss_caution(recording)];
+    cautions.into_iter().flatten().collect()
+}
+
+/// The responses of a recording, and the number of interpolated ticks.
+fn estimated(
+    recording: &Recording,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<(ResponseEstimate, u64), AnalysisError> {
     let is_closed_loop = is_closed_loop(recording);
     let RunSignals {
         loop_signals,
@@ -110,15 +144,7 @@ pub fn analyse_with_progress(
         true => closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)?,
         false => open_loop(loop_signals.signals, band_hz, config)?,
     };
-    let analysis = with_modes(estimate, config, filled_ticks, progress)?;
-    let verdict = analysis
-        .verdict
-        .with(Ending::of(recording).caution())
-        .with(loss_caution(recording));
-    Ok(Analysis {
-        verdict,
-        ..analysis
-    })
+    Ok((estimate, filled_ticks))
 }
 
 /// A warning that records are lost: their ticks were interpolated, or the results lack them.

@@ -2,6 +2,7 @@
 
 use super::plan_error::PlanError;
 use crate::control::ControllerError;
+use crate::control::measured::MeasuredLoopError;
 use crate::identify::IdentifyError;
 use crate::model::plant::PlantError;
 use crate::recording::RecordingError;
@@ -74,4 +75,7 @@ pub enum ClosedLoopError {
     /// The recorded controller is invalid.
     #[error(transparent)]
     Controller(#[from] ControllerError),
+    /// The measured loop gives no margins.
+    #[error(transparent)]
+    Margins(#[from] MeasuredLoopError),
 }

@@ -3,6 +3,7 @@
 use super::analysis_error::AnalysisError;
 use super::error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 use super::loop_check::MarginError;
+use super::measured_frf::FrfError;
 use super::motor_error::MotorError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
@@ -50,6 +51,9 @@ pub enum ExperimentError {
     /// The recording does not contain a frequency response.
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
+    /// A measured plant cannot be used.
+    #[error(transparent)]
+    Frf(#[from] FrfError),
     /// Another failure.
     #[error("{0}")]
     Failed(String),
@@ -98,6 +102,7 @@ impl ExperimentError {
             | ExperimentError::Failed(_)
             | ExperimentError::Motor(MotorError::Memory(_) | MotorError::Stopped) => true,
             ExperimentError::Remote(error) => error.is_failure,
+            ExperimentError::Frf(error) => error.is_failure(),
             ExperimentError::Plan(_)
             | ExperimentError::Margin(_)
             | ExperimentError::Excitation(_)
@@ -125,6 +130,7 @@ impl ExperimentError {
             ExperimentError::Run(_) | ExperimentError::Analysis(_) | ExperimentError::Failed(_) => {
                 ErrorKind::Failed
             }
+            ExperimentError::Frf(_) => ErrorKind::Data,
             ExperimentError::Remote(error) => error.error.kind,
         }
     }

@@ -3,8 +3,8 @@
 use nalgebra::Complex;
 
 use crate::control::Margins;
+use crate::control::measured::MeasuredMargins;
 use crate::identify::linearity::Linearity;
-use crate::identify::modal::Estimate;
 use crate::identify::{Frf, FrfDatum};
 
 /// The measured responses of a closed loop, and those of the model at the same frequencies.
@@ -20,21 +20,8 @@ pub struct ClosedResponses {
     pub model_loop: Vec<Complex<f64>>,
     /// Margins by the model.
     pub predicted: Margins,
-    /// Measured margins.
+    /// Measured margins, within the swept band.
     pub margins: MeasuredMargins,
-}
-
-/// Margins of the measured loop, within the swept band.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasuredMargins {
-    /// Lowest frequency in rad/s at which |L| falls below 1.
-    pub crossover_rad_s: Option<f64>,
-    /// 180 degrees + arg L at the crossover.
-    pub phase_margin_deg: Option<Estimate>,
-    /// 1/max|S|.
-    pub modulus_margin: Estimate,
-    /// Frequency of the largest |S|, in rad/s.
-    pub sensitivity_peak_rad_s: f64,
 }
 
 /// A response: for display, and as data for the fit.

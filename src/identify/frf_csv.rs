@@ -14,6 +14,8 @@ use crate::util::input_file::{self, MAX_TABLE_BYTES};
 
 /// Name of the magnitude column of a response from current to displacement.
 pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";
+/// Name of the magnitude column of a response from displacement to current.
+pub const AMPERES_PER_METRE: &str = "magnitude_a_per_m";
 /// Name of the magnitude column of a ratio, such as a sensitivity.
 pub const RATIO: &str = "magnitude";
 
@@ -87,9 +89,7 @@ pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
 pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let found = text.lines().next().unwrap_or_default().trim();
     if found != HEADER {
-        return Err(FrfCsvError::Format(format!(
-            "the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`"
-        )));
+        return Err(wrong_header(found));
     }
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
@@ -103,6 +103,20 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
             .ok_or_else(|| invalid_row(&record))?;
     }
     Ok(frf)
+}
+
+/// The columns are those of another file, or of a response in another unit.
+fn wrong_header(found: &str) -> FrfCsvError {
+    let name = found.split(',').nth(1).unwrap_or_default();
+    let text = match found.replacen(name, METRES_PER_AMPERE, 1) == HEADER {
+        true => format!(
+            "the magnitude column is `{name}`, not `{METRES_PER_AMPERE}`; give a response from current (A) to displacement (m), such as ..._frf.csv of `bench chirp`"
+        ),
+        false => format!(
+            "the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`"
+        ),
+    };
+    FrfCsvError::Format(text)
 }
 
 fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {

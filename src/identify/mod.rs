@@ -25,7 +25,6 @@
 mod band;
 pub mod delay;
 mod error;
-mod estimate;
 mod estimator;
 pub mod external_csv;
 mod fft;
@@ -44,8 +43,8 @@ pub mod welch;
 
 use crate::config::IdentifySettings;
 pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoint};
+pub use crate::util::estimate::{Estimate, SIGMAS_95};
 pub use error::IdentifyError;
-pub use estimate::{Estimate, SIGMAS_95};
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};
 pub use local_model::frf_data::frf_data;

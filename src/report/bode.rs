@@ -55,6 +55,16 @@ pub(super) fn sheet(
 ) -> Result<String, ReportError> {
     let mut charts = vec![magnitude(unit, lines)?, phase(lines)];
     charts.extend(coherence(lines));
+    stacked(charts, lines, title, subtitle)
+}
+
+/// Charts below each other over the frequencies of lines.
+pub(super) fn stacked(
+    charts: Vec<Chart>,
+    lines: &[Line],
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
     let x = Scale::frequency(frequency_range(lines));
     sheet_svg(title, subtitle, &rows(charts, &x))
 }
@@ -76,7 +86,8 @@ fn panel(y: Scale) -> Chart {
     Chart::new("", Scale::logarithmic(""), y)
 }
 
-fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
+/// The magnitudes of lines.
+pub(super) fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
     let label = match unit {
         Unit::MetresPerAmpere => "Magnitude (m/A)",
         Unit::Bare => "Magnitude",
@@ -88,7 +99,8 @@ fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
     }))
 }
 
-fn phase(lines: &[Line]) -> Chart {
+/// The phases of lines.
+pub(super) fn phase(lines: &[Line]) -> Chart {
     let (low, high) = phase_range(lines);
     let chart = panel(Scale::degrees("Phase (deg)").within(low, high)).without_legend();
     lines.iter().fold(chart, |chart, line| {

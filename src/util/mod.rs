@@ -3,6 +3,7 @@
 pub mod atomic_file;
 pub mod checkpoint;
 pub mod decimal;
+pub mod estimate;
 pub mod finding;
 pub mod input_file;
 pub mod nearest;

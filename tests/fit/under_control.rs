@@ -122,8 +122,8 @@ fn closed_loop_record_gives_modes_zeros_and_margins() {
     );
     let crossover = closed_loop.margins.crossover_rad_s.expect("a crossover");
     assert!(
-        (crossover / closed_loop.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3,
-        "{crossover}"
+        (crossover.value / closed_loop.predicted.crossover_rad_s.expect("one") - 1.0).abs() < 2e-3,
+        "{crossover:?}"
     );
 }
 

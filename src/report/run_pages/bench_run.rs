@@ -261,16 +261,15 @@ fn margins(closed: &ClosedResponses) -> String {
 }
 
 fn crossovers(closed: &ClosedResponses) -> String {
-    let [measured, predicted] = [
-        closed.margins.crossover_rad_s,
-        closed.predicted.crossover_rad_s,
-    ]
-    .map(|omega_rad_s| or_none(omega_rad_s.map(angular_frequency)));
-    row(&["Crossover".into(), measured, predicted])
+    let measured = closed.margins.crossover_rad_s;
+    let measured = measured.map(|crossover| format!("{} rad/s", with_interval(crossover, 1.0)));
+    let predicted = closed.predicted.crossover_rad_s.map(angular_frequency);
+    row(&["Crossover".into(), or_none(measured), or_none(predicted)])
 }
 
 fn phase_margins(closed: &ClosedResponses) -> String {
-    let measured = closed.margins.phase_margin_deg;
+    let crossover = closed.margins.crossover();
+    let measured = crossover.map(|crossing| crossing.phase_margin_deg);
     let measured = measured.map(|margin| format!("{} deg", with_interval(margin, 1.0)));
     let predicted = closed.predicted.phase_margin_deg;
     let predicted = predicted.map(|margin| format!("{margin:.2} deg"));

@@ -10,6 +10,7 @@
 mod bench_run;
 mod comparison;
 mod external;
+mod measured_loop;
 mod outputs;
 mod page;
 mod plots;
@@ -23,6 +24,7 @@ use crate::identify::{Frf, Unit};
 pub use bench_run::BenchRun;
 pub use comparison::{ComparedRun, comparison_page};
 pub use external::ExternalRecord;
+pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
 pub use outputs::{
     AnalysisOutputs, AnalysisStatus, ExistingFile, LoopOutputs, ModalSummary, OutputError,
     PageFiles, ResultFiles,

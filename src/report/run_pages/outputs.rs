@@ -56,7 +56,13 @@ impl ResultFiles<'_> {
         self.write(what, "csv", &frf_csv::to_string(frf, magnitude))
     }
 
-    fn write(&self, what: &str, extension: &str, text: &str) -> Result<String, OutputError> {
+    /// Writes a file and returns its path.
+    pub(super) fn write(
+        &self,
+        what: &str,
+        extension: &str,
+        text: &str,
+    ) -> Result<String, OutputError> {
         let stem = self.beside.file_stem().unwrap_or_default();
         let name = format!("{}_{what}.{extension}", stem.to_string_lossy());
         let path = self.beside.with_file_name(name);
@@ -186,13 +192,16 @@ impl LoopOutputs {
         results: ResultFiles<'_>,
     ) -> Result<LoopOutputs, OutputError> {
         let margins = &closed.margins;
+        let phase_margin_deg = margins
+            .crossover()
+            .map(|crossing| crossing.phase_margin_deg);
         Ok(LoopOutputs {
             loop_csv: results.write_frf("loop", &closed.loop_gain, RATIO)?,
             sensitivity_csv: results.write_frf("sensitivity", &closed.sensitivity, RATIO)?,
             complementary_csv: results.write_frf("complementary", &closed.complementary, RATIO)?,
-            crossover_rad_s: margins.crossover_rad_s,
-            phase_margin_deg: margins.phase_margin_deg.map(|margin| margin.value),
-            phase_margin_sigma_deg: margins.phase_margin_deg.map(|margin| margin.sigma),
+            crossover_rad_s: margins.crossover_rad_s.map(|crossover| crossover.value),
+            phase_margin_deg: phase_margin_deg.map(|margin| margin.value),
+            phase_margin_sigma_deg: phase_margin_deg.map(|margin| margin.sigma),
             modulus_margin: margins.modulus_margin.value,
             modulus_margin_sigma: margins.modulus_margin.sigma,
             predicted_modulus_margin: closed.predicted.modulus_margin,

@@ -58,6 +58,7 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
 fn available(python: &str, script: &str) -> Result<(), String> {
     let imports = match script {
         "tables.py" => "import pyarrow.parquet",
+        "measured_margins.py" => "import control, numpy, scipy, mpmath, tomllib",
         _ => "import sys, tomllib, numpy, scipy, mpmath; assert numpy.trapezoid",
     };
     match Command::new(python).args(["-c", imports]).output() {

@@ -1,9 +1,11 @@
 //! A number with its standard deviation.
 
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
 /// Standard deviations to either side of the mean that contain 95 % of a normal distribution.
 pub const SIGMAS_95: f64 = 1.959_963_984_540_054;
 
-/// A number with its standard deviation.
+/// A number with its standard deviation. In JSON: `value`, and the limits `low` and `high` of its 95 % confidence interval.
 ///
 /// ```
 /// use bench::identify::Estimate;
@@ -34,8 +36,25 @@ impl Estimate {
         SIGMAS_95 * self.sigma
     }
 
+    /// The limits of the 95 % confidence interval.
+    pub fn interval_95(self) -> (f64, f64) {
+        let half = self.half_width_95();
+        (self.value - half, self.value + half)
+    }
+
     /// Probability that a normally distributed number with this mean and deviation is below zero.
     pub fn below_zero_probability(self) -> f64 {
         0.5 * libm::erfc(self.value / (self.sigma * std::f64::consts::SQRT_2))
+    }
+}
+
+impl Serialize for Estimate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let (low, high) = self.interval_95();
+        let mut estimate = serializer.serialize_struct("Estimate", 3)?;
+        estimate.serialize_field("value", &self.value)?;
+        estimate.serialize_field("low", &low)?;
+        estimate.serialize_field("high", &high)?;
+        estimate.end()
     }
 }

@@ -1,0 +1,211 @@
+//! Plots of a measured loop: L with its margins as Bode and Nyquist plot, S and T.
+
+use nalgebra::Complex;
+
+use super::ReportError;
+use super::bode::{magnitude, phase, stacked};
+use super::chart::colours::{Colour, GREY, INK, PURPLE};
+use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use super::ellipse::{self, SIGMAS_95_PLANE};
+use super::trace::{self, Line, Trace};
+use crate::identify::{Frf, Unit};
+
+/// Ends of the axes of the Nyquist plot: the surroundings of -1 and of the unit circle.
+const REAL_PART: (f64, f64) = (-2.6, 1.4);
+const IMAGINARY_PART: (f64, f64) = (-1.6, 1.6);
+/// Height of the Nyquist plot in pixels; its axes have the same scale.
+const NYQUIST_HEIGHT: f64 = 640.0;
+/// Largest number of frequencies and of circles in the Nyquist plot.
+const FREQUENCIES: usize = 14;
+const CIRCLES: usize = 60;
+/// Smallest distance of two labelled frequencies on the curve.
+const LABEL_DISTANCE: f64 = 0.27;
+/// Opacity of a circle.
+const OPACITY: f64 = 0.15;
+/// Colour of the margins.
+const MARK: Colour = PURPLE;
+/// Symbols of the margins, in their order.
+const SYMBOLS: [Symbol; 2] = [Symbol::Ring, Symbol::Dot];
+
+/// A frequency of a loop with its name: a margin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoopMark {
+    /// Name and value.
+    pub label: String,
+    /// Frequency in hertz.
+    pub frequency_hz: f64,
+    /// L there.
+    pub loop_gain: Complex<f64>,
+}
+
+/// A measured loop with that of the model.
+#[derive(Clone, Debug)]
+pub struct LoopPlot<'a> {
+    /// Measured L.
+    pub loop_gain: &'a Frf,
+    /// L of the model at the same frequencies.
+    pub model: &'a [Complex<f64>],
+    /// Margins to be marked.
+    pub marks: &'a [LoopMark],
+    /// 1/max |S|.
+    pub modulus_margin: Option<f64>,
+    /// Title of the plot.
+    pub title: &'a str,
+    /// Line below the title.
+    pub subtitle: &'a str,
+}
+
+impl LoopPlot<'_> {
+    fn lines(&self) -> Result<Vec<Line<'_>>, ReportError> {
+        let frequency_hz = &self.loop_gain.frequency_hz;
+        trace::lines(&[
+            Trace::measured("L measured", self.loop_gain),
+            Trace::model("L by the model", frequency_hz, self.model),
+        ])
+    }
+}
+
+/// The Bode plot of L as an SVG document. A band of two sigma surrounds the measured curve; margins are marked in both charts, and
+/// the levels |L| = 1 and arg L = -180 deg are lines.
+///
+/// # Errors
+/// When a response is invalid, or drawing fails.
+pub fn loop_bode_svg(plot: &LoopPlot<'_>) -> Result<String, ReportError> {
+    let lines = plot.lines()?;
+    let mut gains = level(magnitude(Unit::Bare, &lines)?, &lines, 1.0);
+    let mut phases = level(phase(&lines), &lines, -180.0);
+    for (mark, symbol) in plot.marks.iter().zip(SYMBOLS) {
+        let gain = (mark.frequency_hz, mark.loop_gain.norm());
+        let phase = (mark.frequency_hz, phase_deg(&lines[0], mark));
+        gains = gains.points(&mark.label, MARK, symbol, vec![gain]);
+        phases = phases.points(&mark.label, MARK, symbol, vec![phase]);
+    }
+    stacked(vec![gains, phases], &lines, plot.title, plot.subtitle)
+}
+
+/// The phase of a mark on the turn of the curve.
+fn phase_deg(line: &Line, mark: &LoopMark) -> f64 {
+    let after = line
+        .frequency_hz
+        .partition_point(|f| *f < mark.frequency_hz);
+    let near_deg = line.phase_deg[after.min(line.phase_deg.len() - 1)];
+    let phase_deg = mark.loop_gain.arg().to_degrees();
+    phase_deg + 360.0 * libm::round((near_deg - phase_deg) / 360.0)
+}
+
+/// A horizontal line over all frequencies.
+fn level(chart: Chart, lines: &[Line], value: f64) -> Chart {
+    let frequency_hz = lines[0].frequency_hz;
+    let (first, last) = (frequency_hz[0], frequency_hz[frequency_hz.len() - 1]);
+    let points = vec![(first, value), (last, value)];
+    chart.line("", Pen::dotted(GREY), points)
+}
+
+/// The Nyquist plot of L around -1 as an SVG document, with frequencies in hertz on the measured curve, 95 % confidence circles, the
+/// unit circle, and the circle about -1 whose radius is the modulus margin.
+///
+/// # Errors
+/// When a response is invalid, or drawing fails.
+pub fn loop_nyquist_svg(plot: &LoopPlot<'_>) -> Result<String, ReportError> {
+    let lines = plot.lines()?;
+    let x = Scale::linear("Real part of L").within(REAL_PART.0, REAL_PART.1);
+    let y = Scale::linear("Imaginary part of L").within(IMAGINARY_PART.0, IMAGINARY_PART.1);
+    let mut chart = Chart::new("", x, y).equal();
+    chart = confidence_circles(chart, &lines[0], plot.loop_gain);
+    chart = chart.line("|L| = 1", Pen::dotted(GREY), round_outline(0.0, 1.0));
+    if let Some(radius) = plot.modulus_margin {
+        let outline = round_outline(-1.0, radius);
+        chart = chart.line("modulus margin", Pen::dashed(MARK).thin(), outline);
+    }
+    for line in &lines {
+        let points = line.response.iter().map(|l| (l.re, l.im)).collect();
+        chart = chart.line(line.name, line.pen, points);
+    }
+    for (frequency_hz, l) in labelled(plot.loop_gain) {
+        chart = chart
+            .points("", lines[0].pen.colour, Symbol::Dot, vec![(l.re, l.im)])
+            .text((l.re, l.im), (26.0, -9.0), &frequency_text(frequency_hz));
+    }
+    chart = chart.points("-1", INK, Symbol::Cross, vec![(-1.0, 0.0)]);
+    let row = Row::new(NYQUIST_HEIGHT, vec![chart]);
+    sheet_svg(plot.title, plot.subtitle, &[row])
+}
+
+/// A circle about a point of the real axis, fine enough for a large plot.
+fn round_outline(centre: f64, radius: f64) -> Vec<(f64, f64)> {
+    let ellipse = ellipse::Ellipse {
+        half_axes: [radius, radius],
+        angle_rad: 0.0,
+    };
+    ellipse.outline((centre, 0.0))
+}
+
+fn is_inside(l: &Complex<f64>) -> bool {
+    (REAL_PART.0..=REAL_PART.1).contains(&l.re)
+        && (IMAGINARY_PART.0..=IMAGINARY_PART.1).contains(&l.im)
+}
+
+/// 95 % circles of some of the points inside.
+fn confidence_circles(mut chart: Chart, line: &Line, frf: &Frf) -> Chart {
+    let all = 0..frf.len();
+    let inside: Vec<usize> = all.filter(|k| is_inside(&frf.response[*k])).collect();
+    let step = inside.len().div_ceil(CIRCLES).max(1);
+    let mut name = "95 % circles";
+    for &k in inside.iter().step_by(step) {
+        let (centre, radius) = (frf.response[k], SIGMAS_95_PLANE * frf.magnitude_sigma[k]);
+        let outline = ellipse::circle((centre.re, centre.im), radius);
+        chart = chart.area(name, line.pen.colour, OPACITY, outline);
+        name = "";
+    }
+    chart
+}
+
+/// Frequencies whose points are far enough from each other for labels; those nearest to -1 first.
+fn labelled(frf: &Frf) -> Vec<(f64, Complex<f64>)> {
+    let points = frf
+        .frequency_hz
+        .iter()
+        .copied()
+        .zip(frf.response.iter().copied());
+    let mut candidates: Vec<(f64, Complex<f64>)> = points.filter(|(_, l)| is_inside(l)).collect();
+    candidates.sort_by(|(_, a), (_, b)| (a + 1.0).norm().total_cmp(&(b + 1.0).norm()));
+    let mut labelled: Vec<(f64, Complex<f64>)> = Vec::new();
+    for (f, l) in candidates {
+        let is_free = |(_, other): &(f64, Complex<f64>)| (l - other).norm() > LABEL_DISTANCE;
+        if labelled.len() < FREQUENCIES && labelled.iter().all(is_free) {
+            labelled.push((f, l));
+        }
+    }
+    labelled
+}
+
+fn frequency_text(frequency_hz: f64) -> String {
+    match frequency_hz < 10.0 {
+        true => format!("{frequency_hz:.2} Hz"),
+        false => format!("{frequency_hz:.1} Hz"),
+    }
+}
+
+/// |S| and |T| over frequency as an SVG document, each with a band of two sigma, and the peak of |S|.
+///
+/// # Errors
+/// When a response is invalid, or drawing fails.
+pub fn sensitivity_svg(
+    sensitivity: &Frf,
+    complementary: &Frf,
+    peak: Option<&LoopMark>,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let lines = trace::lines(&[
+        Trace::measured("S", sensitivity),
+        Trace::measured("T", complementary),
+    ])?;
+    let mut chart = level(magnitude(Unit::Bare, &lines)?, &lines, 1.0);
+    if let Some(mark) = peak {
+        let size = (mark.loop_gain + 1.0).inv().norm();
+        let at = vec![(mark.frequency_hz, size)];
+        chart = level(chart, &lines, size).points(&mark.label, MARK, Symbol::Dot, at);
+    }
+    stacked(vec![chart], &lines, title, subtitle)
+}
