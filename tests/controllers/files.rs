@@ -171,7 +171,7 @@ fn rejects_files_without_a_usable_controller() {
             &["unstable", "s = 2"],
         ),
         (
-            r#"{"num": [1], "den": [1, 2], "Ts": 1e-9}"#,
+            r#"{"num": [1], "den": [1, -0.5], "Ts": 1e-9}"#,
             "",
             &["rate_hz", "100000"],
         ),

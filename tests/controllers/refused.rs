@@ -131,9 +131,7 @@ fn rejects_unstable_poles_and_a_second_integrator() {
     );
     let discrete = "rate_hz = 5000\n";
     refused(
-        &tf(&format!(
-            "{discrete}numerator = [1]\ndenominator = [1, -2, 1]"
-        )),
+        &zpk(&format!("{discrete}poles = [[1, 0], [1, 0]]\ngain = 1")),
         &["unstable", "z = 1.0"],
     );
     refused(

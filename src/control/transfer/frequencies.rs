@@ -8,6 +8,8 @@ use super::roots::Factors;
 /// Below the slowest and above the fastest root, as a ratio.
 const BEYOND: f64 = 1e3;
 const POINTS_PER_DECADE: f64 = 40.0;
+/// Tustin's rule puts zeros at z = -1, half the servo rate, where the response is 0 and has no relative difference.
+const BELOW_NYQUIST: f64 = 0.99;
 /// Limits in rad/s, so that a root near the ends of the range of doubles gives a finite number of points.
 const LOWEST: f64 = 1e-100;
 const HIGHEST: f64 = 1e100;
@@ -41,8 +43,8 @@ fn limits(slowest: f64, fastest: f64, domain: Domain) -> (f64, f64) {
     match domain {
         Domain::Continuous => (slowest / BEYOND, fastest * BEYOND),
         Domain::Discrete { rate_hz } => {
-            let nyquist = std::f64::consts::PI * rate_hz;
-            (slowest.min(nyquist) / BEYOND, nyquist)
+            let highest = BELOW_NYQUIST * std::f64::consts::PI * rate_hz;
+            (slowest.min(highest) / BEYOND, highest)
         }
     }
 }
