@@ -20,9 +20,11 @@ mod biquad;
 mod closed_loop;
 mod controller;
 mod file;
+mod inverse;
 mod law;
 mod laws;
 mod margins;
+mod minimum_time;
 mod pole;
 mod section;
 mod state_space;
@@ -31,16 +33,20 @@ mod swept;
 mod tuned;
 
 pub use biquad::{Biquad, BiquadState};
-pub use closed_loop::ClosedLoop;
+pub use closed_loop::{ClosedLoop, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use file::{ControllerError, ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
 pub use margins::{Crossing, Margins};
+pub use minimum_time::{
+    MinimumTime, MinimumTimeError, StepLimits, StepPlant, StepTiming, minimum_time,
+};
 pub use pole::{Pole, listed_poles};
 pub use section::{Section, SectionError};
 pub use state_space::StateSpace;
-pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
+pub use step_metrics::{SETTLING_BAND, StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};
 pub use tuned::TunedDesign;
