@@ -85,9 +85,9 @@ fn time_checks(c: &mut Criterion, name: &str, residuals: Option<Residuals>) {
             let passed = interlocks.check_command(command_a);
             interlocks.record_current(command_a, command_a);
             let decision = Decision {
-                reference_m: 0.0,
                 requested_a: command_a,
                 active: true,
+                ..Decision::default()
             };
             interlocks.record_motion(&decision, 1.0, command_a);
             black_box((checked.is_ok(), moves.is_ok(), passed.is_ok(), command_a))

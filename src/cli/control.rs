@@ -18,8 +18,8 @@ use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles};
 use crate::excitation::Extremes;
 use crate::experiment::{
-    MotorSummary, Plan, PlanLimits, Run, RunSummary, TrackingMetrics, closed_loop, predicted_step,
-    require_margins, tracking_metrics,
+    CommandSummary, MotorSummary, Plan, PlanLimits, Run, RunSummary, TrackingMetrics, closed_loop,
+    predicted_step, require_margins, tracking_metrics,
 };
 use crate::recording::Recording;
 use crate::report::run_pages::AnalysisOutputs;
@@ -31,6 +31,9 @@ struct Report {
     #[serde(flatten)]
     run: RunSummary,
     predicted: Predicted,
+    /// Shaping, prefilter and feedforward.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<CommandSummary>,
     measured: Option<TrackingMetrics>,
     /// Extremes of a swept reference by the model.
     expected: Option<Extremes>,
@@ -52,8 +55,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
     require_margins(&config, &margins, args.run.stage(&config))?;
-    let predicted = predicted(margins, &config, &closed_loop);
     let plan = Plan::control(config.clone())?;
+    let predicted = predicted(margins, &plan, &closed_loop);
     if args.plan {
         return print_plan(args, &plan, predicted);
     }
@@ -79,6 +82,9 @@ struct PlanReport {
     limits: PlanLimits,
     motor: Option<MotorSummary>,
     predicted: Predicted,
+    /// Shaping, prefilter and feedforward.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    command: Option<CommandSummary>,
 }
 
 /// Prints what the run would do.
@@ -90,10 +96,12 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
         limits: PlanLimits::of(config),
         motor: args.run.motor_summary(plan)?,
         predicted,
+        command: plan.command_summary().cloned(),
     };
     print_result(args.bench.json, &report, |report| {
+        let command = report.command.as_ref().map(command_text);
         plan_output::control_text(
-            &report.reference,
+            &(report.reference.clone() + &command.unwrap_or_default()),
             report.expected.as_ref(),
             &report.limits,
             report.motor.as_ref(),
@@ -103,9 +111,9 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
 }
 
 /// The margins and the step by the model.
-fn predicted(margins: Margins, config: &Config, closed_loop: &ClosedLoop) -> Predicted {
+fn predicted(margins: Margins, plan: &Plan, closed_loop: &ClosedLoop) -> Predicted {
     let step = match margins.stable {
-        true => predicted_step(config, closed_loop).map(|step| step.metrics),
+        true => predicted_step(plan, closed_loop).map(|step| step.metrics),
         false => None,
     };
     Predicted { margins, step }
@@ -126,6 +134,7 @@ fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, Cl
     Ok(Report {
         run: summary,
         predicted,
+        command: plan.command_summary().cloned(),
         measured,
         expected: plan.predicted_extremes,
         made,
@@ -146,6 +155,9 @@ fn tracking(path: &Path, config: &Config) -> Result<Option<TrackingMetrics>, Cli
 fn plan_text(plan: &Plan, predicted: &Predicted, poles: &[Pole]) -> String {
     let margins = margins_text(&plan.config, &predicted.margins, poles);
     let reference = labelled("reference", &reference_text(&plan.config));
+    let command = plan.command_summary().map_or(String::new(), |command| {
+        labelled("command", command_text(command).trim_start_matches("; "))
+    });
     let step = predicted.step.as_ref().map_or(String::new(), |step| {
         labelled("predicted", &step_text(step))
     });
@@ -153,7 +165,7 @@ fn plan_text(plan: &Plan, predicted: &Predicted, poles: &[Pole]) -> String {
         .predicted_extremes
         .as_ref()
         .map_or(String::new(), travel_text);
-    margins + &reference + &step + &travel
+    margins + &reference + &command + &step + &travel
 }
 
 fn travel_text(extremes: &Extremes) -> String {
@@ -173,6 +185,41 @@ fn reference_text(config: &Config) -> String {
     }
     let reference = reference.design().describe();
     format!("{reference}; the loop is closed for {duration_s} s")
+}
+
+/// Shaping, prefilter and feedforward, each after a semicolon.
+fn command_text(command: &CommandSummary) -> String {
+    let mut parts = vec![shaper_text(command)];
+    if command.prefilter {
+        parts.push("low-pass".into());
+    }
+    if command.feedforward {
+        let preview_ms = Decimal(command.preview_s * 1e3);
+        parts.push(format!("feedforward with a preview of {preview_ms:.1} ms"));
+    }
+    let parts = parts.iter().filter(|part| !part.is_empty());
+    parts.map(|part| format!("; {part}")).collect()
+}
+
+fn shaper_text(command: &CommandSummary) -> String {
+    let kind = command.shaper;
+    match (command.settling_time_s, command.plants) {
+        (Some(settling_s), Some(plants)) => format!(
+            "minimum time: {:.1} ms to 2 % for {plants} plants, at most {:.2} A, overshoot {:.1} %",
+            settling_s * 1e3,
+            command.current_a.unwrap_or_default(),
+            Decimal(command.overshoot_percent.unwrap_or_default()),
+        ),
+        _ if command.modes.is_empty() => String::new(),
+        _ => {
+            let modes = command.modes.iter();
+            let modes: Vec<String> = modes
+                .map(|mode| format!("{:.1} rad/s", mode.omega_rad_s))
+                .collect();
+            let (modes, delay_ms) = (modes.join(", "), command.delay_s * 1e3);
+            format!("{kind} shaper for {modes}, delay {delay_ms:.1} ms")
+        }
+    }
 }
 
 fn step_text(step: &StepMetrics) -> String {

@@ -11,7 +11,7 @@ use super::help::{default_value, with_setting};
 use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
-use crate::util::quantity::{Frequency, Length, Speed, Time};
+use crate::util::quantity::{Frequency, Length, Ratio, Speed, Time};
 
 /// Height of a step or ramp and amplitude of a sine without `--amplitude`.
 const HEIGHT: (&str, f64) = ("amplitude_m", 50e-6);
@@ -27,6 +27,8 @@ const START: (&str, f64) = ("at_s", 0.2);
 const AMPLITUDE_KEY: &str = "control.reference.amplitude_m";
 const TRAVEL_KEY: &str = "control.reference.travel_m";
 const FREQUENCY_KEY: &str = "control.reference.frequency_hz";
+const OVERSHOOT_KEY: &str = "control.shaper.max_overshoot_ratio";
+const PREFILTER_KEY: &str = "control.prefilter.frequency_hz";
 const SPEED_KEY: &str = "control.reference.speed_m_per_s";
 
 /// The loop and its reference.
@@ -58,6 +60,24 @@ pub(super) struct Args {
     /// Time with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, help = duration_help())]
     duration: Option<Time>,
+    /// Shape the reference: zv, zvd, ei (impulses that cancel the vibration of the closed loop), or minimum-time (fastest
+    /// step within the limits of current and travel) [default: control.shaper of the profile]
+    #[arg(
+        long,
+        value_name = "zv|zvd|ei|minimum-time",
+        value_enum,
+        hide_possible_values = true
+    )]
+    shaper: Option<Shaper>,
+    /// Largest overshoot of a minimum-time step: 5% or 0.05 [default: not limited]
+    #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
+    max_overshoot: Option<Ratio>,
+    /// Filter the reference by a critically damped low-pass of second order at this frequency
+    #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true)]
+    prefilter: Option<Frequency>,
+    /// Add the current that moves the model along the reference (inverse of the plant, with preview)
+    #[arg(long)]
+    feedforward: bool,
     /// Only print what the run would do: margins, travel, current, heat, duration; no motion
     #[arg(long)]
     pub plan: bool,
@@ -89,6 +109,27 @@ enum ReferenceKind {
     Ramp,
     Sine,
     Chirp,
+}
+
+/// The kinds of shaper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Shaper {
+    Zv,
+    Zvd,
+    Ei,
+    MinimumTime,
+}
+
+impl Shaper {
+    /// The name in `control.shaper.kind`.
+    fn kind(self) -> &'static str {
+        match self {
+            Shaper::Zv => "zv",
+            Shaper::Zvd => "zvd",
+            Shaper::Ei => "ei",
+            Shaper::MinimumTime => "minimum_time",
+        }
+    }
 }
 
 /// The value of `--reference`.
@@ -169,8 +210,37 @@ impl Args {
             given(SPEED_KEY, "--speed", self.speed.as_ref()),
         ];
         settings.extend(options.into_iter().flatten());
+        settings.extend(self.command_settings());
         settings.extend(self.run.seed.setting());
         Ok(settings)
+    }
+
+    /// The settings of shaper, prefilter and feedforward.
+    fn command_settings(&self) -> Vec<OptionSetting> {
+        let shaper = self.shaper.map(|shaper| {
+            let name = shaper.to_possible_value();
+            let name = name.map_or(String::new(), |value| value.get_name().to_string());
+            kind_setting("control.shaper", shaper.kind(), format!("--shaper {name}"))
+        });
+        let prefilter = self.prefilter.as_ref().map(|frequency| {
+            let option = format!("--prefilter {frequency}");
+            kind_setting("control.prefilter", "low_pass", option)
+        });
+        let feedforward = self
+            .feedforward
+            .then(|| kind_setting("control.feedforward", "inverse", "--feedforward".into()));
+        let options = [
+            shaper,
+            given(
+                OVERSHOOT_KEY,
+                "--max-overshoot",
+                self.max_overshoot.as_ref(),
+            ),
+            prefilter,
+            given(PREFILTER_KEY, "--prefilter", self.prefilter.as_ref()),
+            feedforward,
+        ];
+        options.into_iter().flatten().collect()
     }
 
     fn kind(&self) -> Option<ReferenceKind> {
@@ -190,11 +260,22 @@ impl Args {
         if self.frequency.is_some() && kind != Some(ReferenceKind::Sine) {
             return Err(unused("--frequency", "sine"));
         }
+        if self.max_overshoot.is_some() && self.shaper != Some(Shaper::MinimumTime) {
+            return Err(CliError::Usage(
+                "--max-overshoot is valid only with --shaper minimum-time; leave it out, or choose that shaper".into(),
+            ));
+        }
         if self.speed.is_some() && kind != Some(ReferenceKind::Ramp) {
             return Err(unused("--speed", "ramp"));
         }
         Ok(())
     }
+}
+
+/// A table with nothing but its kind.
+fn kind_setting(key: &str, kind: &str, option: String) -> OptionSetting {
+    let table = Table::from_iter([("kind".to_string(), Value::String(kind.into()))]);
+    OptionSetting::new(key, table, option)
 }
 
 fn unused(option: &str, kinds: &str) -> CliError {

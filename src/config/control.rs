@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::command::{FeedforwardSettings, PrefilterSettings, ShaperSettings};
 use crate::excitation::ReferenceSettings;
 
 /// The closed loop of `bench control`.
@@ -25,4 +26,20 @@ pub struct ControlSettings {
     pub steady_after_s: f64,
     /// The reference.
     pub reference: ReferenceSettings,
+    /// The shaping of the reference.
+    #[serde(default, skip_serializing_if = "ShaperSettings::is_none")]
+    pub shaper: ShaperSettings,
+    /// The low-pass of the reference.
+    #[serde(default, skip_serializing_if = "PrefilterSettings::is_none")]
+    pub prefilter: PrefilterSettings,
+    /// The feedforward current.
+    #[serde(default, skip_serializing_if = "FeedforwardSettings::is_none")]
+    pub feedforward: FeedforwardSettings,
+}
+
+impl ControlSettings {
+    /// Whether the loop has a command beside its reference: shaping, prefilter or feedforward.
+    pub fn has_command(&self) -> bool {
+        !(self.shaper.is_none() && self.prefilter.is_none() && self.feedforward.is_none())
+    }
 }

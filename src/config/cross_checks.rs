@@ -1,5 +1,6 @@
 //! Relations between settings, which ranges of single settings cannot express.
 
+use super::command_checks::command_checks;
 use super::purpose::Purpose;
 use super::{
     CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, relations,
@@ -36,6 +37,7 @@ pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
         errors
             .0
             .extend(reference.check(soft_limit_m, config.servo.rate_hz));
+        errors.0.extend(command_checks(config));
     }
     errors.0
 }

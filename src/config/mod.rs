@@ -15,6 +15,8 @@
 mod calibration;
 mod campaign;
 mod check;
+mod command;
+mod command_checks;
 mod control;
 mod cross_checks;
 mod devices;
@@ -42,6 +44,7 @@ pub use crate::excitation::{
 };
 pub use calibration::*;
 pub use campaign::*;
+pub use command::*;
 pub use control::*;
 pub use devices::*;
 pub use error::ConfigError;

@@ -16,7 +16,15 @@ pub(super) fn plant(config: &Config) -> Vec<Finding> {
         findings.push(Finding::new("sim.geometry", what));
     }
     findings.extend(asymmetry_offset(config));
+    findings.extend(frequency_ratio(config));
     findings
+}
+
+fn frequency_ratio(config: &Config) -> Option<Finding> {
+    let ratio = config.sim.frequency_ratio;
+    let is_refused = ratio != 1.0 && config.sim.geometry == Geometry::Quadratic;
+    let what = format!("is {ratio}, which is simulated only with sim.geometry = \"linear\"; set 1");
+    is_refused.then(|| Finding::new("sim.frequency_ratio", what))
 }
 
 /// Smallest m2/m3 - 1 of the simulated stage: the lower limit of `plant.mass_asymmetry`.

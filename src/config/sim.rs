@@ -26,6 +26,11 @@ pub struct SimSettings {
     #[serde(default)]
     #[schemars(range(min = -0.5, max = 0.5))]
     pub asymmetry_offset: f64,
+    /// Frequencies of the modes of the simulated stage over those of the model, which does not contain this ratio: a tolerance of the
+    /// stiffness. The modes of `unmodelled` keep their frequencies. Only for linear geometry.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    #[schemars(range(min = 0.5, max = 2.0))]
+    pub frequency_ratio: f64,
     /// Seed of noise and disturbances.
     #[schemars(range(min = 0, max = 9223372036854775807i64))]
     pub seed: u64,
@@ -48,6 +53,14 @@ pub struct SimSettings {
     pub unmodelled: Vec<UnmodelledMode>,
     /// Lines of the acceleration of the floor in X.
     pub floor: Vec<FloorLine>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn is_one(ratio: &f64) -> bool {
+    *ratio == 1.0
 }
 
 /// A mode of the rig that is not in the model of the plant.

@@ -8,6 +8,7 @@ use super::error::ControllerError;
 use super::law::{ControlDesign, LawInput, LinearLaw};
 use super::margins::{Margins, grid, margins};
 use super::state_space::StateSpace;
+use crate::excitation::command::LoopCommand;
 use crate::model::plant::{LoopPlant, Mode};
 use crate::util::units::UM_PER_M;
 
@@ -27,6 +28,17 @@ pub struct OpenLoopPoles {
     pub integrators: usize,
     /// Poles of the control law outside the unit circle.
     pub unstable: usize,
+}
+
+/// A mode in the response of a closed loop to a step of its reference.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepMode {
+    /// Natural frequency in rad/s.
+    pub omega_rad_s: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Amplitude over the height of the step, at the time of the step.
+    pub step_ratio: f64,
 }
 
 impl ClosedLoop {
@@ -157,12 +169,24 @@ impl ClosedLoop {
             .collect()
     }
 
-    /// Command in amperes and reading in metres of each tick of [`simulate`](Self::simulate). The reading is taken
-    /// before the command.
+    /// Current in amperes and reading in metres of each tick of [`simulate`](Self::simulate). The reading is taken
+    /// before the current.
     pub fn signals(
         &self,
         ticks: usize,
         reference_m: impl Fn(usize) -> f64,
+    ) -> impl Iterator<Item = (f64, f64)> {
+        self.commanded_signals(ticks, move |tick| LoopCommand {
+            reference_m: reference_m(tick),
+            feedforward_a: 0.0,
+        })
+    }
+
+    /// As [`signals`](Self::signals), with a command that contains a feedforward current.
+    pub fn commanded_signals(
+        &self,
+        ticks: usize,
+        mut command: impl FnMut(usize) -> LoopCommand,
     ) -> impl Iterator<Item = (f64, f64)> {
         let mut law = self.design.law(self.plant.period_s());
         law.reset(0.0);
@@ -170,15 +194,57 @@ impl ClosedLoop {
         let mut applied_a = 0.0;
         (0..ticks).map(move |tick| {
             let position_m = self.plant.reading_m(&state);
+            let command = command(tick);
             let input = LawInput {
-                reference_m: reference_m(tick),
+                reference_m: command.reference_m,
                 position_m,
                 applied_a,
             };
-            applied_a = law.update(&input);
+            applied_a = command.added_to(law.update(&input));
             self.plant.step(&mut state, applied_a);
             (applied_a, position_m)
         })
+    }
+
+    /// The lightly damped modes with which the closed loop answers a step of its reference, the strongest first: those whose
+    /// part of the response begins with at least `least_ratio` of the step and decays with less than half of critical damping.
+    ///
+    /// At a pole p of T = L/(1 + L) with the residue R, the part of the response to a unit step is 2 Re(R p^k/(p - 1)).
+    pub fn step_modes(&self, least_ratio: f64) -> Vec<StepMode> {
+        let poles = self.sampled_poles().unwrap_or_default();
+        let pairs = poles.iter().filter(|z| z.im > 0.0);
+        let mut modes: Vec<StepMode> = pairs
+            .map(|z| self.step_mode(*z, &poles))
+            .filter(|mode| mode.damping_ratio < 0.5 && mode.step_ratio >= least_ratio)
+            .collect();
+        modes.sort_by(|a, b| b.step_ratio.total_cmp(&a.step_ratio));
+        modes
+    }
+
+    fn step_mode(&self, z: Complex<f64>, poles: &[Complex<f64>]) -> StepMode {
+        let pole = z.ln() / self.plant.period_s();
+        let residue = self.residue(z, poles);
+        StepMode {
+            omega_rad_s: pole.norm(),
+            damping_ratio: -pole.re / pole.norm(),
+            step_ratio: 2.0 * (residue / (z - Complex::new(1.0, 0.0))).norm(),
+        }
+    }
+
+    /// The residue of T at a pole, by Cauchy's integral on a circle that contains no other pole of T: with 16 points and a fifth of
+    /// the distance to the next pole, the others add (1/5)^16 of their own. A pole of L alone is none of T.
+    fn residue(&self, pole: Complex<f64>, poles: &[Complex<f64>]) -> Complex<f64> {
+        let distances = poles.iter().map(|other| (other - pole).norm());
+        let nearest = distances.filter(|distance| *distance > 0.0);
+        let radius = 0.2 * nearest.fold(1.0, f64::min);
+        let one = Complex::new(1.0, 0.0);
+        let terms = (0..16).map(|point| {
+            let arm = Complex::from_polar(radius, std::f64::consts::PI / 8.0 * f64::from(point));
+            let around = pole + arm;
+            let open = self.plant.response_at(around) * self.linear.response(around);
+            (one - (one + open).inv()) * arm
+        });
+        terms.sum::<Complex<f64>>() / 16.0
     }
 
     fn z(&self, omega_rad_s: f64) -> Complex<f64> {

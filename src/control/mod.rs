@@ -23,11 +23,13 @@ mod controller;
 mod error;
 mod file;
 mod import;
+mod inverse;
 mod landmarks;
 mod law;
 mod laws;
 mod margins;
 pub mod measured;
+mod minimum_time;
 mod pole;
 mod quadratic;
 mod section;
@@ -38,7 +40,7 @@ mod transfer;
 mod tuned;
 
 pub use biquad::{Biquad, BiquadState};
-pub use closed_loop::{ClosedLoop, OpenLoopPoles};
+pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use error::ControllerError;
 pub use file::{ControllerFile, ControllerText, LawFile, SectionSettings};
@@ -46,14 +48,18 @@ pub use import::{
     FormatError, ImportError, ImportOptions, Imported, NumericArray, Value, Variables, import,
     read_variables,
 };
+pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
 pub use margins::{Crossing, Margins};
+pub use minimum_time::{
+    MinimumTime, MinimumTimeError, StepLimits, StepPlant, StepTiming, minimum_time,
+};
 pub use pole::{Pole, listed_poles};
 pub use section::{Section, SectionError};
 pub use state_space::StateSpace;
-pub use step_metrics::{StepMeter, StepMetrics, step_metrics};
+pub use step_metrics::{SETTLING_BAND, StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};
 pub use transfer::{
     Agreement, Cascade, DiscreteDesign, Domain, Factors, GainUnit, Roots, SsFile, SsSettings,

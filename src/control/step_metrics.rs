@@ -2,6 +2,9 @@
 
 use serde::Serialize;
 
+/// Ratio of the height of a step: the step has settled when the position stays within this distance of the reference.
+pub const SETTLING_BAND: f64 = 0.02;
+
 /// Figures of a step response.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct StepMetrics {
@@ -37,7 +40,7 @@ impl StepMeter {
     pub fn push(&mut self, position_m: f64) {
         let error_m = position_m - self.height_m;
         self.seen += 1;
-        if error_m.abs() > 0.02 * self.height_m.abs() {
+        if error_m.abs() > SETTLING_BAND * self.height_m.abs() {
             self.settled = self.seen;
         }
         self.beyond_m = self.beyond_m.max(error_m * self.height_m.signum());

@@ -13,7 +13,7 @@ use std::f64::consts::PI;
 use nalgebra::Complex;
 
 /// X_k = sum over n of `x[n]` exp(2 pi i k n / N), in place. N is the length, a power of two or 0.
-pub(super) fn transform(x: &mut [Complex<f64>]) {
+pub(crate) fn transform(x: &mut [Complex<f64>]) {
     let n = x.len();
     if n < 2 || !n.is_power_of_two() {
         return;

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!  [excitation] kind -> ExcitationDesign (settings) -> Excitation -> extremes by the model, refused beyond the limits
-//!  [control.reference] kind -> ReferenceDesign (settings) -> Reference
+//!  [control.reference] kind -> ReferenceDesign (settings) -> Reference -> command (shaping, feedforward)
 //! ```
 //!
 //! Each is a function of the tick number alone and is built before the run, so that a run can be repeated and replayed. The
@@ -13,9 +13,10 @@
 mod amplitude;
 mod check;
 mod chirp;
+pub mod command;
 mod design;
 mod extremes;
-mod fourier;
+pub(crate) mod fourier;
 mod kinds;
 mod limits;
 mod multisine;

@@ -6,12 +6,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::command_plan::{self, CommandPlan, CommandSummary};
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
-use super::{reference_check, swept_reference};
+use super::reference_check::{self, PlannedReference};
+use super::swept_reference;
 use crate::config::{self, CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
-use crate::excitation::{Extremes, ReferenceContext, Staircase, ZeroCurrent};
+use crate::excitation::command::CommandFilter;
+use crate::excitation::{Extremes, Staircase, ZeroCurrent};
 use crate::model::plant::{self, ModalModel};
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, Correction};
@@ -23,6 +26,8 @@ const CONTROLLER: &str = "controller.toml";
 const CALIBRATION: &str = "calibration.toml";
 /// Name of the attachment with the points of the reference.
 const REFERENCE: &str = "reference.csv";
+/// Name of the attachment with the filters of the command.
+const COMMAND: &str = "command.toml";
 /// Metadata key of the kind of run.
 pub(super) const KIND: &str = "run";
 /// Metadata key of [`Plan::ramp_ticks`]. Recordings of older versions do not have it: the current ended in one step.
@@ -86,6 +91,8 @@ pub struct Plan {
     pub predicted_extremes: Option<Extremes>,
     /// Text of the file of the reference, if it has one.
     reference: Option<String>,
+    /// The planned command of a closed loop, if it has one beside its reference.
+    command: Option<CommandPlan>,
 }
 
 impl Plan {
@@ -114,6 +121,7 @@ impl Plan {
             motor: MotorStart::default(),
             predicted_extremes: None,
             reference: None,
+            command: None,
         }
     }
 
@@ -124,7 +132,9 @@ impl Plan {
         let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
         let is_swept = config.control.reference.is_swept();
         let reference = config.control.reference.design().text()?;
+        let command = command_plan::planned(&config, &controller)?;
         let plan = Plan {
+            command,
             controller: Some(controller),
             reference,
             predicted_extremes,
@@ -133,7 +143,7 @@ impl Plan {
         // Refuses a reference or a controller that cannot be built before the plan is shown.
         plan.program()?;
         if let Some(controller) = plan.controller.as_ref().filter(|_| !is_swept) {
-            reference_check::predicted(&plan.config, controller, plan.reference.as_deref())?;
+            reference_check::predicted(&plan.planned_reference(), controller)?;
         }
         Ok(plan)
     }
@@ -147,6 +157,10 @@ impl Plan {
             name: config.control.controller.clone(),
             text,
         });
+        let command = attached_command(recording)?;
+        if command.is_none() && config.control.has_command() {
+            return Err(PlanError::Missing("command"));
+        }
         let calibration = attached_text(recording, CALIBRATION);
         let calibration =
             calibration.map(|text| config::typed("the calibration of the recording", &text));
@@ -154,6 +168,7 @@ impl Plan {
             controller,
             calibration: calibration.transpose()?,
             reference: attached_text(recording, REFERENCE),
+            command,
             motor: motor_start(recording)?,
             ..Plan::excitation(kind(recording)?, config)
         })
@@ -165,10 +180,12 @@ impl Plan {
         config: Config,
         controller: Option<ControllerText>,
         reference: Option<String>,
+        command: Option<CommandFilter>,
     ) -> Plan {
         Plan {
             controller,
             reference,
+            command: command.map(CommandPlan::from),
             ..Plan::excitation(kind, config)
         }
     }
@@ -179,11 +196,29 @@ impl Plan {
     /// # Errors
     /// When the reference cannot be built, or would trip an interlock.
     pub fn loop_extremes(&self) -> Result<Option<Extremes>, PlanError> {
-        let file = self.reference_file();
         match &self.controller {
             Some(_) if self.config.control.reference.is_swept() => Ok(self.predicted_extremes),
-            Some(controller) => reference_check::predicted(&self.config, controller, file),
+            Some(controller) => reference_check::predicted(&self.planned_reference(), controller),
             None => Ok(None),
+        }
+    }
+
+    /// The filters of the command, if it is not the reference alone.
+    pub fn command_filter(&self) -> Option<&CommandFilter> {
+        self.command.as_ref().map(|command| &command.filter)
+    }
+
+    /// Figures of the planned command; `None` without one, and for a plan that was read from a recording.
+    pub fn command_summary(&self) -> Option<&CommandSummary> {
+        self.command.as_ref()?.summary.as_ref()
+    }
+
+    /// The reference with what its command needs.
+    pub(super) fn planned_reference(&self) -> PlannedReference<'_> {
+        PlannedReference {
+            config: &self.config,
+            file: self.reference_file(),
+            filter: self.command_filter(),
         }
     }
 
@@ -225,16 +260,13 @@ impl Plan {
         let controller = controller.ok_or(PlanError::Missing("controller"))?;
         let law = controller.design(servo.rate_hz)?.law(servo.period_s());
         let design = control.reference.design();
-        let context = ReferenceContext {
-            chirp: &self.config.chirp,
-            period_s: servo.period_s(),
-            file: self.reference.as_deref(),
-        };
-        let reference = design.build(&context)?;
+        let reference = self.planned_reference();
+        let context = reference.context();
         let settle = context.ticks(control.settle_s);
         let closed = design.closed_ticks(&context);
         let closed = closed.unwrap_or_else(|| context.ticks(control.duration_s));
-        Ok(Control::new(law, reference, settle, closed))
+        let command = reference.command()?;
+        Ok(Control::with_command(law, command, settle, closed))
     }
 
     /// Length of each of the two ramps at the end of the run in ticks.
@@ -264,7 +296,12 @@ impl Plan {
         let calibration = calibration
             .transpose()
             .map_err(|error| PlanError::Text(error.to_string()))?;
+        let command = self.command_filter().map(toml::to_string);
+        let command = command
+            .transpose()
+            .map_err(|error| PlanError::Text(error.to_string()))?;
         let attachments = [
+            (COMMAND, "application/toml", command),
             (CONTROLLER, "application/toml", controller),
             (REFERENCE, "text/csv", self.reference.clone()),
             (CALIBRATION, "application/toml", calibration),
@@ -315,6 +352,18 @@ fn thermal_a2(text: &str) -> Option<f64> {
 fn attached_text(recording: &Recording, name: &str) -> Option<String> {
     let attachment = recording.attachment(name)?;
     Some(String::from_utf8_lossy(&attachment.data).into_owned())
+}
+
+/// The filters of the recorded command.
+fn attached_command(recording: &Recording) -> Result<Option<CommandPlan>, PlanError> {
+    let Some(text) = attached_text(recording, COMMAND) else {
+        return Ok(None);
+    };
+    let filter: Result<CommandFilter, toml::de::Error> = toml::from_str(&text);
+    match filter {
+        Ok(filter) => Ok(Some(CommandPlan::from(filter))),
+        Err(error) => Err(PlanError::DamagedCommand(error.message().into())),
+    }
 }
 
 /// The name of a controller or of its file, without characters that are unusual in file names.

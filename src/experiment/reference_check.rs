@@ -6,66 +6,85 @@ use super::plan_error::PlanError;
 use super::swept_reference::closed_loop;
 use crate::config::Config;
 use crate::control::{ClosedLoop, ControllerText};
-use crate::excitation::{Extremes, Limits, Reference, ReferenceContext};
+use crate::excitation::command::{CommandFilter, CommandSource, FilteredCommand, Unfiltered};
+use crate::excitation::{Extremes, Limits, ReferenceContext};
 
 /// Largest number of predicted ticks: 400 s at 5 kHz. Beyond it only the interlocks check the current.
 const PREDICTED_TICKS: u64 = 2_000_000;
 
-/// Refuses a reference that would trip an interlock by the model of the whole rig; returns its extremes. `file` is the text of the
-/// file of the reference. Nothing is predicted for an unstable loop: `control.min_modulus_margin` decides about it.
+/// A reference with what its command needs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PlannedReference<'a> {
+    /// The settings.
+    pub config: &'a Config,
+    /// Text of the file of the reference, if it has one.
+    pub file: Option<&'a str>,
+    /// The filters of the command, if it is not the reference alone.
+    pub filter: Option<&'a CommandFilter>,
+}
+
+impl<'a> PlannedReference<'a> {
+    /// What the settings of the reference need.
+    pub(super) fn context(&self) -> ReferenceContext<'a> {
+        ReferenceContext {
+            chirp: &self.config.chirp,
+            period_s: self.config.servo.period_s(),
+            file: self.file,
+        }
+    }
+
+    /// The command of the loop.
+    pub(super) fn command(&self) -> Result<Box<dyn CommandSource>, PlanError> {
+        let design = self.config.control.reference.design();
+        let reference = design.build(&self.context())?;
+        Ok(match self.filter {
+            None => Box::new(Unfiltered(reference)),
+            Some(filter) => Box::new(FilteredCommand::new(reference, filter.clone())),
+        })
+    }
+
+    /// What reduces current and travel.
+    fn to_lower(&self) -> &'static str {
+        match self.config.control.feedforward.is_none() {
+            true => "the values of the reference, or its slope",
+            false => "the values of the reference, its slope, or control.feedforward.bandwidth_hz",
+        }
+    }
+}
+
+/// Refuses a reference that would trip an interlock by the model of the whole rig; returns its extremes. Nothing is predicted for an
+/// unstable loop: `control.min_modulus_margin` decides about it.
 pub(super) fn predicted(
-    config: &Config,
+    reference: &PlannedReference<'_>,
     controller: &ControllerText,
-    file: Option<&str>,
 ) -> Result<Option<Extremes>, PlanError> {
-    let context = ReferenceContext {
-        chirp: &config.chirp,
-        period_s: config.servo.period_s(),
-        file,
-    };
+    let config = reference.config;
     let design = config.control.reference.design();
-    design.check_file(&context, config.interlock.soft_limit_m)?;
+    design.check_file(&reference.context(), config.interlock.soft_limit_m)?;
     let closed_loop = closed_loop(config, controller)?;
     if !closed_loop.is_stable() {
         return Ok(None);
     }
-    let ticks = context.ticks(config.control.duration_s);
-    let reference = design.build(&context)?;
-    check_loop(config, &closed_loop, &*reference, ticks, 1.0).map(Some)
+    check_tuned(reference, &closed_loop, 1.0).map(Some)
 }
 
-/// Refuses the reference of `config`, scaled by a factor, in a given loop. The whole reference is predicted, from rest.
+/// Refuses a reference, scaled by a factor, with which a given loop would trip an interlock; returns the extremes. The whole reference
+/// is predicted, from rest, with its feedforward current.
 pub(super) fn check_tuned(
-    config: &Config,
+    reference: &PlannedReference<'_>,
     closed_loop: &ClosedLoop,
-    file: Option<&str>,
-    reference_factor: f64,
-) -> Result<(), PlanError> {
-    let context = ReferenceContext {
-        chirp: &config.chirp,
-        period_s: config.servo.period_s(),
-        file,
-    };
-    let reference = config.control.reference.design().build(&context)?;
-    let ticks = context.ticks(config.control.duration_s);
-    check_loop(config, closed_loop, &*reference, ticks, reference_factor)?;
-    Ok(())
-}
-
-/// Refuses a reference with which the loop would trip an interlock within `ticks`; returns the extremes.
-fn check_loop(
-    config: &Config,
-    closed_loop: &ClosedLoop,
-    reference: &dyn Reference,
-    ticks: u64,
     reference_factor: f64,
 ) -> Result<Extremes, PlanError> {
+    let config = reference.config;
+    let mut command = reference.command()?;
+    let ticks = reference.context().ticks(config.control.duration_s);
     let ticks = ticks.min(PREDICTED_TICKS) as usize;
-    let signals = closed_loop.signals(ticks, |tick| reference_factor * reference.at_m(tick as u64));
+    let signals = closed_loop.commanded_signals(ticks, |tick| {
+        command.at(tick as u64).scaled(reference_factor)
+    });
     let limits = without_slew(config.excitation_limits());
     let extremes = Extremes::over(signals, &limits);
-    let setting = "the values of the reference, or its slope";
-    limits.check(&extremes, None, setting)?;
+    limits.check(&extremes, None, reference.to_lower())?;
     Ok(extremes)
 }
 

@@ -13,6 +13,7 @@ use super::remembered_motor::MotorHandling;
 use super::run::{RemoteRecording, Run, RunFile, StopCause};
 use crate::config;
 use crate::control::ControllerText;
+use crate::excitation::command::CommandFilter;
 use crate::recording::Totals;
 use crate::rig::calibration::Calibration;
 use crate::rt::servo_run::RunOutcome;
@@ -30,6 +31,9 @@ pub struct RunOrder {
     controller: Option<(String, String)>,
     /// Text of the file of the reference.
     reference: Option<String>,
+    /// The filters of the command.
+    #[serde(default)]
+    command: Option<CommandFilter>,
     /// A calibration instead of the configured one, as TOML.
     calibration_toml: Option<String>,
     /// Pace of the loop.
@@ -70,6 +74,7 @@ impl RunOrder {
             kind: plan.kind,
             config_toml: plan.config_toml()?,
             reference: plan.reference_file().map(String::from),
+            command: plan.command_filter().cloned(),
             controller: plan.controller.map(|found| (found.name, found.text)),
             calibration_toml: calibration_toml
                 .map_err(|error| PlanError::Text(error.to_string()))?,
@@ -93,6 +98,7 @@ impl RunOrder {
             config,
             controller,
             self.reference.clone(),
+            self.command.clone(),
         ))
     }
 

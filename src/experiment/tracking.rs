@@ -3,13 +3,10 @@
 use serde::Serialize;
 
 use crate::config::{ControlSettings, LoopSettings};
-use crate::control::{StepMeter, StepMetrics};
+use crate::control::{SETTLING_BAND, StepMeter, StepMetrics};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::{TickRecord, flag};
 use crate::util::running_stats::RunningStats;
-
-/// Ratio of the height of a step; the settling band.
-const SETTLING_BAND: f64 = 0.02;
 
 /// How well a closed loop followed its reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -38,8 +38,7 @@ pub fn check_tune(plan: &Plan, factors: Factors, stage: Stage) -> Result<(), Tun
         factors,
     )?;
     if rig.is_stable() {
-        let file = plan.reference_file();
-        reference_check::check_tuned(&plan.config, &rig, file, factors.reference)?;
+        reference_check::check_tuned(&plan.planned_reference(), &rig, factors.reference)?;
     }
     Ok(())
 }

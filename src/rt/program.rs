@@ -5,6 +5,7 @@
 
 use super::tuning::Factors;
 use crate::control::{ControlLaw, LawInput};
+use crate::excitation::command::{CommandSource, LoopCommand, Unfiltered};
 use crate::excitation::{Excitation, Reference};
 
 /// Input of a program in a tick.
@@ -25,8 +26,10 @@ pub struct ProgramInput {
 pub struct Decision {
     /// Reference in metres, 0 where there is none.
     pub reference_m: f64,
-    /// The requested current in amperes.
+    /// The requested current in amperes, feedforward included.
     pub requested_a: f64,
+    /// The part of the request that is feedforward, in amperes: it does not depend on the position.
+    pub feedforward_a: f64,
     /// Whether the excitation is on or the loop closed: false in the zero-current intervals before and after.
     pub active: bool,
 }
@@ -43,6 +46,7 @@ pub trait Program: Send {
         let decision = self.decide(input);
         Decision {
             requested_a: scale * decision.requested_a,
+            feedforward_a: scale * decision.feedforward_a,
             ..decision
         }
     }
@@ -65,9 +69,9 @@ pub struct Excite<E>(
 impl<E: Excitation> Program for Excite<E> {
     fn decide(&mut self, input: &ProgramInput) -> Decision {
         Decision {
-            reference_m: 0.0,
             requested_a: self.0.current_a(input.tick),
             active: self.0.active(input.tick),
+            ..Decision::default()
         }
     }
 
@@ -81,25 +85,38 @@ impl<E: Excitation> Program for Excite<E> {
 ///
 /// The start is bumpless: the rest position is the mean over the rest, the law starts from rest, and the reference is
 /// relative to the rest position. No earlier set-point and no offset of the probe makes the stage jump.
+///
+/// The request is that of the law plus the feedforward current of the command. The factor of the reference applies to both.
 pub struct Control {
     law: Box<dyn ControlLaw>,
-    reference: Box<dyn Reference>,
+    command: Box<dyn CommandSource>,
     settle_ticks: u64,
     closed_ticks: u64,
     rest_m: f64,
 }
 
 impl Control {
-    /// A run of `settle_ticks` (at least one) at rest, followed by `closed_ticks` in closed loop.
+    /// A run of `settle_ticks` (at least one) at rest, followed by `closed_ticks` in closed loop, without feedforward.
     pub fn new(
         law: Box<dyn ControlLaw>,
         reference: Box<dyn Reference>,
         settle_ticks: u64,
         closed_ticks: u64,
     ) -> Self {
+        let command = Box::new(Unfiltered(reference));
+        Control::with_command(law, command, settle_ticks, closed_ticks)
+    }
+
+    /// As [`Control::new`], with a command that may contain a feedforward current.
+    pub fn with_command(
+        law: Box<dyn ControlLaw>,
+        command: Box<dyn CommandSource>,
+        settle_ticks: u64,
+        closed_ticks: u64,
+    ) -> Self {
         Control {
             law,
-            reference,
+            command,
             settle_ticks: settle_ticks.max(1),
             closed_ticks,
             rest_m: 0.0,
@@ -111,22 +128,24 @@ impl Control {
         self.rest_m += (input.position_m - self.rest_m) / (input.tick + 1) as f64;
         Decision {
             reference_m: self.rest_m,
-            requested_a: 0.0,
-            active: false,
+            ..Decision::default()
         }
     }
 
-    /// A tick in closed loop. `relative_m`: the reference in metres from the rest position.
-    fn closed(&mut self, input: &ProgramInput, relative_m: f64) -> Decision {
+    /// A tick in closed loop. The reference of `command` is relative to the rest position.
+    fn closed(&mut self, input: &ProgramInput, command: LoopCommand) -> Decision {
         let factors = input.factors;
+        let command = command.scaled(factors.reference);
         let law_input = LawInput {
-            reference_m: self.rest_m + factors.reference * relative_m,
+            reference_m: self.rest_m + command.reference_m,
             position_m: input.position_m,
             applied_a: input.applied_a,
         };
+        let law_a = self.law.update(&law_input.with_gain(factors.gain));
         Decision {
             reference_m: law_input.reference_m,
-            requested_a: self.law.update(&law_input.with_gain(factors.gain)),
+            requested_a: command.added_to(law_a),
+            feedforward_a: command.feedforward_a,
             active: true,
         }
     }
@@ -138,17 +157,24 @@ impl Program for Control {
             None => self.rest(input),
             Some(0) => {
                 self.law.reset(self.rest_m);
-                self.closed(input, self.reference.at_m(0))
+                let command = self.command.at(0);
+                self.closed(input, command)
             }
-            Some(tick) => self.closed(input, self.reference.at_m(tick)),
+            Some(tick) => {
+                let command = self.command.at(tick);
+                self.closed(input, command)
+            }
         }
     }
 
-    /// The loop stays closed, and its reference goes to the rest position.
+    /// The loop stays closed, its reference goes to the rest position, and the feedforward current to zero.
     fn settle(&mut self, input: &ProgramInput, scale: f64) -> Decision {
         match input.tick.checked_sub(self.settle_ticks) {
             None => Decision::default(),
-            Some(tick) => self.closed(input, scale * self.reference.at_m(tick)),
+            Some(tick) => {
+                let command = self.command.at(tick).scaled(scale);
+                self.closed(input, command)
+            }
         }
     }
 

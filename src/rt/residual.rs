@@ -236,7 +236,7 @@ impl Closed {
         Ok(())
     }
 
-    /// The law of the model closes with the law of the loop. The ramps at the end of the run are not predicted.
+    /// The law of the model closes with the law of the loop, with the same feedforward current. The ramps at the end of the run are not predicted.
     fn record(&mut self, decision: &Decision, gain: f64, rest_m: f64) {
         self.is_active = decision.active;
         if !decision.active {
@@ -250,7 +250,7 @@ impl Closed {
                     position_m: self.plant.position_m,
                     applied_a: self.applied_a,
                 };
-                self.applied_a = law.update(&input.with_gain(gain));
+                self.applied_a = law.update(&input.with_gain(gain)) + decision.feedforward_a;
             }
             LoopPrediction::Unstable | LoopPrediction::NotLinear => {
                 self.plant.peak.add(self.reference_m);

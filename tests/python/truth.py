@@ -10,6 +10,9 @@ with bench.
     frf       response of the rig (unmodelled modes included) from set-point to probe at `frequency_hz`
     loop      |S| = |1/(1 + L)| of the sampled loop at `omega_rad_s`
     step      settling time and overshoot of the sampled linear loop
+    command   the same with the stage's unmodelled modes for a step of `height_m` behind the filters `reference` and `feedforward`
+              ([delay in ticks, weight] each; the step is at tick `at`), with the largest current, change of the current from tick to
+              tick and travel. `config.plant.frequency_ratio` scales the frequencies of the modelled modes
     sigma     standard deviation of the error in the steady state, from the spectra of floor, noise and quantisation, and
               by how much it differs from one run of `seconds` to the next
     bands     where along `operating_points` (ratios of L) there are CNMP zeros: their limits by bisection
@@ -88,7 +91,9 @@ def matrices(p):
         ]
     )
     Q = np.array([1, a, -2 * a, 0])
-    return M, K, Q, damping_matrix(p["damping"], M, K), M[:, 0]
+    # All frequencies times a ratio, with the same damping ratios.
+    ratio = p.get("frequency_ratio", 1.0)
+    return M, ratio**2 * K, Q, ratio * damping_matrix(p["damping"], M, K), M[:, 0]
 
 
 def damping_matrix(d, M, K):
@@ -565,6 +570,46 @@ def step(q):
     }
 
 
+def filtered(taps, height, at, ticks):
+    """A step at tick `at` behind a filter."""
+    values = np.zeros(ticks)
+    for delay, weight in taps:
+        values[max(at + delay, 0) :] += weight * height
+    return values
+
+
+def command(q):
+    """The loop tick by tick: controller on the error, feedforward added, one period of delay for each configured one."""
+    config, height, at = q["config"], q["height_m"], q["at"]
+    rate = config["loop"]["rate_hz"]
+    ticks = int(round(q["seconds"] * rate))
+    reference = filtered(q["reference"], height, at, ticks)
+    feedforward = filtered(q["feedforward"], height, at, ticks)
+    gain = (np.zeros((0, 0)), np.zeros(0), np.zeros(0), UM_PER_M)
+    a, b, c, d = cascade([gain] + [tustin(*companion(n, m), tustin_rate(w, 1 / rate)) for n, m, w in sections(config)])
+    F, g, C = sampled(config, True)
+    waiting = [0.0] * config["loop"]["computing_delay_periods"]
+    x, p = np.zeros(len(a)), np.zeros(len(F))
+    position, current = np.zeros(ticks), np.zeros(ticks)
+    for k in range(ticks):
+        position[k] = C @ p
+        error = reference[k] - position[k]
+        current[k] = c @ x + d * error + feedforward[k]
+        x = a @ x + b * error
+        waiting.append(current[k])
+        p = F @ p + g * waiting.pop(0)
+    after = position[at:]
+    outside = np.nonzero(np.abs(after - height) > 0.02 * abs(height))[0]
+    settled = outside[-1] + 1 if len(outside) else 0
+    return {
+        "settling_time_s": settled / rate if settled < len(after) else None,
+        "overshoot_percent": 100 * max(0.0, float((after / height).max() - 1)),
+        "current_a": float(np.abs(current).max()),
+        "change_a": float(np.abs(np.diff(current, prepend=0.0)).max()),
+        "travel_m": float(np.abs(position).max()),
+    }
+
+
 def course(q):
     terms = q["terms"]
     A = la.block_diag(*[[[0, 1], [-w * w, -2 * zeta * w]] for w, zeta, _ in terms])
@@ -606,7 +651,7 @@ def sigma(q):
     return {"sigma_m": float(np.sqrt(variance)), "relative_spread": float(spread)}
 
 
-ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, sigma, bands, crossing, veering, modal, angle, points, course)}
+ANSWERS = {f.__name__: f for f in (model, margins, frf, loop, step, command, sigma, bands, crossing, veering, modal, angle, points, course)}
 
 if __name__ == "__main__":
     json.dump([ANSWERS[q["what"]](q) for q in json.load(sys.stdin)], sys.stdout)

@@ -414,9 +414,9 @@ impl Program for PanickingProgram {
         let tick = input.tick;
         assert!(tick < 10, "panic of the test program");
         Decision {
-            reference_m: 0.0,
             requested_a: 0.1,
             active: true,
+            ..Decision::default()
         }
     }
     fn ticks(&self) -> u64 {

@@ -129,9 +129,9 @@ impl Program for RecordingProgram {
         let tick = input.tick;
         self.0.lock().expect("not poisoned").push(tick);
         Decision {
-            reference_m: 0.0,
             requested_a: 0.1,
             active: true,
+            ..Decision::default()
         }
     }
     fn ticks(&self) -> u64 {

@@ -4,6 +4,7 @@ mod bumpless;
 mod calibrated;
 use bench_test_support::faulty_rig;
 mod enabling;
+mod feedforward;
 mod late_ticks;
 mod live_rig;
 mod matrix;

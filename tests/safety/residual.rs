@@ -273,6 +273,7 @@ fn closed_tick(
         reference_m,
         requested_a: applied_a,
         active: true,
+        ..Decision::default()
     };
     interlocks.record_motion(&decision, 1.0, applied_a);
     checked

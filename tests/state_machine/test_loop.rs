@@ -163,9 +163,9 @@ struct Constant(Load);
 impl Program for Constant {
     fn decide(&mut self, _input: &ProgramInput) -> Decision {
         Decision {
-            reference_m: 0.0,
             requested_a: self.0.current_a,
             active: true,
+            ..Decision::default()
         }
     }
 

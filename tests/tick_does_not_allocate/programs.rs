@@ -3,6 +3,7 @@ use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
 };
 use bench::control::{ControlDesign, ControllerText};
+use bench::excitation::command::{CommandFilter, FilteredCommand, Taps};
 use bench::excitation::{
     Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
     StepReference, SweptReference, ZeroCurrent,
@@ -62,6 +63,11 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
             let reference = settings.design().build(&context).expect("valid");
             let program = Control::new(sections.law(period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
+            let reference = settings.design().build(&context).expect("valid");
+            let command = FilteredCommand::new(reference, filter());
+            let command = Box::new(command);
+            let program = Control::with_command(sections.law(period_s), command, 500, 4500);
+            programs.push((format!("{name}, filtered {settings:?}"), Box::new(program)));
         }
     }
     for sweep in [Sweep::Linear, Sweep::Logarithmic] {
@@ -101,6 +107,13 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         ))),
     ));
     programs
+}
+
+/// A shaped reference and a feedforward current, with delays and preview; 1 A for 100 um.
+fn filter() -> CommandFilter {
+    let reference = Taps::dense(-50, vec![0.01; 100]);
+    let feedforward = Taps::dense(-80, vec![62.5; 160]);
+    CommandFilter::new(reference, feedforward).expect("finite")
 }
 
 /// Settings for an excitation of almost 1 s; the chirp has two repetitions.

@@ -146,9 +146,9 @@ pub struct ConstantCurrent(pub f64);
 impl Program for ConstantCurrent {
     fn decide(&mut self, _input: &ProgramInput) -> Decision {
         Decision {
-            reference_m: 0.0,
             requested_a: self.0,
             active: true,
+            ..Decision::default()
         }
     }
     fn ticks(&self) -> u64 {

@@ -173,6 +173,17 @@ impl PlantSettings {
         self.as_model().operating_point_m()
     }
 
+    /// The same model at another operating point in metres; `None` for a model without one.
+    pub fn at_operating_point(&self, point_m: f64) -> Option<PlantSettings> {
+        let mut plant = self.clone();
+        match &mut plant {
+            PlantSettings::Sr4dof(settings) => settings.operating_point_m = point_m,
+            PlantSettings::Xy(settings) => settings.operating_point_m = point_m,
+            PlantSettings::Lumped(_) | PlantSettings::Modal(_) => return None,
+        }
+        Some(plant)
+    }
+
     /// Mass asymmetry D = m2/m3 - 1, of a model that has it.
     pub fn mass_asymmetry(&self) -> Option<f64> {
         self.as_model().mass_asymmetry()

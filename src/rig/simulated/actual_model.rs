@@ -6,6 +6,9 @@ use crate::model::plant::{self, ModalModel, Mode, PlantError};
 /// The modes of the linear rig: those of the plant's model, and the unmodelled ones.
 pub fn modes(plant: &PlantSettings, sim: &SimSettings) -> Result<Vec<Mode>, PlantError> {
     let mut modes = ModalModel::of(&plant::build(&actual_plant(plant, sim))?)?.modes;
+    for mode in &mut modes {
+        mode.omega_rad_s *= sim.frequency_ratio;
+    }
     modes.extend(unmodelled_modes(sim));
     Ok(modes)
 }

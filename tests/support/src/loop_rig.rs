@@ -173,9 +173,9 @@ pub struct CurrentProgram<F>(pub F, pub u64);
 impl<F: FnMut(u64) -> f64 + Send> Program for CurrentProgram<F> {
     fn decide(&mut self, input: &ProgramInput) -> Decision {
         Decision {
-            reference_m: 0.0,
             requested_a: (self.0)(input.tick),
             active: true,
+            ..Decision::default()
         }
     }
     fn ticks(&self) -> u64 {
