@@ -3,7 +3,7 @@
 //! ```text
 //! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
 //!                      |-> overlay (several recordings) -------------------+
-//!                      `-> loop_plots (L with its margins, S and T) -------+
+//!                      `-> measured_loop_plots (L with its margins, S and T) -------+
 //! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
@@ -16,7 +16,7 @@ mod distortion;
 pub mod ellipse;
 mod error;
 pub mod html;
-mod loop_plots;
+mod measured_loop_plots;
 pub mod number;
 mod nyquist;
 mod overlay;
@@ -35,7 +35,10 @@ pub use chart::{
 pub use coherence::coherence_svg;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
-pub use loop_plots::{LoopMark, LoopPlot, loop_bode_svg, loop_nyquist_svg, sensitivity_svg};
+pub use measured_loop_plots::{
+    MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
+    measured_sensitivity_svg,
+};
 pub use nyquist::nyquist_svg;
 pub use overlay::{
     Envelope, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, signals_svg, step_svg,

@@ -11,7 +11,10 @@ use crate::control::ClosedLoop;
 use crate::control::measured::MeasuredMargins;
 use crate::experiment::LoopCurves;
 use crate::identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
-use crate::report::{LoopMark, LoopPlot, loop_bode_svg, loop_nyquist_svg, sensitivity_svg};
+use crate::report::{
+    MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
+    measured_sensitivity_svg,
+};
 use crate::util::units::hz;
 
 /// A loop with a measured plant.
@@ -66,7 +69,7 @@ impl MeasuredLoopFiles {
             .collect();
         let marks = report.margins.map_or(Vec::new(), |m| marks(m, curves));
         let peak = report.margins.map(|margins| peak_mark(margins, curves));
-        let plot = LoopPlot {
+        let plot = MeasuredLoopPlot {
             loop_gain: &curves.loop_gain,
             model: &model,
             marks: &marks,
@@ -76,7 +79,7 @@ impl MeasuredLoopFiles {
         };
         let (s, t) = (&curves.sensitivity, &curves.complementary);
         let sensitivity_plot =
-            sensitivity_svg(s, t, peak.as_ref(), &report.title, &report.subtitle)?;
+            measured_sensitivity_svg(s, t, peak.as_ref(), &report.title, &report.subtitle)?;
         Ok(MeasuredLoopFiles {
             loop_csv: results.write_frf("loop", &curves.loop_gain, RATIO)?,
             sensitivity_csv: results.write_frf("sensitivity", s, RATIO)?,
@@ -87,8 +90,8 @@ impl MeasuredLoopFiles {
                 &curves.disturbance,
                 METRES_PER_AMPERE,
             )?,
-            loop_plot: results.write("loop", "svg", &loop_bode_svg(&plot)?)?,
-            nyquist_plot: results.write("nyquist", "svg", &loop_nyquist_svg(&plot)?)?,
+            loop_plot: results.write("loop", "svg", &measured_bode_svg(&plot)?)?,
+            nyquist_plot: results.write("nyquist", "svg", &measured_nyquist_svg(&plot)?)?,
             sensitivity_plot: results.write("sensitivity", "svg", &sensitivity_plot)?,
         })
     }
@@ -109,11 +112,11 @@ impl MeasuredLoopFiles {
 }
 
 /// The crossover with its phase margin, and the peak of |S|.
-fn marks(margins: &MeasuredMargins, curves: &LoopCurves) -> Vec<LoopMark> {
+fn marks(margins: &MeasuredMargins, curves: &LoopCurves) -> Vec<MeasuredMark> {
     let crossover = margins.crossover().map(|crossing| {
         let margin_deg = crossing.phase_margin_deg;
         let argument = (margin_deg.value - 180.0).to_radians();
-        LoopMark {
+        MeasuredMark {
             label: format!("phase margin {} deg", with_interval(margin_deg, 1.0)),
             frequency_hz: hz(crossing.rad_s.value),
             loop_gain: Complex::from_polar(1.0, argument),
@@ -124,14 +127,14 @@ fn marks(margins: &MeasuredMargins, curves: &LoopCurves) -> Vec<LoopMark> {
 }
 
 /// The peak of |S|.
-fn peak_mark(margins: &MeasuredMargins, curves: &LoopCurves) -> LoopMark {
+fn peak_mark(margins: &MeasuredMargins, curves: &LoopCurves) -> MeasuredMark {
     let (frequency_hz, margin) = (hz(margins.sensitivity_peak_rad_s), margins.modulus_margin);
     let response = &curves.loop_gain.response;
     let after = curves
         .loop_gain
         .frequency_hz
         .partition_point(|f| *f < frequency_hz);
-    LoopMark {
+    MeasuredMark {
         label: format!("modulus margin {}", with_interval(margin, 1.0)),
         frequency_hz,
         loop_gain: response[after.min(response.len() - 1)],

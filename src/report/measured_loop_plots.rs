@@ -29,7 +29,7 @@ const SYMBOLS: [Symbol; 2] = [Symbol::Ring, Symbol::Dot];
 
 /// A frequency of a loop with its name: a margin.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LoopMark {
+pub struct MeasuredMark {
     /// Name and value.
     pub label: String,
     /// Frequency in hertz.
@@ -40,13 +40,13 @@ pub struct LoopMark {
 
 /// A measured loop with that of the model.
 #[derive(Clone, Debug)]
-pub struct LoopPlot<'a> {
+pub struct MeasuredLoopPlot<'a> {
     /// Measured L.
     pub loop_gain: &'a Frf,
     /// L of the model at the same frequencies.
     pub model: &'a [Complex<f64>],
     /// Margins to be marked.
-    pub marks: &'a [LoopMark],
+    pub marks: &'a [MeasuredMark],
     /// 1/max |S|.
     pub modulus_margin: Option<f64>,
     /// Title of the plot.
@@ -55,7 +55,7 @@ pub struct LoopPlot<'a> {
     pub subtitle: &'a str,
 }
 
-impl LoopPlot<'_> {
+impl MeasuredLoopPlot<'_> {
     fn lines(&self) -> Result<Vec<Line<'_>>, ReportError> {
         let frequency_hz = &self.loop_gain.frequency_hz;
         trace::lines(&[
@@ -70,7 +70,7 @@ impl LoopPlot<'_> {
 ///
 /// # Errors
 /// When a response is invalid, or drawing fails.
-pub fn loop_bode_svg(plot: &LoopPlot<'_>) -> Result<String, ReportError> {
+pub fn measured_bode_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
     let mut gains = level(magnitude(Unit::Bare, &lines)?, &lines, 1.0);
     let mut phases = level(phase(&lines), &lines, -180.0);
@@ -84,7 +84,7 @@ pub fn loop_bode_svg(plot: &LoopPlot<'_>) -> Result<String, ReportError> {
 }
 
 /// The phase of a mark on the turn of the curve.
-fn phase_deg(line: &Line, mark: &LoopMark) -> f64 {
+fn phase_deg(line: &Line, mark: &MeasuredMark) -> f64 {
     let after = line
         .frequency_hz
         .partition_point(|f| *f < mark.frequency_hz);
@@ -106,7 +106,7 @@ fn level(chart: Chart, lines: &[Line], value: f64) -> Chart {
 ///
 /// # Errors
 /// When a response is invalid, or drawing fails.
-pub fn loop_nyquist_svg(plot: &LoopPlot<'_>) -> Result<String, ReportError> {
+pub fn measured_nyquist_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
     let x = Scale::linear("Real part of L").within(REAL_PART.0, REAL_PART.1);
     let y = Scale::linear("Imaginary part of L").within(IMAGINARY_PART.0, IMAGINARY_PART.1);
@@ -190,10 +190,10 @@ fn frequency_text(frequency_hz: f64) -> String {
 ///
 /// # Errors
 /// When a response is invalid, or drawing fails.
-pub fn sensitivity_svg(
+pub fn measured_sensitivity_svg(
     sensitivity: &Frf,
     complementary: &Frf,
-    peak: Option<&LoopMark>,
+    peak: Option<&MeasuredMark>,
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
