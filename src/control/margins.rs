@@ -28,10 +28,14 @@ pub struct Margins {
     pub phase_margin_deg: Option<f64>,
     /// Smallest gain margin over all phase crossover frequencies, in dB.
     pub gain_margin_db: Option<f64>,
+    /// Frequency of this gain margin in rad/s.
+    pub gain_margin_rad_s: Option<f64>,
     /// 1/max |S|: the distance of L from -1.
     pub modulus_margin: f64,
     /// 20 log10 max |S|.
     pub sensitivity_peak_db: f64,
+    /// Frequency of this peak in rad/s.
+    pub sensitivity_peak_rad_s: f64,
     /// Lowest frequency at which |S| rises through 1/sqrt(2).
     pub sensitivity_bandwidth_rad_s: Option<f64>,
     /// Whether all poles of the closed loop are stable.
@@ -65,13 +69,16 @@ pub(super) fn margins(
     };
     let (crossings, crossover_rad_s) = tabulated.crossings();
     let phase_margins = crossings.iter().map(|c| c.phase_margin_deg);
-    let peak = tabulated.sensitivity_peak();
+    let (peak_rad_s, peak) = tabulated.sensitivity_peak();
+    let gain_margin = tabulated.gain_margin();
     Margins {
         crossover_rad_s,
         phase_margin_deg: smallest(phase_margins),
-        gain_margin_db: smallest(tabulated.gain_margins_db()),
+        gain_margin_db: gain_margin.map(|(_, db)| db),
+        gain_margin_rad_s: gain_margin.map(|(rad_s, _)| rad_s),
         modulus_margin: 1.0 / peak,
         sensitivity_peak_db: 20.0 * libm::log10(peak),
+        sensitivity_peak_rad_s: peak_rad_s,
         sensitivity_bandwidth_rad_s: tabulated.sensitivity_bandwidth_rad_s(),
         stable,
         crossings,
@@ -106,27 +113,31 @@ impl Tabulated<'_> {
         }
     }
 
-    /// Distances in decibels of |L| from 1 where L crosses the negative real axis.
-    fn gain_margins_db(&self) -> impl Iterator<Item = f64> {
+    /// Frequency and size in decibels of the smallest distance of |L| from 1 where L crosses the negative real axis.
+    fn gain_margin(&self) -> Option<(f64, f64)> {
         let imaginary: Vec<f64> = self.values.iter().map(|l| l.im).collect();
-        let places: Vec<usize> = sign_changes(&imaginary).collect();
+        let places = sign_changes(&imaginary);
         let negative = |i: &usize| self.values[*i].re < 0.0 || self.values[*i + 1].re < 0.0;
-        let crossings = places.into_iter().filter(negative);
-        crossings
-            .map(|i| (self.response)(self.bisect(i, &|l| l.im)))
-            .filter(|l| l.re < 0.0)
-            .map(|l| -20.0 * libm::log10(l.norm()))
+        let crossings = places.filter(negative).map(|i| {
+            let rad_s = self.bisect(i, &|l| l.im);
+            (rad_s, (self.response)(rad_s))
+        });
+        let margins = crossings
+            .filter(|(_, l)| l.re < 0.0)
+            .map(|(rad_s, l)| (rad_s, -20.0 * libm::log10(l.norm())));
+        margins.min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
     }
 
-    /// max |S|.
-    fn sensitivity_peak(&self) -> f64 {
+    /// Frequency and value of max |S|.
+    fn sensitivity_peak(&self) -> (f64, f64) {
         let on_grid: Vec<f64> = self.values.iter().map(|l| (l + 1.0).inv().norm()).collect();
-        let highest = on_grid.iter().copied().fold(0.0, f64::max);
+        let points = self.grid_rad_s.iter().copied().zip(on_grid.iter().copied());
+        let highest = points.fold((f64::NAN, 0.0), higher);
         let sensitivity = |w: f64| ((self.response)(w) + 1.0).inv().norm();
         let refined = local_maxima(&on_grid)
-            .filter(|i| on_grid[*i] > 0.9 * highest)
+            .filter(|i| on_grid[*i] > 0.9 * highest.1)
             .map(|i| maximum(&sensitivity, self.grid_rad_s[i - 1], self.grid_rad_s[i + 1]));
-        refined.fold(highest, f64::max)
+        refined.fold(highest, higher)
     }
 
     /// The lowest frequency at which |S| rises through 1/sqrt(2).
@@ -146,6 +157,11 @@ impl Tabulated<'_> {
         let (low, high) = (self.grid_rad_s[i], self.grid_rad_s[i + 1]);
         bisect(&|w| of((self.response)(w)), low, high)
     }
+}
+
+/// The point of the larger value.
+fn higher(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    if b.1 > a.1 { b } else { a }
 }
 
 /// The value of smallest magnitude.
@@ -207,8 +223,8 @@ fn bisect(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Largest value of `f` between `low` and `high`, by golden section.
-fn maximum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+/// Place and size of the largest value of `f` between `low` and `high`, by golden section.
+fn maximum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     for _ in 0..50 {
         let (a, b) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
@@ -218,7 +234,8 @@ fn maximum(f: &dyn Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
             low = a;
         }
     }
-    f(0.5 * (low + high))
+    let place = 0.5 * (low + high);
+    (place, f(place))
 }
 
 #[cfg(test)]
@@ -237,10 +254,14 @@ mod tests {
         assert!((found.phase_margin_deg.unwrap() - (90.0 - (k * d).to_degrees())).abs() < 1e-9);
         let gain_margin = 20.0 * (std::f64::consts::PI / (2.0 * k * d)).log10();
         assert!((found.gain_margin_db.unwrap() - gain_margin).abs() < 1e-9);
+        let at = found.gain_margin_rad_s.unwrap();
+        assert!((at - std::f64::consts::FRAC_PI_2 / d).abs() < 1e-9);
         // The peak of |S| against a brute force search in steps of 7 mrad/s.
-        let brute = (1..100_000)
-            .map(|i| (l(f64::from(i) * 7e-3) + 1.0).inv().norm())
-            .fold(0.0, f64::max);
+        let (place, brute) = (1..100_000)
+            .map(|i| f64::from(i) * 7e-3)
+            .map(|w| (w, (l(w) + 1.0).inv().norm()))
+            .fold((0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+        assert!((found.sensitivity_peak_rad_s - place).abs() < 7e-3);
         assert!((found.modulus_margin * brute - 1.0).abs() < 1e-7);
     }
 
