@@ -84,6 +84,9 @@ pub(super) struct Args {
     /// Only print what the run would do: margins, travel, current, heat, duration; no motion
     #[arg(long)]
     pub plan: bool,
+    /// Write only the recording, without plots and report
+    #[arg(long)]
+    pub no_report: bool,
 }
 
 fn duration_help() -> String {
@@ -295,7 +298,10 @@ impl Args {
         ] {
             self.refuse_without(is_given, option, |kind| kind.has(key))?;
         }
-        Ok(())
+        let is_chirp = self.kind() == Some(ReferenceKind::Chirp);
+        self.refuse_without(self.no_report && is_chirp, "--no-report", |kind| {
+            kind != ReferenceKind::Chirp
+        })
     }
 
     /// Refuses an option that is given with a reference for which `is_used` does not hold.

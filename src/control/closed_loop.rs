@@ -59,6 +59,11 @@ impl ClosedLoop {
         &self.plant
     }
 
+    /// The modes of the mechanics.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes
+    }
+
     /// P in metres per ampere at z = exp(j w T): hold, amplifier, modes, delays and the probe's rate.
     pub fn sampled_plant(&self, omega_rad_s: f64) -> Complex<f64> {
         self.plant.response(omega_rad_s)
@@ -67,6 +72,12 @@ impl ClosedLoop {
     /// L = P C of the sampled loop.
     pub fn sampled_loop(&self, omega_rad_s: f64) -> Complex<f64> {
         self.plant.response(omega_rad_s) * self.linear.response(self.z(omega_rad_s))
+    }
+
+    /// T = L/(1 + L) of the sampled loop, from reference to reading.
+    pub fn complementary_sensitivity(&self, omega_rad_s: f64) -> Complex<f64> {
+        let loop_gain = self.sampled_loop(omega_rad_s);
+        loop_gain / (loop_gain + 1.0)
     }
 
     /// L = P C in continuous time, without hold, delay and amplifier; `None` for a law that was not designed as a

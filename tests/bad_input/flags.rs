@@ -97,6 +97,10 @@ fn rejects_invalid_flags_with_value_and_limit() {
             "control --reference sine --reference-seed 2",
             &["--reference-seed", "--reference random"],
         ),
+        (
+            "control --reference chirp --no-report",
+            &["--no-report", "step, hold"],
+        ),
         ("control --speed 1e-5", &["--speed", "ramp"]),
         (
             "control --reference nosuch.csv",
