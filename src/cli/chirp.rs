@@ -186,7 +186,8 @@ fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     outputs.map_err(|error| analysis_failed(&error, path))
 }
 
-fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
+/// A failed analysis of a run, with the state of its recording.
+pub(super) fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
     let path = recording.display();
     let state = match recording.exists() {
         true => "is complete",

@@ -33,7 +33,7 @@ enum Command {
     Linearity(linearity::Args),
     /// Run the closed loop with a reference signal; writes a recording and prints predicted and measured settling time,
     /// overshoot and error
-    Control(control::Args),
+    Control(Box<control::Args>),
     /// Run as a daemon that owns the bench: live page, HTTP interface, queue of commands; other `bench` commands on this
     /// machine then use its bench
     Serve(serve::Args),

@@ -1,54 +1,22 @@
 //! `bench control`: run the closed loop with a reference.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use super::analysis_output;
 use super::chirp::{outcome, outputs};
 pub(super) use super::control_options::Args;
+use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
 use super::error::CliError;
-use super::margins::text as margins_text;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::plan_output;
-use super::run_options::{close, exit, run_text};
-use super::table::labelled;
-use crate::config::{Config, Purpose};
-use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles};
+use super::run_options::{close, exit};
+use crate::config::Purpose;
+use crate::control::{ClosedLoop, Margins, listed_poles};
 use crate::excitation::Extremes;
 use crate::experiment::{
-    CommandSummary, MotorSummary, Plan, PlanLimits, Run, RunSummary, TrackingMetrics, closed_loop,
-    predicted_step, require_margins, tracking_metrics,
+    CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
+    predicted_step, require_margins,
 };
-use crate::recording::Recording;
-use crate::report::run_pages::AnalysisOutputs;
-use crate::util::decimal::Decimal;
-
-/// The JSON object of the command.
-#[derive(Debug, Serialize)]
-struct Report {
-    #[serde(flatten)]
-    run: RunSummary,
-    predicted: Predicted,
-    /// Shaping, prefilter and feedforward.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    command: Option<CommandSummary>,
-    measured: Option<TrackingMetrics>,
-    /// Extremes of a swept reference by the model.
-    expected: Option<Extremes>,
-    /// Responses of plant and loop, from a swept reference.
-    #[serde(flatten)]
-    made: Option<AnalysisOutputs>,
-}
-
-#[derive(Debug, Serialize)]
-struct Predicted {
-    #[serde(flatten)]
-    margins: Margins,
-    #[serde(flatten)]
-    step: Option<StepMetrics>,
-}
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
@@ -62,11 +30,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     if !args.bench.json {
         let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
-        print_text(&plan_text(&plan, &predicted, &poles))?;
+        let text = PlanText {
+            plan: &plan,
+            predicted: &predicted,
+            poles: &poles,
+        };
+        print_text(&text.to_string())?;
     }
     let mut run = args.run.run(&plan, "control")?;
-    let report = report(&mut run, &plan, predicted)?;
-    close(run, &report, args.bench.json, &text(&report, &config))?;
+    let report = report(&mut run, &plan, predicted, args.no_report)?;
+    let text = control_output::text(&report, &config);
+    close(run, &report, args.bench.json, &text)?;
     Ok(match &report.made {
         Some(made) => outcome(&report.run, made),
         None => exit(&report.run),
@@ -91,7 +65,7 @@ struct PlanReport {
 fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome, CliError> {
     let config = &plan.config;
     let report = PlanReport {
-        reference: reference_text(config),
+        reference: control_output::reference_text(config),
         expected: plan.loop_extremes()?,
         limits: PlanLimits::of(config),
         motor: args.run.motor_summary(plan)?,
@@ -99,7 +73,7 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
         command: plan.command_summary().cloned(),
     };
     print_result(args.bench.json, &report, |report| {
-        let command = report.command.as_ref().map(command_text);
+        let command = report.command.as_ref().map(control_output::command_text);
         plan_output::control_text(
             &(report.reference.clone() + &command.unwrap_or_default()),
             report.expected.as_ref(),
@@ -110,148 +84,46 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
     Ok(Outcome::Done)
 }
 
-/// The margins and the step by the model.
+/// The margins and the response to the reference by the model.
 fn predicted(margins: Margins, plan: &Plan, closed_loop: &ClosedLoop) -> Predicted {
     let step = match margins.stable {
         true => predicted_step(plan, closed_loop).map(|step| step.metrics),
         false => None,
     };
-    Predicted { margins, step }
+    Predicted {
+        sine: PredictedSine::of(&plan.config, closed_loop, &margins),
+        margins,
+        step,
+    }
 }
 
 /// The result of a run: tracking, or responses of a swept reference.
-fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, CliError> {
+fn report(
+    run: &mut Run,
+    plan: &Plan,
+    predicted: Predicted,
+    no_report: bool,
+) -> Result<Report, CliError> {
     let summary = RunSummary::of(run)?;
-    let is_swept = plan.config.control.reference.is_swept();
-    let measured = match summary.is_completed() && !is_swept {
-        true => tracking(&run.path, &plan.config)?,
-        false => None,
-    };
-    let made = match is_swept {
-        true => Some(outputs(&summary, &run.path, &plan.config)?),
-        false => None,
-    };
+    let is_completed = summary.is_completed();
+    let mut result = ControlResult::default();
+    let mut made = None;
+    if plan.config.control.reference.is_swept() {
+        let mut outputs = outputs(&summary, &run.path, &plan.config)?;
+        if !is_completed {
+            let files = control_output::result(&run.path, is_completed, no_report)?.files;
+            outputs.pages.extend(files);
+        }
+        made = Some(outputs);
+    } else {
+        result = control_output::result(&run.path, is_completed, no_report)?;
+    }
     Ok(Report {
         run: summary,
         predicted,
         command: plan.command_summary().cloned(),
-        measured,
+        result,
         expected: plan.predicted_extremes,
         made,
     })
-}
-
-/// The measured tracking of a recorded run.
-fn tracking(path: &Path, config: &Config) -> Result<Option<TrackingMetrics>, CliError> {
-    let recording = Recording::open(path)?;
-    Ok(tracking_metrics(
-        &recording,
-        &config.control,
-        &config.servo,
-    )?)
-}
-
-/// Margins, reference and predicted step, printed before the run.
-fn plan_text(plan: &Plan, predicted: &Predicted, poles: &[Pole]) -> String {
-    let margins = margins_text(&plan.config, &predicted.margins, poles);
-    let reference = labelled("reference", &reference_text(&plan.config));
-    let command = plan.command_summary().map_or(String::new(), |command| {
-        labelled("command", command_text(command).trim_start_matches("; "))
-    });
-    let step = predicted.step.as_ref().map_or(String::new(), |step| {
-        labelled("predicted", &step_text(step))
-    });
-    let travel = plan
-        .predicted_extremes
-        .as_ref()
-        .map_or(String::new(), travel_text);
-    margins + &reference + &command + &step + &travel
-}
-
-fn travel_text(extremes: &Extremes) -> String {
-    let travel_um = extremes.travel_m * 1e6;
-    labelled(
-        "expected",
-        &format!("travel of {travel_um:.1} um by the model"),
-    )
-}
-
-/// The reference, and how long the loop is closed.
-fn reference_text(config: &Config) -> String {
-    let duration_s = config.control.duration_s;
-    let reference = &config.control.reference;
-    if reference.is_swept() {
-        return config.swept_reference_text();
-    }
-    let reference = reference.design().describe();
-    format!("{reference}; the loop is closed for {duration_s} s")
-}
-
-/// Shaping, prefilter and feedforward, each after a semicolon.
-fn command_text(command: &CommandSummary) -> String {
-    let mut parts = vec![shaper_text(command)];
-    if command.prefilter {
-        parts.push("low-pass".into());
-    }
-    if command.feedforward {
-        let preview_ms = Decimal(command.preview_s * 1e3);
-        parts.push(format!("feedforward with a preview of {preview_ms:.1} ms"));
-    }
-    let parts = parts.iter().filter(|part| !part.is_empty());
-    parts.map(|part| format!("; {part}")).collect()
-}
-
-fn shaper_text(command: &CommandSummary) -> String {
-    let kind = command.shaper;
-    match (command.settling_time_s, command.plants) {
-        (Some(settling_s), Some(plants)) => format!(
-            "minimum time: {:.1} ms to 2 % for {plants} plants, at most {:.2} A, overshoot {:.1} %",
-            settling_s * 1e3,
-            command.current_a.unwrap_or_default(),
-            Decimal(command.overshoot_percent.unwrap_or_default()),
-        ),
-        _ if command.modes.is_empty() => String::new(),
-        _ => {
-            let modes = command.modes.iter();
-            let modes: Vec<String> = modes
-                .map(|mode| format!("{:.1} rad/s", mode.omega_rad_s))
-                .collect();
-            let (modes, delay_ms) = (modes.join(", "), command.delay_s * 1e3);
-            format!("{kind} shaper for {modes}, delay {delay_ms:.1} ms")
-        }
-    }
-}
-
-fn step_text(step: &StepMetrics) -> String {
-    let settling = step
-        .settling_time_s
-        .map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
-    let overshoot = Decimal(step.overshoot_percent);
-    format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
-}
-
-/// The result of the run.
-fn text(report: &Report, config: &Config) -> String {
-    let run = run_text(&report.run, config);
-    match &report.made {
-        Some(made) => run + &analysis_output::text(made),
-        None => measured_text(report.measured.as_ref()) + &run,
-    }
-}
-
-fn measured_text(measured: Option<&TrackingMetrics>) -> String {
-    let Some(measured) = measured else {
-        return labelled(
-            "measured",
-            "no result: the run ended before the steady state",
-        );
-    };
-    let step = measured.step.as_ref().map(step_text);
-    let steady = format!(
-        "steady state: mean error {:+.4} um, sigma {:.4} um",
-        Decimal(measured.steady_state_mean_error_m * 1e6),
-        measured.steady_state_sigma_m * 1e6
-    );
-    let parts: Vec<String> = step.into_iter().chain([steady]).collect();
-    labelled("measured", &parts.join("; "))
 }

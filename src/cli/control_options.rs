@@ -11,25 +11,37 @@ use super::help::{default_value, with_setting};
 use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
-use crate::util::quantity::{Frequency, Length, Ratio, Speed, Time};
+use crate::util::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
 
-/// Height of a step or ramp and amplitude of a sine without `--amplitude`.
-const HEIGHT: (&str, f64) = ("amplitude_m", 50e-6);
+/// A setting of a reference without its option.
+type Default = (&'static str, Value);
+
+/// Height or amplitude without `--amplitude`.
+const HEIGHT: Default = ("amplitude_m", Value::Float(50e-6));
 /// Largest travel of a swept reference without `--amplitude`.
-const TRAVEL: (&str, f64) = ("travel_m", 20e-6);
-/// Frequency of a sine without `--frequency`.
-const FREQUENCY: (&str, f64) = ("frequency_hz", 1.0);
+const TRAVEL: Default = ("travel_m", Value::Float(20e-6));
+/// Frequency of a periodic reference without `--frequency`.
+const FREQUENCY: Default = ("frequency_hz", Value::Float(1.0));
+/// Highest frequency of a random reference without `--frequency`.
+const HIGHEST_FREQUENCY: Default = ("frequency_hz", Value::Float(10.0));
+/// Period of a random reference.
+const PERIOD: Default = ("period_s", Value::Float(10.0));
+/// Seed of a random reference.
+const SEED: Default = ("seed", Value::Integer(1));
 /// Speed of a ramp without `--speed`.
-const SPEED: (&str, f64) = ("speed_m_per_s", 1e-4);
-/// Start of a step or ramp after the loop is closed.
-const START: (&str, f64) = ("at_s", 0.2);
+const SPEED: Default = ("speed_m_per_s", Value::Float(1e-4));
+/// Largest speed of an s-curve without `--speed`.
+const LARGEST_SPEED: Default = ("speed_m_per_s", Value::Float(1e-3));
+/// Largest acceleration of an s-curve without `--acceleration`.
+const ACCELERATION: Default = ("acceleration_m_per_s2", Value::Float(0.05));
+/// Largest jerk of an s-curve without `--jerk`.
+const JERK: Default = ("jerk_m_per_s3", Value::Float(5.0));
+/// Start of the motion after the loop is closed.
+const START: Default = ("at_s", Value::Float(0.2));
 
-const AMPLITUDE_KEY: &str = "control.reference.amplitude_m";
-const TRAVEL_KEY: &str = "control.reference.travel_m";
-const FREQUENCY_KEY: &str = "control.reference.frequency_hz";
 const OVERSHOOT_KEY: &str = "control.shaper.max_overshoot_ratio";
 const PREFILTER_KEY: &str = "control.prefilter.frequency_hz";
-const SPEED_KEY: &str = "control.reference.speed_m_per_s";
+const TABLE: &str = "control.reference";
 
 /// The loop and its reference.
 #[derive(Clone, Debug, clap::Args)]
@@ -41,22 +53,33 @@ pub(super) struct Args {
     choice: ControllerChoice,
     #[command(flatten)]
     pub run: RunOptions,
-    /// Reference signal: step, hold (constant rest position), ramp, sine, chirp (identification in closed loop), or a CSV
-    /// file with the columns
+    /// Reference: step, hold (rest position), ramp, sine, square, triangle, s-curve (move with bounded speed, acceleration and
+    /// jerk), random (limited to a band), chirp (identification in closed loop), or a CSV file with the columns
     /// time_s,reference_m [default: control.reference of the profile]
-    #[arg(long, value_name = "step|hold|ramp|sine|chirp|FILE", value_parser = reference)]
+    #[arg(long, value_name = "KIND|FILE", value_parser = reference)]
     reference: Option<Reference>,
-    /// Height of step and ramp, amplitude of the sine [default: 50um]; for a chirp: largest travel
-    /// predicted by the model
-    /// [default: 20um]
+    /// Height of step, ramp and s-curve, amplitude of sine, square and triangle, largest position of random
+    /// [default: 50um]; for a chirp: largest travel predicted by the model [default: 20um]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
     amplitude: Option<Length>,
-    /// Frequency of the sine [default: 1Hz]
+    /// Frequency of sine, square and triangle [default: 1Hz]; for random: highest frequency [default: 10Hz]
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true)]
     frequency: Option<Frequency>,
-    /// Speed of the ramp [default: 0.1mm/s]
+    /// Speed of the ramp [default: 0.1mm/s]; for an s-curve: largest speed [default: 1mm/s]
     #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
     speed: Option<Speed>,
+    /// Largest acceleration of the s-curve [default: 50mm/s^2]
+    #[arg(long, value_name = "ACCELERATION", allow_hyphen_values = true)]
+    acceleration: Option<Acceleration>,
+    /// Largest jerk of the s-curve [default: 5m/s^3]
+    #[arg(long, value_name = "JERK", allow_hyphen_values = true)]
+    jerk: Option<Jerk>,
+    /// Time after which the random reference repeats [default: 10s]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
+    period: Option<Time>,
+    /// Seed of the random reference [default: 1]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    reference_seed: Option<u64>,
     /// Time with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, help = duration_help())]
     duration: Option<Time>,
@@ -81,6 +104,9 @@ pub(super) struct Args {
     /// Only print what the run would do: margins, travel, current, heat, duration; no motion
     #[arg(long)]
     pub plan: bool,
+    /// Write only the recording, without plots and report
+    #[arg(long)]
+    pub no_report: bool,
 }
 
 fn duration_help() -> String {
@@ -108,6 +134,11 @@ enum ReferenceKind {
     Hold,
     Ramp,
     Sine,
+    Square,
+    Triangle,
+    #[value(alias = "s_curve")]
+    SCurve,
+    Random,
     Chirp,
 }
 
@@ -146,19 +177,53 @@ impl ReferenceKind {
             ReferenceKind::Hold => "hold",
             ReferenceKind::Ramp => "ramp",
             ReferenceKind::Sine => "sine",
+            ReferenceKind::Square => "square",
+            ReferenceKind::Triangle => "triangle",
+            ReferenceKind::SCurve => "s_curve",
+            ReferenceKind::Random => "random",
             ReferenceKind::Chirp => "chirp",
         }
     }
 
     /// Its settings without other options.
-    fn defaults(self) -> &'static [(&'static str, f64)] {
+    fn defaults(self) -> Vec<Default> {
         match self {
-            ReferenceKind::Step => &[HEIGHT, START],
-            ReferenceKind::Hold => &[],
-            ReferenceKind::Ramp => &[HEIGHT, START, SPEED],
-            ReferenceKind::Sine => &[HEIGHT, FREQUENCY],
-            ReferenceKind::Chirp => &[TRAVEL],
+            ReferenceKind::Step => vec![HEIGHT, START],
+            ReferenceKind::Hold => vec![],
+            ReferenceKind::Ramp => vec![HEIGHT, START, SPEED],
+            ReferenceKind::Sine | ReferenceKind::Triangle => vec![HEIGHT, FREQUENCY],
+            ReferenceKind::Square => vec![HEIGHT, FREQUENCY, START],
+            ReferenceKind::SCurve => vec![HEIGHT, LARGEST_SPEED, ACCELERATION, JERK, START],
+            ReferenceKind::Random => vec![HEIGHT, HIGHEST_FREQUENCY, PERIOD, SEED],
+            ReferenceKind::Chirp => vec![TRAVEL],
         }
+    }
+
+    /// Whether it has a setting.
+    fn has(self, key: &str) -> bool {
+        self.defaults().iter().any(|(name, _)| *name == key)
+    }
+
+    /// The key of `--amplitude`.
+    fn amplitude_key(self) -> &'static str {
+        match self {
+            ReferenceKind::Chirp => TRAVEL.0,
+            _ => HEIGHT.0,
+        }
+    }
+}
+
+/// The names of the kinds that fulfil a condition: `step, ramp or sine`.
+fn names(condition: impl Fn(ReferenceKind) -> bool) -> String {
+    let kinds = ReferenceKind::value_variants().iter();
+    let values = kinds
+        .filter(|kind| condition(**kind))
+        .filter_map(ReferenceKind::to_possible_value);
+    let names: Vec<String> = values.map(|value| value.get_name().to_string()).collect();
+    match names.split_last() {
+        Some((last, [])) => last.clone(),
+        Some((last, others)) => format!("{} or {last}", others.join(", ")),
+        None => String::new(),
     }
 }
 
@@ -171,13 +236,13 @@ impl Reference {
                 ("file", Table::from_iter([path]))
             }
             Reference::Kind(kind) => {
-                let defaults = kind.defaults().iter();
-                let entries = defaults.map(|(key, si)| (key.to_string(), Value::Float(*si)));
+                let defaults = kind.defaults().into_iter();
+                let entries = defaults.map(|(key, value)| (key.to_string(), value));
                 (kind.name(), entries.collect())
             }
         };
         table.insert("kind".into(), Value::String(kind.into()));
-        OptionSetting::new("control.reference", table, format!("--reference {kind}"))
+        OptionSetting::new(TABLE, table, format!("--reference {kind}"))
     }
 }
 
@@ -188,7 +253,8 @@ fn reference(text: &str) -> Result<Reference, String> {
     match std::fs::metadata(Path::new(text)) {
         Ok(_) => Ok(Reference::File(text.into())),
         Err(error) => Err(format!(
-            "neither a kind of reference nor a file: {error}; choose step, hold, ramp, sine, chirp, or a file"
+            "neither a kind of reference nor a file: {error}; choose {}, or a file",
+            names(|_| true)
         )),
     }
 }
@@ -199,15 +265,19 @@ impl Args {
         self.refuse_unused()?;
         let mut settings = self.choice.settings();
         settings.extend(self.reference.as_ref().map(Reference::setting));
-        let (amplitude_key, duration_key) = match self.kind() {
-            Some(ReferenceKind::Chirp) => (TRAVEL_KEY, "chirp.duration_s"),
-            _ => (AMPLITUDE_KEY, "control.duration_s"),
+        let duration_key = match self.kind() {
+            Some(ReferenceKind::Chirp) => "chirp.duration_s",
+            _ => "control.duration_s",
         };
         let options = [
-            given(amplitude_key, "--amplitude", self.amplitude.as_ref()),
+            self.reference_setting(self.amplitude_key(), "--amplitude", self.amplitude.as_ref()),
             given(duration_key, "--duration", self.duration.as_ref()),
-            given(FREQUENCY_KEY, "--frequency", self.frequency.as_ref()),
-            given(SPEED_KEY, "--speed", self.speed.as_ref()),
+            self.reference_setting(FREQUENCY.0, "--frequency", self.frequency.as_ref()),
+            self.reference_setting(SPEED.0, "--speed", self.speed.as_ref()),
+            self.reference_setting(ACCELERATION.0, "--acceleration", self.acceleration.as_ref()),
+            self.reference_setting(JERK.0, "--jerk", self.jerk.as_ref()),
+            self.reference_setting(PERIOD.0, "--period", self.period.as_ref()),
+            self.seed_setting(),
         ];
         settings.extend(options.into_iter().flatten());
         settings.extend(self.command_settings());
@@ -250,25 +320,79 @@ impl Args {
         }
     }
 
+    /// The key of `--amplitude`.
+    fn amplitude_key(&self) -> &'static str {
+        self.kind().map_or(HEIGHT.0, ReferenceKind::amplitude_key)
+    }
+
+    /// A setting of the reference with the quantity of an option, if it is given.
+    fn reference_setting<D>(
+        &self,
+        key: &str,
+        option: &str,
+        quantity: Option<&Measure<D>>,
+    ) -> Option<OptionSetting> {
+        given(&format!("{TABLE}.{key}"), option, quantity)
+    }
+
+    /// The seed of a random reference, if it is given.
+    fn seed_setting(&self) -> Option<OptionSetting> {
+        let seed = self.reference_seed?;
+        let option = format!("--reference-seed {seed}");
+        // The parser of the option allows no larger one.
+        Some(OptionSetting::new(
+            format!("{TABLE}.{}", SEED.0),
+            seed as i64,
+            option,
+        ))
+    }
+
     /// Refuses an option that the reference does not use.
     fn refuse_unused(&self) -> Result<(), CliError> {
-        let is_file = matches!(self.reference, Some(Reference::File(_)));
-        let kind = self.kind();
-        if self.amplitude.is_some() && (is_file || kind == Some(ReferenceKind::Hold)) {
-            return Err(unused("--amplitude", "step, ramp, sine or chirp"));
-        }
-        if self.frequency.is_some() && kind != Some(ReferenceKind::Sine) {
-            return Err(unused("--frequency", "sine"));
-        }
         if self.max_overshoot.is_some() && self.shaper != Some(Shaper::MinimumTime) {
             return Err(CliError::Usage(
                 "--max-overshoot is valid only with --shaper minimum-time; leave it out, or choose that shaper".into(),
             ));
         }
-        if self.speed.is_some() && kind != Some(ReferenceKind::Ramp) {
-            return Err(unused("--speed", "ramp"));
+        let is_default = self.reference.is_none();
+        let amplitude = self.amplitude.is_some() && !is_default;
+        self.refuse_without(amplitude, "--amplitude", |kind| {
+            kind.has(kind.amplitude_key())
+        })?;
+        for (is_given, option, key) in [
+            (self.frequency.is_some(), "--frequency", FREQUENCY.0),
+            (self.speed.is_some(), "--speed", SPEED.0),
+            (
+                self.acceleration.is_some(),
+                "--acceleration",
+                ACCELERATION.0,
+            ),
+            (self.jerk.is_some(), "--jerk", JERK.0),
+            (self.period.is_some(), "--period", PERIOD.0),
+            (self.reference_seed.is_some(), "--reference-seed", SEED.0),
+        ] {
+            self.refuse_without(is_given, option, |kind| kind.has(key))?;
         }
-        Ok(())
+        let is_chirp = self.kind() == Some(ReferenceKind::Chirp);
+        self.refuse_without(self.no_report && is_chirp, "--no-report", |kind| {
+            kind != ReferenceKind::Chirp
+        })
+    }
+
+    /// Refuses an option that is given with a reference for which `is_used` does not hold.
+    fn refuse_without(
+        &self,
+        is_given: bool,
+        option: &str,
+        is_used: impl Fn(ReferenceKind) -> bool,
+    ) -> Result<(), CliError> {
+        if !is_given || self.kind().is_some_and(&is_used) {
+            return Ok(());
+        }
+        let kinds = names(is_used);
+        Err(CliError::Usage(format!(
+            "{option} is valid only with --reference {kinds}; leave it out, or choose such a reference"
+        )))
     }
 }
 
@@ -276,10 +400,4 @@ impl Args {
 fn kind_setting(key: &str, kind: &str, option: String) -> OptionSetting {
     let table = Table::from_iter([("kind".to_string(), Value::String(kind.into()))]);
     OptionSetting::new(key, table, option)
-}
-
-fn unused(option: &str, kinds: &str) -> CliError {
-    CliError::Usage(format!(
-        "{option} is valid only with --reference {kinds}; leave it out, or choose such a reference"
-    ))
 }

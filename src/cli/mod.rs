@@ -12,6 +12,7 @@ mod config;
 mod connection;
 mod control;
 mod control_options;
+mod control_output;
 mod controller;
 mod controller_choice;
 mod doctor;

@@ -7,11 +7,11 @@ use serde::Serialize;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
-use crate::experiment::{Plan, RunKind, overview, step_response};
+use crate::experiment::{Plan, RunKind, control_run, overview, step_response};
 use crate::identify::{Frf, frf_csv};
 use crate::recording::Recording;
 use crate::report::ReportError;
-use crate::report::run_pages::{ComparedRun, comparison_page};
+use crate::report::run_pages::{ComparedRun, ControlReport, comparison_page};
 use crate::util::atomic_file::write_atomic;
 
 /// The page on standard output instead of a file.
@@ -39,9 +39,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let runs = args.recordings.iter().map(|path| compared_run(path));
-    let runs = runs.collect::<Result<Vec<_>, _>>()?;
-    let page = comparison_page(&runs).map_err(nothing_common)?;
+    let page = page(&args.recordings)?;
     let path = args
         .out
         .clone()
@@ -65,6 +63,37 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         format!("page       {}\n", report.page)
     })?;
     Ok(Outcome::Done)
+}
+
+/// The page of one closed-loop run, or of one or several recordings in the same plots.
+fn page(paths: &[PathBuf]) -> Result<String, CliError> {
+    if let [path] = paths
+        && let Some(page) = control_page(path)?
+    {
+        return Ok(page);
+    }
+    let runs = paths.iter().map(|path| compared_run(path));
+    let runs = runs.collect::<Result<Vec<_>, _>>()?;
+    comparison_page(&runs).map_err(nothing_common)
+}
+
+/// The report of a closed-loop run; `None` for another run.
+fn control_page(path: &Path) -> Result<Option<String>, CliError> {
+    let recording = Recording::open(path)?;
+    let plan = Plan::of(&recording)?;
+    if plan.kind != RunKind::Control {
+        return Ok(None);
+    }
+    let run = control_run(&recording, &plan)?;
+    let report = ControlReport {
+        recording: &recording,
+        config: &plan.config,
+        run: &run,
+    };
+    let failed = |error: ReportError| CliError::Failed(error.to_string());
+    let plots = report.plots().map_err(failed)?;
+    let page = report.page(&plots, frf_beside(path)?.as_ref());
+    page.map(Some).map_err(failed)
 }
 
 fn nothing_common(error: ReportError) -> CliError {

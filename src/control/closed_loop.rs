@@ -81,6 +81,11 @@ impl ClosedLoop {
         &self.plant
     }
 
+    /// The modes of the mechanics.
+    pub fn modes(&self) -> &[Mode] {
+        &self.modes
+    }
+
     /// P in metres per ampere at z = exp(j w T): hold, amplifier, modes, delays and the probe's rate.
     pub fn sampled_plant(&self, omega_rad_s: f64) -> Complex<f64> {
         self.plant.response(omega_rad_s)
@@ -108,6 +113,12 @@ impl ClosedLoop {
             integrators: at_one.len() + 2 * free_bodies.count(),
             unstable: others.iter().filter(|z| z.norm() > 1.0 + AT_ONE).count(),
         })
+    }
+
+    /// T = L/(1 + L) of the sampled loop, from reference to reading.
+    pub fn complementary_sensitivity(&self, omega_rad_s: f64) -> Complex<f64> {
+        let loop_gain = self.sampled_loop(omega_rad_s);
+        loop_gain / (loop_gain + 1.0)
     }
 
     /// L = P C in continuous time, without hold, delay and amplifier; `None` for a law that was not designed as a
@@ -149,11 +160,6 @@ impl ClosedLoop {
         let response = |w| self.continuous_response(sections, w);
         let stable = self.is_stable_in_continuous_time(sections);
         Ok(margins(&response, &grid, stable, true))
-    }
-
-    /// The modes of the plant.
-    pub fn modes(&self) -> &[Mode] {
-        &self.modes
     }
 
     /// Frequencies in rad/s that follow every resonance of plant and controller.

@@ -29,10 +29,14 @@ pub struct Margins {
     pub phase_margin_deg: Option<f64>,
     /// Smallest gain margin over all phase crossover frequencies, in dB.
     pub gain_margin_db: Option<f64>,
+    /// Frequency of this gain margin in rad/s.
+    pub gain_margin_rad_s: Option<f64>,
     /// 1/max |S|: the distance of L from -1.
     pub modulus_margin: f64,
     /// 20 log10 max |S|.
     pub sensitivity_peak_db: f64,
+    /// Frequency of this peak in rad/s.
+    pub sensitivity_peak_rad_s: f64,
     /// Lowest frequency at which |S| rises through 1/sqrt(2).
     pub sensitivity_bandwidth_rad_s: Option<f64>,
     /// Whether all poles of the closed loop are stable.
@@ -68,13 +72,19 @@ pub(super) fn margins(
         })
         .collect();
     let gain_margin_db = |w: &f64| -20.0 * libm::log10(response(*w).norm());
+    let gain_margins = places.phase_crossings_rad_s.iter();
+    let gain_margin = gain_margins
+        .map(|w| (*w, gain_margin_db(w)))
+        .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
     let peak = places.sensitivity_peak.value;
     Margins {
         crossover_rad_s: places.crossover_rad_s,
         phase_margin_deg: smallest(crossings.iter().map(|c| c.phase_margin_deg)),
-        gain_margin_db: smallest(places.phase_crossings_rad_s.iter().map(gain_margin_db)),
+        gain_margin_db: gain_margin.map(|(_, db)| db),
+        gain_margin_rad_s: gain_margin.map(|(rad_s, _)| rad_s),
         modulus_margin: 1.0 / peak,
         sensitivity_peak_db: 20.0 * libm::log10(peak),
+        sensitivity_peak_rad_s: places.sensitivity_peak.rad_s,
         sensitivity_bandwidth_rad_s: places.sensitivity_bandwidth_rad_s,
         stable,
         crossings,
@@ -124,10 +134,14 @@ mod tests {
         assert!((found.phase_margin_deg.unwrap() - (90.0 - (k * d).to_degrees())).abs() < 1e-9);
         let gain_margin = 20.0 * (std::f64::consts::PI / (2.0 * k * d)).log10();
         assert!((found.gain_margin_db.unwrap() - gain_margin).abs() < 1e-9);
+        let at = found.gain_margin_rad_s.unwrap();
+        assert!((at - std::f64::consts::FRAC_PI_2 / d).abs() < 1e-9);
         // The peak of |S| against a brute force search in steps of 7 mrad/s.
-        let brute = (1..100_000)
-            .map(|i| (l(f64::from(i) * 7e-3) + 1.0).inv().norm())
-            .fold(0.0, f64::max);
+        let (place, brute) = (1..100_000)
+            .map(|i| f64::from(i) * 7e-3)
+            .map(|w| (w, (l(w) + 1.0).inv().norm()))
+            .fold((0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+        assert!((found.sensitivity_peak_rad_s - place).abs() < 7e-3);
         assert!((found.modulus_margin * brute - 1.0).abs() < 1e-7);
     }
 

@@ -42,8 +42,9 @@ pub use multisine::{Lines, MultisineSettings};
 pub use periodic::Periodic;
 pub use prbs::PrbsSettings;
 pub use reference::{
-    FileReference, HoldReference, RampReference, ReferenceContext, ReferenceDesign, ReferenceError,
-    ReferenceSettings, SineReference, StepOfReference, StepReference, SweptReference,
+    FileReference, HoldReference, RampReference, RandomReference, ReferenceContext,
+    ReferenceDesign, ReferenceError, ReferenceSettings, SCurveReference, SineReference,
+    SquareReference, StepOfReference, StepReference, SweptReference, TriangleReference,
 };
 pub use shape::{CurrentLimit, MAX_POINTS, shaped_amplitude};
 pub use staircase::{Staircase, StaircaseSteps};

@@ -200,7 +200,8 @@ fn clip_ratio(round: u32) -> f64 {
     CLIP_RATIOS.0 + (CLIP_RATIOS.1 - CLIP_RATIOS.0) * f64::from(round) / f64::from(ROUNDS)
 }
 
-fn random_phases(count: usize, seed: u64) -> Vec<Complex<f64>> {
+/// exp(i phi) with `count` random phases of a seed.
+pub(super) fn random_phases(count: usize, seed: u64) -> Vec<Complex<f64>> {
     const UNIT: f64 = 1.0 / (1u64 << 53) as f64;
     let mut random = Pcg64::new(u128::from(seed), 1);
     let mut phases = Vec::with_capacity(count);

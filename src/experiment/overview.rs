@@ -25,6 +25,8 @@ pub struct Overview {
     pub reference_m: Vec<Extent>,
     /// Valid positions in metres.
     pub position_m: Vec<Extent>,
+    /// Reference minus valid position in metres.
+    pub error_m: Vec<Extent>,
     /// Current set-point in amperes.
     pub current_a: Vec<Extent>,
 }
@@ -53,6 +55,7 @@ impl Overview {
         for (extents, value) in [
             (&mut self.reference_m, record.reference_m),
             (&mut self.position_m, record.position_m),
+            (&mut self.error_m, record.reference_m - record.position_m),
             (&mut self.current_a, record.command_a),
         ] {
             add_value(extents, value, time_s, begins);

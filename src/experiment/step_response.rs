@@ -79,6 +79,10 @@ fn commanded_step(
 pub struct StepResponse {
     /// Height of the step in metres.
     pub height_m: f64,
+    /// Rest position in metres.
+    pub rest_m: f64,
+    /// Time of the step in seconds since the loop closed.
+    pub at_s: f64,
     /// Sampling period in seconds.
     pub period_s: f64,
     /// Measured position in metres from the rest position, at each tick from the step on.
@@ -130,18 +134,21 @@ pub fn step_response(
         true => predicted_step(plan, &closed_loop),
         false => None,
     };
+    let (rest_m, positions_m) = positions_after(recording, step.at_s * config.servo.rate_hz)?;
     Ok(Some(StepResponse {
         height_m: step.height_m,
+        rest_m,
+        at_s: step.at_s,
         period_s: config.servo.period_s(),
-        positions_m: positions_after(recording, step.at_s * config.servo.rate_hz)?,
+        positions_m,
         predicted,
         metrics: tracking_metrics(recording, &config.control, &config.servo)?,
     }))
 }
 
-/// The positions from a tick on, counted since the loop was closed. The rest position is the reference of the last tick before the
+/// The rest position, and the positions from it from a tick on, counted since the loop was closed. The rest position is the reference of the last tick before the
 /// loop was closed, as in [`tracking_metrics`].
-fn positions_after(recording: &Recording, tick: f64) -> Result<Vec<f64>, ExperimentError> {
+fn positions_after(recording: &Recording, tick: f64) -> Result<(f64, Vec<f64>), ExperimentError> {
     let first = tick.round() as u64;
     let (mut active, mut rest_m) = (0, 0.0);
     let mut positions_m = Vec::new();
@@ -158,5 +165,5 @@ fn positions_after(recording: &Recording, tick: f64) -> Result<Vec<f64>, Experim
         }
         active += 1;
     }
-    Ok(positions_m)
+    Ok((rest_m, positions_m))
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::sine_response::{SineMeter, SineResponse};
 use crate::config::{ControlSettings, LoopSettings};
 use crate::control::{SETTLING_BAND, StepMeter, StepMetrics};
 use crate::recording::{Recording, RecordingError};
@@ -19,6 +20,21 @@ pub struct TrackingMetrics {
     pub steady_state_mean_error_m: f64,
     /// Standard deviation of r - y in metres over the steady state.
     pub steady_state_sigma_m: f64,
+    /// RMS of r - y in metres over the steady state.
+    pub steady_state_rms_m: f64,
+    /// Gain and phase, if the reference is a sine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sine: Option<SineResponse>,
+}
+
+/// The tick, counted since the loop closed, at which the steady state begins.
+pub(super) fn steady_tick(control: &ControlSettings, rate_hz: f64) -> u64 {
+    let last_change_s = control.reference.design().last_change_s();
+    ticks(last_change_s, rate_hz).saturating_add(ticks(control.steady_after_s, rate_hz))
+}
+
+fn ticks(seconds: f64, rate_hz: f64) -> u64 {
+    (seconds * rate_hz).round() as u64
 }
 
 /// The metrics of a run; `None` if it ended before its steady state. One pass with constant memory: a run may last for days.
@@ -46,22 +62,22 @@ struct TrackingMeter {
     height_m: f64,
     step: StepMeter,
     error: RunningStats,
+    sine: Option<SineMeter>,
 }
 
 impl TrackingMeter {
     fn new(control: &ControlSettings, rate_hz: f64) -> TrackingMeter {
-        let ticks = |seconds: f64| (seconds * rate_hz).round() as u64;
         let reference = control.reference.design();
-        let last_change = ticks(reference.last_change_s());
         let height_m = reference.step().map_or(0.0, |step| step.height_m);
         TrackingMeter {
-            last_change,
-            steady: last_change.saturating_add(ticks(control.steady_after_s)),
+            last_change: ticks(reference.last_change_s(), rate_hz),
+            steady: steady_tick(control, rate_hz),
             active: 0,
             origin_m: 0.0,
             height_m,
             step: StepMeter::new(height_m),
             error: RunningStats::default(),
+            sine: reference.sine_hz().map(|hz| SineMeter::new(hz, rate_hz)),
         }
     }
 
@@ -79,6 +95,9 @@ impl TrackingMeter {
         }
         if self.active >= self.steady {
             self.error.push(record.reference_m - record.position_m);
+            if let Some(sine) = &mut self.sine {
+                sine.push(record.tick, record.reference_m, record.position_m);
+            }
         }
         self.active += 1;
     }
@@ -90,6 +109,8 @@ impl TrackingMeter {
             step,
             steady_state_mean_error_m: self.error.mean,
             steady_state_sigma_m: sigma_m,
+            steady_state_rms_m: self.error.mean.hypot(sigma_m),
+            sine: self.sine.as_ref().and_then(SineMeter::response),
         })
     }
 

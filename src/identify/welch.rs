@@ -80,6 +80,12 @@ pub fn spectra(signals: &Signals, segment: usize) -> Result<PowerSpectra, Identi
 }
 
 impl PowerSpectra {
+    /// Degrees of freedom of a power spectral density at one frequency: twice the number of independent averages. Its ratio to the
+    /// expected value is distributed as chi-square over this number.
+    pub fn degrees_of_freedom(&self) -> f64 {
+        2.0 * independent_averages(self.segments)
+    }
+
     /// H1 at bin `k`; not finite where the input is zero.
     fn h1(&self, k: usize, resolution_hz: f64) -> FrfPoint {
         let (input, output, cross) = (self.input[k], self.output[k], self.cross[k]);

@@ -3,7 +3,8 @@
 //! ```text
 //! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
 //!                      |-> overlay (several recordings) -------------------+
-//!                      `-> measured_loop_plots (L with its margins, S and T) -------+
+//!                      `-> measured_loop_plots (L, S and T, with bands) ---+
+//! loop_plots, run_signals, error_spectrum (closed loop) -------------------+
 //! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
@@ -15,7 +16,9 @@ mod coherence;
 mod distortion;
 pub mod ellipse;
 mod error;
+mod error_spectrum;
 pub mod html;
+mod loop_plots;
 mod measured_loop_plots;
 pub mod number;
 mod nyquist;
@@ -24,6 +27,7 @@ pub mod phase;
 mod pole_zero;
 mod quadrants;
 pub mod run_pages;
+mod run_signals;
 mod stability;
 mod trace;
 
@@ -35,15 +39,16 @@ pub use chart::{
 pub use coherence::coherence_svg;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
+pub use error_spectrum::error_spectrum_svg;
+pub use loop_plots::{LoopPlot, loop_bode_svg, loop_nyquist_svg, sensitivity_svg};
 pub use measured_loop_plots::{
     MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
     measured_sensitivity_svg,
 };
 pub use nyquist::nyquist_svg;
-pub use overlay::{
-    Envelope, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, signals_svg, step_svg,
-};
+pub use overlay::{StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, step_svg};
 pub use pole_zero::{PoleZeroMap, UncertainPoint, pole_zero_svg};
 pub use quadrants::{QuadrantPanel, quadrants_svg};
+pub use run_signals::{Envelope, SettlingBand, SignalsPlot, signals_svg};
 pub use stability::{OrderedMode, stability_svg};
 pub use trace::{Curve, Trace};

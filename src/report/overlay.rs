@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::bode::sheet;
-use super::chart::colours::{BLUE, Colour, GREEN, ORANGE, PURPLE, VERMILION};
+use super::chart::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Stroke, sheet_svg};
 use super::trace::{self, Trace};
 use crate::identify::{Frf, Unit};
@@ -93,50 +93,6 @@ pub fn step_svg(step: &StepPlot<'_>, title: &str) -> Result<String, ReportError>
         chart = chart.line("by the model", pen, micro(step.predicted));
     }
     sheet_svg(title, "", &[Row::new(STEP_HEIGHT, vec![chart])])
-}
-
-/// A signal over time: (seconds, smallest and largest value of the interval that begins there).
-pub type Envelope = [(f64, f64, f64)];
-
-/// Reference, position and current of a whole run, below each other. Units are metres and amperes.
-///
-/// # Errors
-/// When there is nothing to draw, or drawing fails.
-pub fn signals_svg(
-    reference: &Envelope,
-    position: &Envelope,
-    current: &Envelope,
-    title: &str,
-) -> Result<String, ReportError> {
-    if current.is_empty() {
-        return Err(ReportError::NoTrace);
-    }
-    let time = Scale::linear("Time (s)");
-    let motion = Chart::new(
-        "",
-        time.clone().unnumbered(),
-        Scale::linear("Position (µm)"),
-    )
-    .line("reference", Pen::solid(ORANGE), outline(reference, MICRO))
-    .line("position", Pen::solid(BLUE), outline(position, MICRO));
-    let current = Chart::new("", time, Scale::linear("Current (A)")).line(
-        "current",
-        Pen::solid(GREEN),
-        outline(current, 1.0),
-    );
-    let rows = [
-        Row::new(STEP_HEIGHT, vec![motion]),
-        Row::new(0.5 * STEP_HEIGHT, vec![current]),
-    ];
-    sheet_svg(title, "", &rows)
-}
-
-/// A line from minimum to maximum of each interval.
-fn outline(envelope: &Envelope, factor: f64) -> Vec<(f64, f64)> {
-    let points = envelope
-        .iter()
-        .flat_map(|(time_s, low, high)| [(*time_s, factor * low), (*time_s, factor * high)]);
-    points.collect()
 }
 
 fn step_chart() -> Chart {

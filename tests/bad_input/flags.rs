@@ -68,11 +68,38 @@ fn rejects_invalid_flags_with_value_and_limit() {
         ),
         (
             "control --reference hold --amplitude 5um",
-            &["--amplitude", "step, ramp, sine or chirp"],
+            &[
+                "--amplitude",
+                "step, ramp, sine, square, triangle, s-curve, random or chirp",
+            ],
         ),
         (
             "control --reference step --frequency 5",
-            &["--frequency", "sine"],
+            &["--frequency", "sine, square, triangle or random"],
+        ),
+        (
+            "control --reference ramp --jerk 5",
+            &["--jerk", "--reference s-curve"],
+        ),
+        (
+            "control --reference s-curve --acceleration 5mm/s",
+            &["`5mm/s` is a speed", "50mm/s^2"],
+        ),
+        (
+            "control --reference square --amplitude 1mm",
+            &["--amplitude 1mm", "the soft limit of 0.0009 m"],
+        ),
+        (
+            "control --reference random --frequency 0.01",
+            &["--frequency 0.01 is 0.01 Hz", "the period of 10 s"],
+        ),
+        (
+            "control --reference sine --reference-seed 2",
+            &["--reference-seed", "--reference random"],
+        ),
+        (
+            "control --reference chirp --no-report",
+            &["--no-report", "step, hold"],
         ),
         ("control --speed 1e-5", &["--speed", "ramp"]),
         (
@@ -256,6 +283,9 @@ fn rejects_nan_and_infinity_in_every_numeric_flag() {
         "--amplitude",
         "--reference sine --frequency",
         "--reference ramp --speed",
+        "--reference random --frequency",
+        "--reference s-curve --acceleration",
+        "--reference s-curve --jerk",
     ];
     let model = ["--operating-point", "--asymmetry"].map(|flag| format!("model modes {flag}"));
     for flag in chirp

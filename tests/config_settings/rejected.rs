@@ -295,7 +295,7 @@ fn rejects_unknown_kind_and_lists_valid_kinds() {
     assert_set_rejected("chirp.sweep=up", &["`chirp.sweep`", "linear, logarithmic"]);
     assert_set_rejected(
         "control.reference.kind=foo",
-        &["hold, step, ramp, sine, chirp, file"],
+        &["hold, step, ramp, sine, square, triangle, s_curve, random, chirp, file"],
     );
     assert_set_rejected("plant=3", &["`plant.model` is missing", "sr4dof"]);
 }

@@ -58,8 +58,12 @@ fn errors_name_option_and_unit_as_typed_and_suggest_a_correction() {
         &["--amplitude 10mm is 0.01 m", "the soft limit of 0.0009 m"],
     );
     refused(
-        "control --reference square",
-        &["--reference", "square", "step, hold, ramp, sine, chirp"],
+        "control --reference circle",
+        &[
+            "--reference",
+            "circle",
+            "step, hold, ramp, sine, square, triangle, s-curve, random or chirp",
+        ],
     );
 }
 

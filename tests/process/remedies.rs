@@ -49,7 +49,7 @@ const REFUSED: [(&str, &str); 66] = [
     ),
     // Closed loop
     ("control --frequency 5Hz", "such a reference"),
-    ("control --reference square", "step, hold"),
+    ("control --reference circle", "step, hold"),
     ("control --reference sine --amplitude 10mm", "lower it"),
     ("control --reference sine --frequency 3kHz", "loop.rate_hz"),
     (

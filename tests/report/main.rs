@@ -3,6 +3,7 @@
 mod attributes;
 mod bode;
 mod comparison;
+mod control;
 mod nyquist;
 mod overlay;
 mod phase;

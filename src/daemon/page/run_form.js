@@ -2,6 +2,9 @@
 
 import { quantity } from "/page/drawing.js";
 
+/** References with a frequency. */
+const WITH_FREQUENCY = ["sine", "square", "triangle", "random"];
+
 const byId = (id) => document.getElementById(id);
 
 /** The arguments of the command line that the form stands for. */
@@ -10,7 +13,7 @@ export function formArguments() {
   const add = (option, id) => { const text = byId(id).value.trim(); if (text) args.push(option, text); };
   if (command === "control") {
     args.push(byId("controller").value, "--reference", reference);
-    if (reference === "sine") add("--frequency", "frequency");
+    if (WITH_FREQUENCY.includes(reference)) add("--frequency", "frequency");
   }
   if (command === "chirp" || (command === "control" && reference === "chirp")) {
     add("--start", "from");
@@ -27,7 +30,7 @@ export function showFields() {
   const isControl = command === "control";
   const show = (selector, isShown) => document.querySelectorAll(selector).forEach((field) => { field.hidden = !isShown; });
   show(".only-control", isControl);
-  show(".only-sine", isControl && reference === "sine");
+  show(".only-frequency", isControl && WITH_FREQUENCY.includes(reference));
   show(".only-chirp", command === "chirp" || (isControl && reference === "chirp"));
   show(".not-calibrate", command !== "calibrate");
   byId("amplitude").placeholder = isControl ? "50um" : "0.5A";

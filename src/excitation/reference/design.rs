@@ -65,6 +65,11 @@ pub trait ReferenceDesign {
         None
     }
 
+    /// Frequency in hertz of a sine, whose gain and phase are measured.
+    fn sine_hz(&self) -> Option<f64> {
+        None
+    }
+
     /// Time in seconds of its last change: the steady state is measured after it.
     fn last_change_s(&self) -> f64 {
         self.step().map_or(0.0, |step| step.at_s)
@@ -112,6 +117,15 @@ pub(super) fn check_amplitude(amplitude_m: f64, soft_limit_m: f64) -> Vec<Findin
         "is {amplitude_m} m, beyond the soft limit of {soft_limit_m} m (interlock.soft_limit_m); lower it"
     );
     vec![Finding::new("control.reference.amplitude_m", what)]
+}
+
+/// A finding about a frequency that is not below half the servo rate.
+pub(super) fn check_frequency(frequency_hz: f64, rate_hz: f64) -> Option<Finding> {
+    let nyquist_hz = rate_hz / 2.0;
+    let what = format!(
+        "is {frequency_hz} Hz, not below half the servo rate of {nyquist_hz} Hz; lower it, or raise loop.rate_hz"
+    );
+    (frequency_hz >= nyquist_hz).then(|| Finding::new("control.reference.frequency_hz", what))
 }
 
 /// A reference file that cannot be used.

@@ -6,9 +6,13 @@ mod design;
 mod file;
 mod hold;
 mod ramp;
+mod random;
+mod s_curve;
 mod sine;
+mod square;
 mod step;
 mod swept;
+mod triangle;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,9 +21,13 @@ pub use design::{ReferenceContext, ReferenceDesign, ReferenceError, StepOfRefere
 pub use file::FileReference;
 pub use hold::HoldReference;
 pub use ramp::RampReference;
+pub use random::RandomReference;
+pub use s_curve::SCurveReference;
 pub use sine::SineReference;
+pub use square::SquareReference;
 pub use step::StepReference;
 pub use swept::SweptReference;
+pub use triangle::TriangleReference;
 
 /// Declares the kinds of reference: `/// documentation, Kind(Settings)`.
 macro_rules! references {
@@ -54,6 +62,14 @@ references! {
     Ramp(RampReference),
     /// A sine that starts at zero.
     Sine(SineReference),
+    /// A square wave.
+    Square(SquareReference),
+    /// A triangle wave that starts at zero.
+    Triangle(TriangleReference),
+    /// From 0 to a height with bounded speed, acceleration and jerk, then constant.
+    SCurve(SCurveReference),
+    /// A random signal, limited to a band and to a peak.
+    Random(RandomReference),
     /// The sweep of `[chirp]` in metres, with its rest before and after: for identification in closed loop. The run
     /// lasts as long as the sweep; `control.duration_s` is not used.
     Chirp(SweptReference),

@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, check_amplitude, um};
+use super::design::{
+    ReferenceContext, ReferenceDesign, ReferenceError, check_amplitude, check_frequency, um,
+};
 use crate::excitation::waveform::Reference;
 use crate::util::finding::Finding;
 
@@ -42,15 +44,13 @@ impl ReferenceDesign for SineReference {
     }
 
     fn check(&self, soft_limit_m: f64, rate_hz: f64) -> Vec<Finding> {
-        let (frequency_hz, nyquist_hz) = (self.frequency_hz, rate_hz / 2.0);
         let mut findings = check_amplitude(self.amplitude_m, soft_limit_m);
-        if frequency_hz >= nyquist_hz {
-            let what = format!(
-                "is {frequency_hz} Hz, not below half the servo rate of {nyquist_hz} Hz; lower it, or raise loop.rate_hz"
-            );
-            findings.push(Finding::new("control.reference.frequency_hz", what));
-        }
+        findings.extend(check_frequency(self.frequency_hz, rate_hz));
         findings
+    }
+
+    fn sine_hz(&self) -> Option<f64> {
+        Some(self.frequency_hz)
     }
 }
 

@@ -3,31 +3,16 @@
 use nalgebra::Complex;
 
 use super::page::{delay_ms, named, table_section, with_interval};
-use super::{Plot, PlotKind, RecordReport};
+use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
 use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
-use crate::report::html::{escaped, facts, row, section};
+use crate::report::html::row;
 use crate::report::number::angular_frequency;
 use crate::report::{DistortionLevels, ReportError, Trace, bode_svg, distortion_svg};
-
-/// Entries of the recording's metadata that the page shows.
-const METADATA: [&str; 11] = [
-    "program",
-    "host",
-    "kernel",
-    "pace",
-    "policy",
-    "memory_locked",
-    "idle_states_off",
-    "cpu",
-    "refused",
-    "amplifier",
-    "probe",
-];
 
 const SENSITIVITY_CAPTION: &str = "S from reference to error and T from reference to displacement. The peak of S is the inverse \
     of the modulus margin.";
@@ -72,12 +57,11 @@ impl<'a> BenchRun<'a> {
     /// When a response is invalid, or drawing fails.
     pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
         let analysis = self.analysis;
-        let file = self.recording.path().file_name().unwrap_or_default();
         Ok(RecordReport {
             title: self.title.clone(),
             subtitle: self
                 .subtitle("current set-point to displacement, with hold, amplifier and delay"),
-            record: format!("Recording {}", file.to_string_lossy()),
+            record: format!("Recording {}", run_facts::file_name(self.recording)),
             unit: Unit::MetresPerAmpere,
             residue_unit: "1/kg".into(),
             frf: &analysis.frf,
@@ -89,7 +73,7 @@ impl<'a> BenchRun<'a> {
             evidence: evidence(analysis),
             further_plots: self.further_plots()?,
             before_plots: analysis.closed.as_ref().map_or_else(String::new, margins),
-            after_plots: self.scheduling() + &self.configuration(),
+            after_plots: self.scheduling() + &run_facts::configuration(self.recording, &self.title),
         })
     }
 
@@ -98,16 +82,8 @@ impl<'a> BenchRun<'a> {
         let (excitation, rate_hz) = (&self.excitation, self.rate_hz);
         format!(
             "{shown};\n{excitation} at {rate_hz} Hz; {}",
-            self.metadata("started")
+            run_facts::metadata(self.recording, "started")
         )
-    }
-
-    /// An entry of the recording's metadata; empty if it is missing.
-    fn metadata(&self, name: &str) -> &str {
-        self.recording
-            .metadata()
-            .get(name)
-            .map_or("", String::as_str)
     }
 
     fn further_plots(&self) -> Result<Vec<Plot>, ReportError> {
@@ -167,56 +143,13 @@ impl<'a> BenchRun<'a> {
         })
     }
 
-    /// How the loop was scheduled, and what it recorded.
     fn scheduling(&self) -> String {
-        let metadata = METADATA.map(|name| (label(name), self.metadata(name).to_string()));
-        let mut pairs = metadata.to_vec();
-        pairs.retain(|(_, text)| !text.is_empty());
-        pairs.extend(self.counts());
-        pairs.extend(self.lateness());
-        section("The loop", &facts(&pairs))
+        let filled = self.analysis.filled_ticks.to_string();
+        run_facts::scheduling(
+            self.recording,
+            &[("Missing ticks filled in".into(), filled)],
+        )
     }
-
-    fn counts(&self) -> [(String, String); 4] {
-        let recording = self.recording;
-        let counts = [
-            ("Ticks", recording.tick_count()),
-            ("Overruns", recording.overruns()),
-            ("Lost records", recording.lost_records()),
-            ("Missing ticks filled in", self.analysis.filled_ticks),
-        ];
-        counts.map(|(name, count)| (name.to_string(), count.to_string()))
-    }
-
-    /// The largest wake-up latency and computation time; none at virtual pace, which has no clock.
-    fn lateness(&self) -> Vec<(String, String)> {
-        if self.metadata("pace") == "virtual" {
-            return Vec::new();
-        }
-        let timings = self.recording.timings().iter();
-        let latencies = timings.clone().map(|timing| timing.lateness_max_ns);
-        let computations = timings.map(|timing| timing.compute_max_ns);
-        named([
-            ("Largest wake-up latency", Some(largest_us(latencies))),
-            ("Longest computation", Some(largest_us(computations))),
-        ])
-    }
-
-    fn configuration(&self) -> String {
-        let Some(toml) = self.recording.config_toml() else {
-            return String::new();
-        };
-        let (title, toml) = (escaped(&self.title), escaped(toml));
-        let details = format!(
-            "<details><summary>{title}</summary>\n<pre><code>{toml}</code></pre>\n</details>\n"
-        );
-        section("Configuration", &details)
-    }
-}
-
-/// The largest of some times in microseconds.
-fn largest_us(times_ns: impl Iterator<Item = u64>) -> String {
-    format!("{:.1} µs", times_ns.max().unwrap_or(0) as f64 / 1e3)
 }
 
 fn distortion_caption(linearity: &Linearity) -> String {
@@ -286,10 +219,4 @@ fn modulus_margins(closed: &ClosedResponses) -> String {
 
 fn or_none(text: Option<String>) -> String {
     text.unwrap_or_else(|| "none in the band".into())
-}
-
-/// `memory_locked` as `Memory locked`.
-fn label(name: &str) -> String {
-    let (first, rest) = name.split_at(1);
-    first.to_uppercase() + &rest.replace('_', " ")
 }

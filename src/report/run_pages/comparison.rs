@@ -4,7 +4,8 @@ use crate::experiment::{Extent, Overview, StepResponse, TrackingMetrics};
 use crate::identify::{Frf, Unit};
 use crate::report::html::{document_with_plots, escaped, note, picture, row, section, table};
 use crate::report::{
-    ReportError, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, signals_svg, step_svg,
+    ReportError, SignalsPlot, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg,
+    signals_svg, step_svg,
 };
 
 /// Longest part of a step that is drawn, as a multiple of its settling time.
@@ -61,8 +62,13 @@ fn responses(runs: &[ComparedRun]) -> Result<String, ReportError> {
         .iter()
         .map(|(name, frf)| (name.as_str(), frf))
         .collect();
+    responses_section(&traces)
+}
+
+/// Measured frequency responses in one plot.
+pub(super) fn responses_section(responses: &[(&str, &Frf)]) -> Result<String, ReportError> {
     let heading = "Frequency responses of the stage";
-    let svg = overlay_bode_svg(Unit::MetresPerAmpere, &traces, heading)?;
+    let svg = overlay_bode_svg(Unit::MetresPerAmpere, responses, heading)?;
     Ok(section(heading, &picture(&svg, heading, FRF_CAPTION)))
 }
 
@@ -74,14 +80,15 @@ fn steps(runs: &[ComparedRun]) -> Result<String, ReportError> {
     let heading = "Step response";
     let svg = match found[..] {
         [] => return Ok(String::new()),
-        [(_, step)] => single(step, heading)?,
+        [(_, step)] => step_picture(step, heading)?,
         _ => overlay(&found, heading)?,
     };
     let picture = picture(&svg, heading, STEP_CAPTION);
     Ok(section(heading, &(picture + &figures(&found))))
 }
 
-fn single(step: &StepResponse, heading: &str) -> Result<String, ReportError> {
+/// A measured step beside that of the model.
+pub(super) fn step_picture(step: &StepResponse, heading: &str) -> Result<String, ReportError> {
     let drawn_s = drawn_s(step);
     let (measured, predicted) = (
         step.measured_points(drawn_s),
@@ -142,12 +149,19 @@ fn signals(runs: &[ComparedRun]) -> Result<String, ReportError> {
         extents.map(|e| (e.time_s, e.min, e.max)).collect()
     };
     let heading = "Signals";
-    let svg = signals_svg(
-        &envelope(&overview.reference_m),
-        &envelope(&overview.position_m),
-        &envelope(&overview.current_a),
-        heading,
-    )?;
+    let [reference, position, current] = [
+        &overview.reference_m,
+        &overview.position_m,
+        &overview.current_a,
+    ]
+    .map(|extents| envelope(extents));
+    let plot = SignalsPlot {
+        reference: &reference,
+        position: &position,
+        current: &current,
+        ..SignalsPlot::default()
+    };
+    let svg = signals_svg(&plot, heading, "")?;
     Ok(section(heading, &picture(&svg, heading, SIGNALS_CAPTION)))
 }
 

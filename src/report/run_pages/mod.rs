@@ -4,16 +4,19 @@
 //! BenchRun (a run of the bench) -------.
 //!                                       > RecordReport -> plots (SVG) -> page (HTML)
 //! ExternalRecord (a CSV) --------------'
+//! ControlReport (a closed-loop run) -> plots (SVG), control_page (HTML)
 //! ComparedRun (one or several runs) -> comparison (HTML)
 //! ```
 
 mod bench_run;
 mod comparison;
+mod control_page;
 mod external;
 mod measured_loop;
 mod outputs;
 mod page;
 mod plots;
+mod run_facts;
 
 use nalgebra::Complex;
 
@@ -23,11 +26,12 @@ use crate::identify::{Frf, Unit};
 
 pub use bench_run::BenchRun;
 pub use comparison::{ComparedRun, comparison_page};
+pub use control_page::ControlReport;
 pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
 pub use outputs::{
-    AnalysisOutputs, AnalysisStatus, ExistingFile, LoopOutputs, ModalSummary, OutputError,
-    PageFiles, ResultFiles,
+    AnalysisOutputs, AnalysisStatus, ControlFiles, ExistingFile, LoopOutputs, ModalSummary,
+    OutputError, PageFiles, ResultFiles,
 };
 pub use page::page;
 pub use plots::{Plot, PlotKind, plots};

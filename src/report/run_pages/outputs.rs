@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::RecordReport;
 use super::bench_run::BenchRun;
+use super::control_page::ControlReport;
 use super::page::page;
 use super::plots::{PlotKind, plots};
 use crate::experiment::{Analysis, ClosedResponses};
@@ -118,6 +119,48 @@ impl PageFiles {
         let page = page(report, &plots);
         files.report = Some(results.write("report", "html", &page)?);
         Ok(files)
+    }
+}
+
+impl PageFiles {
+    /// Adds the plots and the page of a closed-loop run that has no analysis, because it did not come to its end.
+    pub fn extend(&mut self, files: Option<ControlFiles>) {
+        let Some(files) = files else {
+            return;
+        };
+        let drawn = files.plots.into_iter().filter(|(_, path)| path.is_some());
+        self.plots.extend(drawn);
+        self.report = files.report;
+    }
+}
+
+/// The plots and the page of a closed-loop run; the names in JSON must not change.
+#[derive(Clone, Debug, Serialize)]
+pub struct ControlFiles {
+    /// All plots.
+    pub plots: Plots,
+    /// The page.
+    pub report: Option<String>,
+}
+
+impl ControlFiles {
+    /// Draws a run and writes its plots and its page.
+    ///
+    /// # Errors
+    /// When a plot cannot be drawn, or a file cannot be written.
+    pub fn write(
+        report: &ControlReport<'_>,
+        results: ResultFiles<'_>,
+    ) -> Result<ControlFiles, OutputError> {
+        let drawn = report.plots()?;
+        let mut plots: Plots = PlotKind::CONTROL.map(|kind| (kind.name(), None)).into();
+        for plot in &drawn {
+            let path = results.write(plot.kind.name(), "svg", &plot.svg)?;
+            plots.insert(plot.kind.name(), Some(path));
+        }
+        let page = report.page(&drawn, None)?;
+        let report = Some(results.write("report", "html", &page)?);
+        Ok(ControlFiles { plots, report })
     }
 }
 

@@ -25,7 +25,7 @@ const NYQUIST_CAPTION: &str = "The response in the complex plane, where its magn
 const STABILITY_CAPTION: &str = "The modes at each model order that the fit visited. A mode of the stage persists from one \
     order to the next; a mode of noise or of the search moves. The first orders are fitted with larger tolerances.";
 
-/// The kinds of plots. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
+/// The kinds of plots of an analysed record and of a closed-loop run. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
 /// distortion needs a multisine with lines that are not excited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -46,10 +46,28 @@ pub enum PlotKind {
     Sensitivity,
     /// Output, noise and distortion of a multisine.
     Linearity,
+    /// Reference, position, error and current of a closed-loop run.
+    Signals,
+    /// Step response of a closed-loop run.
+    Step,
+    /// Spectrum of the error of a closed-loop run.
+    Spectrum,
+    /// Nyquist plot of L.
+    LoopNyquist,
 }
 
 impl PlotKind {
-    /// All kinds.
+    /// The kinds of a closed-loop run.
+    pub const CONTROL: [PlotKind; 6] = [
+        PlotKind::Signals,
+        PlotKind::Step,
+        PlotKind::Spectrum,
+        PlotKind::Loop,
+        PlotKind::LoopNyquist,
+        PlotKind::Sensitivity,
+    ];
+
+    /// The kinds of an analysed record.
     pub const ALL: [PlotKind; 8] = [
         PlotKind::Bode,
         PlotKind::Coherence,
@@ -72,6 +90,10 @@ impl PlotKind {
             PlotKind::Loop => "loop",
             PlotKind::Sensitivity => "sensitivity",
             PlotKind::Linearity => "linearity",
+            PlotKind::Signals => "signals",
+            PlotKind::Step => "step",
+            PlotKind::Spectrum => "spectrum",
+            PlotKind::LoopNyquist => "loop_nyquist",
         }
     }
 }

@@ -13,6 +13,7 @@ mod noise;
 mod nonlinear_plant;
 mod probe;
 mod setpoints;
+mod spectra;
 mod stage;
 mod trajectory;
 
@@ -28,6 +29,7 @@ use trajectory::Trajectory;
 pub use actual_model::modes;
 pub use live::LiveStage;
 pub use probe::Sensor;
+pub use spectra::DisturbanceSpectra;
 
 /// The simulated amplifier, stage and probe.
 ///

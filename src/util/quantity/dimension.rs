@@ -17,6 +17,10 @@ pub enum Dimension {
     Current,
     /// Metres per second.
     Speed,
+    /// Metres per second squared.
+    Acceleration,
+    /// Metres per second cubed.
+    Jerk,
     /// Kilograms.
     Mass,
     /// Newtons.
@@ -52,6 +56,10 @@ pub(super) const UNITS: &[(&str, Dimension, f64)] = &[
     ("m/s", Dimension::Speed, 1.0),
     ("mm/s", Dimension::Speed, 1e-3),
     ("um/s", Dimension::Speed, 1e-6),
+    ("m/s^2", Dimension::Acceleration, 1.0),
+    ("mm/s^2", Dimension::Acceleration, 1e-3),
+    ("m/s^3", Dimension::Jerk, 1.0),
+    ("mm/s^3", Dimension::Jerk, 1e-3),
     ("kg", Dimension::Mass, 1.0),
     ("g", Dimension::Mass, 1e-3),
     ("N", Dimension::Force, 1.0),
@@ -72,7 +80,8 @@ const KEY_SUFFIXES: &[(&str, Dimension)] = &[
     ("_n_per_a", Dimension::Other("N/A")),
     ("_a_per_um", Dimension::Other("A/um")),
     ("_n_s_per_m", Dimension::Other("N s/m")),
-    ("_m_per_s2", Dimension::Other("m/s^2")),
+    ("_m_per_s3", Dimension::Jerk),
+    ("_m_per_s2", Dimension::Acceleration),
     ("_m_per_s", Dimension::Speed),
     ("_a_per_s", Dimension::Other("A/s")),
     ("_rad_s", Dimension::AngularFrequency),
@@ -140,6 +149,8 @@ impl Dimension {
             Dimension::AngularFrequency => "an angular frequency",
             Dimension::Current => "a current",
             Dimension::Speed => "a speed",
+            Dimension::Acceleration => "an acceleration",
+            Dimension::Jerk => "a jerk",
             Dimension::Mass => "a mass",
             Dimension::Force => "a force",
             Dimension::Stiffness => "a stiffness",
@@ -159,6 +170,8 @@ impl Dimension {
             Dimension::AngularFrequency => "180rad/s or 29Hz",
             Dimension::Current => "0.1A or 100mA",
             Dimension::Speed => "0.1mm/s or 1e-4",
+            Dimension::Acceleration => "50mm/s^2 or 0.05",
+            Dimension::Jerk => "5m/s^3 or 5",
             Dimension::Mass => "60g or 0.06kg",
             Dimension::Force => "26N or 500mN",
             Dimension::Stiffness => "36000N/m or 36kN/m",

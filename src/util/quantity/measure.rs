@@ -92,6 +92,10 @@ measures! {
     Current = OfCurrent, Dimension::Current;
     /// A speed in metres per second: `0.1mm/s`.
     Speed = OfSpeed, Dimension::Speed;
+    /// An acceleration in metres per second squared: `50mm/s^2`.
+    Acceleration = OfAcceleration, Dimension::Acceleration;
+    /// A jerk in metres per second cubed: `5m/s^3`.
+    Jerk = OfJerk, Dimension::Jerk;
     /// A ratio: `10%` or `0.1`.
     Ratio = OfRatio, Dimension::Ratio;
 }

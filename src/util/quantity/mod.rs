@@ -23,8 +23,9 @@ mod typed;
 
 pub use dimension::Dimension;
 pub use measure::{
-    AngularFrequency, Current, Frequency, Length, Measure, OfAngularFrequency, OfCurrent,
-    OfDimension, OfFrequency, OfLength, OfRatio, OfSpeed, OfTime, Ratio, Speed, Time, si,
+    Acceleration, AngularFrequency, Current, Frequency, Jerk, Length, Measure, OfAcceleration,
+    OfAngularFrequency, OfCurrent, OfDimension, OfFrequency, OfJerk, OfLength, OfRatio, OfSpeed,
+    OfTime, Ratio, Speed, Time, si,
 };
 pub use setting::OperatingPoint;
 pub use typed::{Quantity, QuantityError};

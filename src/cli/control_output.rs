@@ -1,0 +1,313 @@
+//! Plan and result of `bench control`: the analysis of the recording, and its text.
+
+use std::fmt;
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::analysis_output;
+use super::chirp::analysis_failed;
+use super::error::CliError;
+use super::margins::text as margins_text;
+use super::output::warn;
+use super::run_options::run_text;
+use super::table::labelled;
+use crate::config::Config;
+use crate::control::{Margins, Pole, StepMetrics};
+use crate::excitation::Extremes;
+use crate::experiment::{
+    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
+    abandon_on_signal, control_run, run_figures, tracking_metrics,
+};
+use crate::identify::SIGMAS_95;
+use crate::recording::Recording;
+use crate::report::run_pages::{
+    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
+};
+use crate::util::decimal::Decimal;
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    #[serde(flatten)]
+    pub run: RunSummary,
+    pub predicted: Predicted,
+    /// Shaping, prefilter and feedforward.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub command: Option<CommandSummary>,
+    /// Tracking, plots and page; of a swept reference `None`.
+    #[serde(flatten)]
+    pub result: ControlResult,
+    /// Extremes of a swept reference by the model.
+    pub expected: Option<Extremes>,
+    /// Responses of plant and loop, from a swept reference.
+    #[serde(flatten)]
+    pub made: Option<AnalysisOutputs>,
+}
+
+/// The loop by the model.
+#[derive(Debug, Serialize)]
+pub(super) struct Predicted {
+    #[serde(flatten)]
+    pub margins: Margins,
+    #[serde(flatten)]
+    pub step: Option<StepMetrics>,
+    /// Gain and phase at the frequency of a sine.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sine: Option<PredictedSine>,
+}
+
+/// What a recorded run shows, unless its reference is swept.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct ControlResult {
+    /// Settling, overshoot and steady state; `None` if the run ended before it.
+    pub measured: Option<TrackingMetrics>,
+    /// Largest values and heat, also of a run that tripped.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub whole_run: Option<RunFigures>,
+    /// Plots and page; `None` with `--no-report`.
+    #[serde(flatten)]
+    pub files: Option<ControlFiles>,
+}
+
+/// Analyses a recorded run and writes its report. Ctrl-C cancels it; the recording stays complete.
+pub(super) fn result(
+    path: &Path,
+    is_completed: bool,
+    no_report: bool,
+) -> Result<ControlResult, CliError> {
+    let recording = path.to_path_buf();
+    let work = move || match no_report {
+        true => figures_only(&recording),
+        false => analysed(&recording),
+    };
+    let result = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
+    let result = result.unwrap_or_else(|| Ok(ControlResult::default()));
+    let result = result.map_err(|error| analysis_failed(&error, path))?;
+    Ok(ControlResult {
+        measured: result.measured.filter(|_| is_completed),
+        ..result
+    })
+}
+
+fn figures_only(path: &Path) -> Result<ControlResult, CliError> {
+    let recording = Recording::open(path)?;
+    let plan = Plan::of(&recording)?;
+    let config = &plan.config;
+    Ok(ControlResult {
+        measured: tracking_metrics(&recording, &config.control, &config.servo)?,
+        whole_run: Some(run_figures(&recording, config, plan.motor.thermal_a2)?),
+        files: None,
+    })
+}
+
+fn analysed(path: &Path) -> Result<ControlResult, CliError> {
+    let recording = Recording::open(path)?;
+    let plan = Plan::of(&recording)?;
+    let run = control_run(&recording, &plan)?;
+    let report = ControlReport {
+        recording: &recording,
+        config: &plan.config,
+        run: &run,
+    };
+    let results = ResultFiles {
+        beside: path,
+        existing: ExistingFile::Replace,
+    };
+    Ok(ControlResult {
+        measured: run.tracking,
+        whole_run: Some(run.figures),
+        files: written(&report, results),
+    })
+}
+
+/// Writes plots and page. If this fails, for example on a full disk, the results of the run are still stored and printed.
+fn written(report: &ControlReport<'_>, results: ResultFiles<'_>) -> Option<ControlFiles> {
+    let files = ControlFiles::write(report, results);
+    files
+        .inspect_err(|error| warn(&[format!("no report: {error}")]))
+        .ok()
+}
+
+/// Margins, reference and predicted response, printed before the run.
+pub(super) struct PlanText<'a> {
+    pub plan: &'a Plan,
+    pub predicted: &'a Predicted,
+    pub poles: &'a [Pole],
+}
+
+impl fmt::Display for PlanText<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let config = &self.plan.config;
+        let margins = margins_text(config, &self.predicted.margins, self.poles);
+        f.write_str(&margins)?;
+        f.write_str(&labelled("reference", &reference_text(config)))?;
+        if let Some(command) = self.plan.command_summary() {
+            let text = command_text(command);
+            f.write_str(&labelled("command", text.trim_start_matches("; ")))?;
+        }
+        if let Some(step) = &self.predicted.step {
+            f.write_str(&labelled("predicted", &step_text(step)))?;
+        }
+        if let Some(sine) = &self.predicted.sine {
+            f.write_str(&labelled("predicted", &predicted_sine_text(sine)))?;
+        }
+        match &self.plan.predicted_extremes {
+            Some(extremes) => f.write_str(&travel_text(extremes)),
+            None => Ok(()),
+        }
+    }
+}
+
+fn travel_text(extremes: &Extremes) -> String {
+    let travel_um = extremes.travel_m * 1e6;
+    labelled(
+        "expected",
+        &format!("travel of {travel_um:.1} um by the model"),
+    )
+}
+
+/// The reference, and how long the loop is closed.
+pub(super) fn reference_text(config: &Config) -> String {
+    let duration_s = config.control.duration_s;
+    let reference = &config.control.reference;
+    if reference.is_swept() {
+        return config.swept_reference_text();
+    }
+    let reference = reference.design().describe();
+    format!("{reference}; the loop is closed for {duration_s} s")
+}
+
+/// Shaping, prefilter and feedforward, each after a semicolon.
+pub(super) fn command_text(command: &CommandSummary) -> String {
+    let mut parts = vec![shaper_text(command)];
+    if command.prefilter {
+        parts.push("low-pass".into());
+    }
+    if command.feedforward {
+        let preview_ms = Decimal(command.preview_s * 1e3);
+        parts.push(format!("feedforward with a preview of {preview_ms:.1} ms"));
+    }
+    let parts = parts.iter().filter(|part| !part.is_empty());
+    parts.map(|part| format!("; {part}")).collect()
+}
+
+fn shaper_text(command: &CommandSummary) -> String {
+    let kind = command.shaper;
+    match (command.settling_time_s, command.plants) {
+        (Some(settling_s), Some(plants)) => format!(
+            "minimum time: {:.1} ms to 2 % for {plants} plants, at most {:.2} A, overshoot {:.1} %",
+            settling_s * 1e3,
+            command.current_a.unwrap_or_default(),
+            Decimal(command.overshoot_percent.unwrap_or_default()),
+        ),
+        _ if command.modes.is_empty() => String::new(),
+        _ => {
+            let modes = command.modes.iter();
+            let modes: Vec<String> = modes
+                .map(|mode| format!("{:.1} rad/s", mode.omega_rad_s))
+                .collect();
+            let (modes, delay_ms) = (modes.join(", "), command.delay_s * 1e3);
+            format!("{kind} shaper for {modes}, delay {delay_ms:.1} ms")
+        }
+    }
+}
+
+fn step_text(step: &StepMetrics) -> String {
+    let settling = step
+        .settling_time_s
+        .map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
+    let overshoot = Decimal(step.overshoot_percent);
+    format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
+}
+
+fn predicted_sine_text(sine: &PredictedSine) -> String {
+    let phase_deg = Decimal(sine.phase_deg);
+    format!("gain {:.4}, phase {phase_deg:.2} deg", sine.gain)
+}
+
+/// The result of the run.
+pub(super) fn text(report: &Report, config: &Config) -> String {
+    let run = run_text(&report.run, config);
+    match &report.made {
+        Some(made) => run + &analysis_output::text(made) + &page_text(incomplete_page(report)),
+        None => result_text(&report.result, &run),
+    }
+}
+
+/// The page of a swept run that did not come to its end; that of an analysed run is listed with its plots.
+fn incomplete_page(report: &Report) -> Option<&String> {
+    let made = report.made.as_ref().filter(|_| !report.run.is_completed());
+    made.and_then(|made| made.pages.report.as_ref())
+}
+
+fn page_text(page: Option<&String>) -> String {
+    page.map_or(String::new(), |page| labelled("report", page))
+}
+
+fn result_text(result: &ControlResult, run: &str) -> String {
+    let measured = measured_text(result.measured.as_ref());
+    let figures = result.whole_run.as_ref().map(figures_text);
+    let page = result
+        .files
+        .as_ref()
+        .and_then(|files| files.report.as_ref());
+    measured + &figures.unwrap_or_default() + run + &page_text(page)
+}
+
+fn measured_text(measured: Option<&TrackingMetrics>) -> String {
+    let Some(measured) = measured else {
+        return labelled(
+            "measured",
+            "no result: the run ended before the steady state",
+        );
+    };
+    let parts = match &measured.sine {
+        Some(sine) => vec![sine_text(sine), residual_text(sine, measured)],
+        None => {
+            let step = measured.step.as_ref().map(step_text);
+            step.into_iter().chain([steady_text(measured)]).collect()
+        }
+    };
+    labelled("measured", &parts.join("; "))
+}
+
+fn steady_text(measured: &TrackingMetrics) -> String {
+    format!(
+        "steady state: mean error {:+.4} um, sigma {:.4} um",
+        Decimal(measured.steady_state_mean_error_m * 1e6),
+        measured.steady_state_sigma_m * 1e6
+    )
+}
+
+fn sine_text(sine: &SineResponse) -> String {
+    let half_width = |sigma: Option<f64>, digits: usize| {
+        sigma.map_or(String::new(), |sigma| {
+            format!(" +- {:.digits$}", SIGMAS_95 * sigma)
+        })
+    };
+    format!(
+        "gain {:.4}{}, phase {:.2}{} deg",
+        sine.gain,
+        half_width(sine.gain_sigma, 4),
+        Decimal(sine.phase_deg),
+        half_width(sine.phase_sigma_deg, 2),
+    )
+}
+
+/// What the sine leaves, and the error that follows from its gain and phase.
+fn residual_text(sine: &SineResponse, measured: &TrackingMetrics) -> String {
+    let (residual_um, error_um) = (sine.residual_rms_m * 1e6, measured.steady_state_rms_m * 1e6);
+    format!("beside the sine {residual_um:.4} um rms; error with it {error_um:.4} um rms")
+}
+
+fn figures_text(figures: &RunFigures) -> String {
+    let heat_percent = 100.0 * (figures.thermal_peak_a / figures.thermal_limit_a).powi(2);
+    let text = format!(
+        "error at most {:.2} um; current at most {:.3} A, rms {:.3} A; heat of the motor at most {heat_percent:.1} % of its limit",
+        figures.peak_error_m * 1e6,
+        figures.peak_current_a,
+        figures.rms_current_a,
+    );
+    labelled("whole run", &text)
+}
