@@ -3,6 +3,7 @@ use bench::control::{ControlLaw, LawInput};
 use bench::excitation::command::{CommandSource, LoopCommand};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::{Control, Program, ProgramInput};
+use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
 use bench::rt::tuning::{Factors, Tune};
 
@@ -54,7 +55,7 @@ fn interlocks_judge_the_sum_of_law_and_feedforward() {
         let has_tripped = bench
             .trips()
             .iter()
-            .any(|trip| matches!(trip, Trip::PeakCurrent { .. }));
+            .any(|trip| matches!(trip.kind, EventKind::Trip(Trip::PeakCurrent { .. })));
         assert_eq!(has_tripped, trips);
         assert!(records.iter().all(|record| record.command_a.abs() < 9.99));
     }
