@@ -10,13 +10,14 @@ pub(super) use super::control_options::Args;
 use super::error::CliError;
 use super::margins::text as margins_text;
 use super::outcome::Outcome;
-use super::output::{print_result, print_text};
+use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{close, exit, run_text};
 use super::table::labelled;
 use crate::config::{Config, Purpose};
 use crate::control::{ClosedLoop, Margins, Pole, StepMetrics, listed_poles};
 use crate::excitation::Extremes;
+use crate::experiment::certificate::{Evidence, require_evidence};
 use crate::experiment::{
     MotorSummary, Plan, PlanLimits, Run, RunSummary, TrackingMetrics, closed_loop, predicted_step,
     require_margins, tracking_metrics,
@@ -34,6 +35,8 @@ struct Report {
     measured: Option<TrackingMetrics>,
     /// Extremes of a swept reference by the model.
     expected: Option<Extremes>,
+    /// The certificate with which the loop closed, and what is wrong with it.
+    evidence: Evidence,
     /// Responses of plant and loop, from a swept reference.
     #[serde(flatten)]
     made: Option<AnalysisOutputs>,
@@ -51,18 +54,20 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
-    require_margins(&config, &margins, args.run.stage(&config))?;
+    let stage = args.run.stage(&config);
+    require_margins(&config, &margins, stage)?;
     let predicted = predicted(margins, &config, &closed_loop);
-    let plan = Plan::control(config.clone())?;
+    let plan = Plan::control(config.clone())?.with_override(args.override_reason.clone());
+    let evidence = require_evidence(&plan, stage, None)?;
     if args.plan {
-        return print_plan(args, &plan, predicted);
+        return print_plan(args, &plan, predicted, evidence);
     }
     if !args.bench.json {
         let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
-        print_text(&plan_text(&plan, &predicted, &poles))?;
+        print_text(&(plan_text(&plan, &predicted, &poles) + &evidence_text(&evidence)))?;
     }
     let mut run = args.run.run(&plan, "control")?;
-    let report = report(&mut run, &plan, predicted)?;
+    let report = report(&mut run, &plan, predicted, evidence)?;
     close(run, &report, args.bench.json, &text(&report, &config))?;
     Ok(match &report.made {
         Some(made) => outcome(&report.run, made),
@@ -79,10 +84,16 @@ struct PlanReport {
     limits: PlanLimits,
     motor: Option<MotorSummary>,
     predicted: Predicted,
+    evidence: Evidence,
 }
 
 /// Prints what the run would do.
-fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome, CliError> {
+fn print_plan(
+    args: &Args,
+    plan: &Plan,
+    predicted: Predicted,
+    evidence: Evidence,
+) -> Result<Outcome, CliError> {
     let config = &plan.config;
     let report = PlanReport {
         reference: reference_text(config),
@@ -90,14 +101,16 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
         limits: PlanLimits::of(config),
         motor: args.run.motor_summary(plan)?,
         predicted,
+        evidence,
     };
+    warn(&report.evidence.defects);
     print_result(args.bench.json, &report, |report| {
         plan_output::control_text(
             &report.reference,
             report.expected.as_ref(),
             &report.limits,
             report.motor.as_ref(),
-        )
+        ) + &evidence_text(&report.evidence)
     })?;
     Ok(Outcome::Done)
 }
@@ -112,7 +125,12 @@ fn predicted(margins: Margins, config: &Config, closed_loop: &ClosedLoop) -> Pre
 }
 
 /// The result of a run: tracking, or responses of a swept reference.
-fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, CliError> {
+fn report(
+    run: &mut Run,
+    plan: &Plan,
+    predicted: Predicted,
+    evidence: Evidence,
+) -> Result<Report, CliError> {
     let summary = RunSummary::of(run)?;
     let is_swept = plan.config.control.reference.is_swept();
     let measured = match summary.is_completed() && !is_swept {
@@ -128,6 +146,7 @@ fn report(run: &mut Run, plan: &Plan, predicted: Predicted) -> Result<Report, Cl
         predicted,
         measured,
         expected: plan.predicted_extremes,
+        evidence,
         made,
     })
 }
@@ -154,6 +173,20 @@ fn plan_text(plan: &Plan, predicted: &Predicted, poles: &[Pole]) -> String {
         .as_ref()
         .map_or(String::new(), travel_text);
     margins + &reference + &step + &travel
+}
+
+/// The certificate and the margin that it proves, and an override.
+fn evidence_text(evidence: &Evidence) -> String {
+    let certificate = evidence.certificate.as_ref().map_or(String::new(), |file| {
+        let margin = evidence
+            .modulus_margin_lower
+            .map_or("no modulus margin by its response".into(), |margin| {
+                format!("modulus margin at least {margin:.3} by its response (95 %)")
+            });
+        labelled("evidence", &format!("{file}: {margin}"))
+    });
+    let reason = evidence.override_reason.as_ref();
+    certificate + &reason.map_or(String::new(), |reason| labelled("override", reason))
 }
 
 fn travel_text(extremes: &Extremes) -> String {

@@ -11,6 +11,7 @@ use super::help::{default_value, with_setting};
 use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
+use crate::experiment::certificate::OverrideReason;
 use crate::util::quantity::{Frequency, Length, Speed, Time};
 
 /// Height of a step or ramp and amplitude of a sine without `--amplitude`.
@@ -58,6 +59,14 @@ pub(super) struct Args {
     /// Time with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, help = duration_help())]
     duration: Option<Time>,
+    /// Certificate of a chirp (`*_certificate.json`): the evidence that devices, load and controller belong together. On devices a
+    /// loop closes only with one [default: control.certificate; none]
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<String>,
+    /// Close the loop on devices although the certificate is missing or does not fit; the reason (at least 10 characters) is
+    /// recorded. A loop that is unstable by the model is refused nevertheless
+    #[arg(long = "override", value_name = "REASON")]
+    pub override_reason: Option<OverrideReason>,
     /// Only print what the run would do: margins, travel, current, heat, duration; no motion
     #[arg(long)]
     pub plan: bool,
@@ -169,6 +178,7 @@ impl Args {
             given(SPEED_KEY, "--speed", self.speed.as_ref()),
         ];
         settings.extend(options.into_iter().flatten());
+        settings.extend(self.certificate.as_deref().map(certificate_setting));
         settings.extend(self.run.seed.setting());
         Ok(settings)
     }
@@ -195,6 +205,11 @@ impl Args {
         }
         Ok(())
     }
+}
+
+fn certificate_setting(file: &str) -> OptionSetting {
+    let option = format!("--certificate {file}");
+    OptionSetting::new("control.certificate", file, option)
 }
 
 fn unused(option: &str, kinds: &str) -> CliError {

@@ -64,6 +64,11 @@ impl ClosedLoop {
         self.plant.response(omega_rad_s)
     }
 
+    /// C in amperes per metre at z = exp(j w T).
+    pub fn sampled_controller(&self, omega_rad_s: f64) -> Complex<f64> {
+        self.linear.response(self.z(omega_rad_s))
+    }
+
     /// L = P C of the sampled loop.
     pub fn sampled_loop(&self, omega_rad_s: f64) -> Complex<f64> {
         self.plant.response(omega_rad_s) * self.linear.response(self.z(omega_rad_s))

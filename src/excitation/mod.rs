@@ -24,6 +24,7 @@ mod prbs;
 mod reference;
 mod repeated;
 mod shape;
+mod stage_check;
 mod staircase;
 mod stepped_sine;
 mod sweep;
@@ -45,6 +46,7 @@ pub use reference::{
     ReferenceSettings, SineReference, StepOfReference, StepReference, SweptReference,
 };
 pub use shape::{CurrentLimit, MAX_POINTS, shaped_amplitude};
+pub use stage_check::{StageCheckSettings, StageCheckSignal, Tone};
 pub use staircase::{Staircase, StaircaseSteps};
 pub use stepped_sine::{Spacing, SteppedSineSettings};
 pub use sweep::{ChirpSettings, Sweep, SweptSine};
