@@ -9,4 +9,5 @@ mod frf_noise;
 mod joint_estimate;
 mod modes;
 mod residual_monitor;
+mod stage_check;
 mod verdicts;
