@@ -8,6 +8,7 @@ use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
 use crate::experiment::analyse_with_progress;
+use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use crate::util::decimal::Decimal;
@@ -57,8 +58,10 @@ pub(super) fn text(outputs: &AnalysisOutputs) -> String {
         closed.unwrap_or_default(),
         delay_text(outputs),
         linearity.unwrap_or_default(),
+        certificate_text(outputs.certificate.as_deref()),
         pages_text(&outputs.pages),
         modal_output::text(&outputs.summary),
+        outputs.signs.as_ref().map_or(String::new(), signs_text),
     ]
     .concat()
 }
@@ -68,6 +71,23 @@ pub(super) fn response_text(frf_csv: &str, frequencies: usize, coherence: f64) -
     format!(
         "  response   {frf_csv}\n             {frequencies} frequencies, median coherence {coherence:.4}"
     )
+}
+
+fn certificate_text(path: Option<&str>) -> String {
+    path.map_or(String::new(), |path| format!("  evidence   {path}\n"))
+}
+
+/// A warning in large letters, if the signs of the residues differ from those of the model.
+fn signs_text(signs: &SignCheck) -> String {
+    if !signs.differ() {
+        return String::new();
+    }
+    let (line, measured, model) = ("*".repeat(80), &signs.measured, &signs.model);
+    let heading = format!(
+        "THE SIGNS OF THE RESIDUES DIFFER FROM THE MODEL: MEASURED {measured}, MODEL {model}"
+    );
+    let text = wrap(&heading, 2) + &wrap(SIGNS_DIFFER, 2);
+    format!("\n{line}\n{text}{line}\n")
 }
 
 /// The delay, and the file of the response without it.

@@ -7,12 +7,13 @@ pub(super) use super::control_options::Args;
 use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
 use super::error::CliError;
 use super::outcome::Outcome;
-use super::output::{print_result, print_text};
+use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{close, exit};
 use crate::config::Purpose;
 use crate::control::{ClosedLoop, Margins, listed_poles};
 use crate::excitation::Extremes;
+use crate::experiment::certificate::{Evidence, require_evidence};
 use crate::experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
@@ -22,11 +23,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
-    require_margins(&config, &margins, args.run.stage(&config))?;
-    let plan = Plan::control(config.clone())?;
+    let stage = args.run.stage(&config);
+    require_margins(&config, &margins, stage)?;
+    let plan = Plan::control(config.clone())?.with_override(args.override_reason.clone());
+    let evidence = require_evidence(&plan, stage, None)?;
     let predicted = predicted(margins, &plan, &closed_loop);
     if args.plan {
-        return print_plan(args, &plan, predicted);
+        return print_plan(args, &plan, predicted, evidence);
     }
     if !args.bench.json {
         let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
@@ -34,11 +37,12 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             plan: &plan,
             predicted: &predicted,
             poles: &poles,
+            evidence: &evidence,
         };
         print_text(&text.to_string())?;
     }
     let mut run = args.run.run(&plan, "control")?;
-    let report = report(&mut run, &plan, predicted, args.no_report)?;
+    let report = report(&mut run, &plan, predicted, evidence, args.no_report)?;
     let text = control_output::text(&report, &config);
     close(run, &report, args.bench.json, &text)?;
     Ok(match &report.made {
@@ -59,10 +63,16 @@ struct PlanReport {
     /// Shaping, prefilter and feedforward.
     #[serde(skip_serializing_if = "Option::is_none")]
     command: Option<CommandSummary>,
+    evidence: Evidence,
 }
 
 /// Prints what the run would do.
-fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome, CliError> {
+fn print_plan(
+    args: &Args,
+    plan: &Plan,
+    predicted: Predicted,
+    evidence: Evidence,
+) -> Result<Outcome, CliError> {
     let config = &plan.config;
     let report = PlanReport {
         reference: control_output::reference_text(config),
@@ -71,7 +81,9 @@ fn print_plan(args: &Args, plan: &Plan, predicted: Predicted) -> Result<Outcome,
         motor: args.run.motor_summary(plan)?,
         predicted,
         command: plan.command_summary().cloned(),
+        evidence,
     };
+    warn(&report.evidence.defects);
     print_result(args.bench.json, &report, |report| {
         let command = report.command.as_ref().map(control_output::command_text);
         plan_output::control_text(
@@ -102,6 +114,7 @@ fn report(
     run: &mut Run,
     plan: &Plan,
     predicted: Predicted,
+    evidence: Evidence,
     no_report: bool,
 ) -> Result<Report, CliError> {
     let summary = RunSummary::of(run)?;
@@ -124,6 +137,7 @@ fn report(
         command: plan.command_summary().cloned(),
         result,
         expected: plan.predicted_extremes,
+        evidence,
         made,
     })
 }

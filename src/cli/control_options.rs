@@ -11,6 +11,7 @@ use super::help::{default_value, with_setting};
 use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
+use crate::experiment::certificate::OverrideReason;
 use crate::util::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
 
 /// A setting of a reference without its option.
@@ -101,6 +102,14 @@ pub(super) struct Args {
     /// Add the current that moves the model along the reference (inverse of the plant, with preview)
     #[arg(long)]
     feedforward: bool,
+    /// Certificate of a chirp (`*_certificate.json`): the evidence that devices, load and controller belong together. On devices a
+    /// loop closes only with one [default: control.certificate; none]
+    #[arg(long, value_name = "FILE")]
+    certificate: Option<String>,
+    /// Close the loop on devices although the certificate is missing or does not fit; the reason (at least 10 characters) is
+    /// recorded. A loop that is unstable by the model is refused nevertheless
+    #[arg(long = "override", value_name = "REASON")]
+    pub override_reason: Option<OverrideReason>,
     /// Only print what the run would do: margins, travel, current, heat, duration; no motion
     #[arg(long)]
     pub plan: bool,
@@ -281,6 +290,7 @@ impl Args {
         ];
         settings.extend(options.into_iter().flatten());
         settings.extend(self.command_settings());
+        settings.extend(self.certificate.as_deref().map(certificate_setting));
         settings.extend(self.run.seed.setting());
         Ok(settings)
     }
@@ -400,4 +410,9 @@ impl Args {
 fn kind_setting(key: &str, kind: &str, option: String) -> OptionSetting {
     let table = Table::from_iter([("kind".to_string(), Value::String(kind.into()))]);
     OptionSetting::new(key, table, option)
+}
+
+fn certificate_setting(file: &str) -> OptionSetting {
+    let option = format!("--certificate {file}");
+    OptionSetting::new("control.certificate", file, option)
 }

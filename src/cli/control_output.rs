@@ -15,6 +15,7 @@ use super::table::labelled;
 use crate::config::Config;
 use crate::control::{Margins, Pole, StepMetrics};
 use crate::excitation::Extremes;
+use crate::experiment::certificate::Evidence;
 use crate::experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
@@ -40,6 +41,8 @@ pub(super) struct Report {
     pub result: ControlResult,
     /// Extremes of a swept reference by the model.
     pub expected: Option<Extremes>,
+    /// The certificate with which the loop closed, and what is wrong with it.
+    pub evidence: Evidence,
     /// Responses of plant and loop, from a swept reference.
     #[serde(flatten)]
     pub made: Option<AnalysisOutputs>,
@@ -134,6 +137,7 @@ pub(super) struct PlanText<'a> {
     pub plan: &'a Plan,
     pub predicted: &'a Predicted,
     pub poles: &'a [Pole],
+    pub evidence: &'a Evidence,
 }
 
 impl fmt::Display for PlanText<'_> {
@@ -152,11 +156,25 @@ impl fmt::Display for PlanText<'_> {
         if let Some(sine) = &self.predicted.sine {
             f.write_str(&labelled("predicted", &predicted_sine_text(sine)))?;
         }
-        match &self.plan.predicted_extremes {
-            Some(extremes) => f.write_str(&travel_text(extremes)),
-            None => Ok(()),
+        if let Some(extremes) = &self.plan.predicted_extremes {
+            f.write_str(&travel_text(extremes))?;
         }
+        f.write_str(&evidence_text(self.evidence))
     }
+}
+
+/// The certificate and the margin that it proves, and an override.
+fn evidence_text(evidence: &Evidence) -> String {
+    let certificate = evidence.certificate.as_ref().map_or(String::new(), |file| {
+        let margin = evidence
+            .modulus_margin_lower
+            .map_or("no modulus margin by its response".into(), |margin| {
+                format!("modulus margin at least {margin:.3} by its response (95 %)")
+            });
+        labelled("evidence", &format!("{file}: {margin}"))
+    });
+    let reason = evidence.override_reason.as_ref();
+    certificate + &reason.map_or(String::new(), |reason| labelled("override", reason))
 }
 
 fn travel_text(extremes: &Extremes) -> String {

@@ -89,6 +89,9 @@ fn check_kind(kind: RunKind, path: &Path) -> Result<(), CliError> {
         RunKind::Calibrate => {
             "is the recording of static steps of `bench calibrate`; choose a recording of `bench chirp` or `bench control`"
         }
+        RunKind::StageCheck => {
+            "is the check of the stage before a closed loop, which is too short for a response; choose a recording of `bench chirp` or `bench control`"
+        }
         RunKind::Quiet => {
             "is a run of `bench campaign` without current, which only contains the rest position of the stage; \
              choose a recording of `bench chirp` or `bench control`"

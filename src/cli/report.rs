@@ -119,7 +119,7 @@ fn compared_run(path: &Path) -> Result<ComparedRun, CliError> {
     let plan = Plan::of(&recording)?;
     let step = match plan.kind {
         RunKind::Control => step_response(&recording, &plan)?,
-        RunKind::Chirp | RunKind::Calibrate | RunKind::Quiet => None,
+        RunKind::Chirp | RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => None,
     };
     let stem = path.file_stem().unwrap_or_default();
     Ok(ComparedRun {

@@ -18,6 +18,13 @@ pub struct ControlSettings {
     /// Time with zero current before the loop closes, in seconds. The mean position over this time is the rest position; the reference is relative to it.
     #[schemars(range(min = 0.001, max = 1000.0))]
     pub settle_s: f64,
+    /// Certificate of a chirp (`STEM_certificate.json`), with which the loop closes. On devices a closed loop needs one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<String>,
+    /// Days for which a certificate is valid, from the start of its chirp; written into each new certificate.
+    #[serde(default = "default_certificate_valid_days")]
+    #[schemars(range(min = 0.0, max = 100000.0))]
+    pub certificate_valid_days: f64,
     /// Duration of the run after the loop has closed, in seconds.
     #[schemars(range(min = 0.001, max = 1000000.0))]
     pub duration_s: f64,
@@ -42,4 +49,9 @@ impl ControlSettings {
     pub fn has_command(&self) -> bool {
         !(self.shaper.is_none() && self.prefilter.is_none() && self.feedforward.is_none())
     }
+}
+
+/// Recordings of older versions do not have the setting.
+fn default_certificate_valid_days() -> f64 {
+    30.0
 }

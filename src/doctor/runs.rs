@@ -4,6 +4,7 @@ use super::finding::{Finding, Subject};
 use crate::config::Config;
 use crate::control::Margins;
 use crate::excitation::Excitation;
+use crate::experiment::certificate::require_evidence;
 use crate::experiment::{
     ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
 };
@@ -16,6 +17,8 @@ pub struct RunChecks {
     pub chirp: Result<f64, String>,
     /// The margins of the loop that `bench control` closes, or why it refuses.
     pub control: Result<Margins, String>,
+    /// Why the certificate does not allow to close the loop on these devices; `None` if it does.
+    pub evidence: Option<String>,
 }
 
 impl RunChecks {
@@ -23,7 +26,9 @@ impl RunChecks {
     /// refused.
     pub fn of(chirp: Result<Config, String>, control: Result<Config, String>) -> RunChecks {
         let text = |error: ExperimentError| error.to_string();
+        let evidence = control.as_ref().ok().and_then(evidence_defect);
         RunChecks {
+            evidence,
             chirp: chirp.and_then(|config| predicted_travel_m(&config).map_err(text)),
             control: control.and_then(|config| loop_margins(&config).map_err(text)),
         }
@@ -32,6 +37,13 @@ impl RunChecks {
 
 fn predicted_travel_m(config: &Config) -> Result<f64, ExperimentError> {
     Ok(predicted_extremes(config)?.travel_m)
+}
+
+/// Why `bench control` would refuse the certificate, apart from what the check of the loop refuses.
+fn evidence_defect(config: &Config) -> Option<String> {
+    let plan = Plan::control(config.clone()).ok()?;
+    let required = require_evidence(&plan, Stage::of(config), None);
+    required.err().map(|error| error.to_string())
 }
 
 fn loop_margins(config: &Config) -> Result<Margins, ExperimentError> {
@@ -65,11 +77,14 @@ pub fn kinds(config: &Config) -> Finding {
 }
 
 /// Evaluates the checks; `min_modulus_margin` is the configured limit.
-pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> [Finding; 2] {
-    [
+pub fn findings(checks: &RunChecks, min_modulus_margin: f64) -> Vec<Finding> {
+    let both = [
         chirp_finding(checks),
         control_finding(checks, min_modulus_margin),
-    ]
+    ];
+    let evidence = checks.evidence.as_ref();
+    let evidence = evidence.map(|why| refused(Subject::Control, why, "repeat `bench chirp`"));
+    both.into_iter().chain(evidence).collect()
 }
 
 fn chirp_finding(checks: &RunChecks) -> Finding {
@@ -138,8 +153,9 @@ mod tests {
         }
     }
 
-    fn severities(checks: &RunChecks) -> [Severity; 2] {
-        findings(checks, 0.4).map(|finding| finding.severity)
+    fn severities(checks: &RunChecks) -> Vec<Severity> {
+        let findings = findings(checks, 0.4).into_iter();
+        findings.map(|finding| finding.severity).collect()
     }
 
     #[test]
@@ -147,16 +163,23 @@ mod tests {
         let good = RunChecks {
             chirp: Ok(1e-4),
             control: Ok(margins(true)),
+            evidence: None,
         };
         assert_eq!(severities(&good), [Severity::Ok, Severity::Ok]);
         let why = "refused: margin 0.3; choose a controller; nothing was moved";
         let refused = RunChecks {
             control: Err(why.into()),
-            ..good
+            ..good.clone()
         };
         assert_eq!(severities(&refused), [Severity::Ok, Severity::Failure]);
         let remedy = findings(&refused, 0.4)[1].remedy.clone();
         assert_eq!(remedy.as_deref(), Some("choose a controller"));
+        let without_certificate = RunChecks {
+            evidence: Some("refused: no certificate; run `bench chirp`; nothing was moved".into()),
+            ..good
+        };
+        let expected = [Severity::Ok, Severity::Ok, Severity::Failure];
+        assert_eq!(severities(&without_certificate), expected);
     }
 
     #[test]
@@ -164,6 +187,7 @@ mod tests {
         let checks = RunChecks {
             chirp: Err("too far".into()),
             control: Ok(margins(false)),
+            evidence: None,
         };
         assert_eq!(severities(&checks), [Severity::Failure, Severity::Warning]);
         let remedy = findings(&checks, 0.0)[0].remedy.clone().unwrap();

@@ -25,6 +25,7 @@ mod prbs;
 mod reference;
 mod repeated;
 mod shape;
+mod stage_check;
 mod staircase;
 mod stepped_sine;
 mod sweep;
@@ -47,6 +48,7 @@ pub use reference::{
     SquareReference, StepOfReference, StepReference, SweptReference, TriangleReference,
 };
 pub use shape::{CurrentLimit, MAX_POINTS, shaped_amplitude};
+pub use stage_check::{StageCheckSettings, StageCheckSignal, Tone};
 pub use staircase::{Staircase, StaircaseSteps};
 pub use stepped_sine::{Spacing, SteppedSineSettings};
 pub use sweep::{ChirpSettings, Sweep, SweptSine};

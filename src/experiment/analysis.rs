@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::analysis_error::AnalysisError;
+use super::certificate::SignCheck;
 use super::closed_loop;
 use super::ending::Ending;
 use super::plan::{KIND, RunKind};
@@ -45,6 +46,8 @@ pub struct Analysis {
     pub filled_ticks: u64,
     /// The fitted modes, or why none can be fitted.
     pub fit: Result<ModalFit, FitError>,
+    /// The signs of the residues beside those of the model; `None` if no modes can be fitted.
+    pub signs: Option<SignCheck>,
     /// The verdict on CNMP zeros.
     pub verdict: Verdict,
     /// The verdict covers modes and zeros up to here, in rad/s.
@@ -206,6 +209,8 @@ fn with_modes(
     let verdict = judge(&fit, &estimate.frf_data, &chain, up_to_rad_s, Some(&modal))?;
     let plant = LoopPlant::with_mean_age(config, &modal.modes);
     let frf = estimate.frf;
+    let fitted = fit.as_ref().ok();
+    let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, band_hz(&frf)));
     let model = model_response(&plant, &frf.frequency_hz);
     Ok(Analysis {
         excess_delay: excess_delay(&frf, &model, up_to_rad_s / TAU),
@@ -214,6 +219,7 @@ fn with_modes(
         model,
         filled_ticks,
         fit,
+        signs,
         verdict,
         judged_up_to_rad_s: up_to_rad_s,
         closed: estimate.closed,
@@ -232,6 +238,13 @@ fn fit_modes(
         Err(FitError::Cancelled) => Err(AnalysisError::Cancelled),
         fit => Ok(fit),
     }
+}
+
+/// Lowest and highest frequency of a response in hertz.
+fn band_hz(frf: &Frf) -> (f64, f64) {
+    let ends = [frf.frequency_hz.first(), frf.frequency_hz.last()];
+    let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
+    (from_hz, to_hz)
 }
 
 fn highest_mode_rad_s(modal: &ModalModel) -> f64 {
@@ -279,6 +292,16 @@ fn visible_modes(modal: &ModalModel, up_to_rad_s: f64) -> usize {
     let is_visible =
         |(mode, sign): &(&Mode, Sign)| *sign != Sign::Hidden && mode.omega_rad_s <= up_to_rad_s;
     modes.filter(is_visible).count()
+}
+
+/// Current and position of a run in open loop at regular times, from its first tick.
+///
+/// # Errors
+/// When the recording cannot be read, or lacks too many ticks.
+pub(super) fn run_signals(recording: &Recording, rate_hz: f64) -> Result<Signals, AnalysisError> {
+    let mut no_progress = |_, _| ControlFlow::Continue(());
+    let read = read_signals(recording, rate_hz, false, &mut no_progress)?;
+    Ok(read.loop_signals.signals)
 }
 
 /// Reads every tick of the run, or only those with the loop closed.

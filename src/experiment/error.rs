@@ -1,12 +1,14 @@
 //! Why an experiment was refused or failed.
 
 use super::analysis_error::AnalysisError;
+use super::certificate::CertificateError;
 use super::error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 use super::loop_check::MarginError;
 use super::measured_frf::FrfError;
 use super::motor_error::MotorError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
+use super::stage_check::StageCheckError;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::excitation::ExcitationError;
@@ -24,6 +26,12 @@ pub enum ExperimentError {
     /// The stability margin of the loop is too small.
     #[error(transparent)]
     Margin(#[from] MarginError),
+    /// The certificate does not allow to close the loop.
+    #[error("refused: {0}, or add --override \"REASON\"; nothing was moved")]
+    Certificate(#[from] CertificateError),
+    /// The stage does not agree with the certificate.
+    #[error("refused before the loop closed: {0}, or add --override \"REASON\"")]
+    StageCheck(#[from] StageCheckError),
     /// The excitation would trip an interlock by the model.
     #[error(transparent)]
     Excitation(#[from] ExcitationError),
@@ -97,6 +105,7 @@ impl ExperimentError {
     pub fn is_failure(&self) -> bool {
         match self {
             ExperimentError::Run(_)
+            | ExperimentError::StageCheck(_)
             | ExperimentError::Recording(_)
             | ExperimentError::Analysis(_)
             | ExperimentError::Failed(_)
@@ -105,6 +114,7 @@ impl ExperimentError {
             ExperimentError::Frf(error) => error.is_failure(),
             ExperimentError::Plan(_)
             | ExperimentError::Margin(_)
+            | ExperimentError::Certificate(_)
             | ExperimentError::Excitation(_)
             | ExperimentError::Plant(_)
             | ExperimentError::Devices(_)
@@ -119,6 +129,9 @@ impl ExperimentError {
         match self {
             ExperimentError::Plan(PlanError::Config(_)) => ErrorKind::Configuration,
             ExperimentError::Plan(PlanError::Controller(_)) => ErrorKind::Controller,
+            ExperimentError::Plan(PlanError::Certificate(_))
+            | ExperimentError::Certificate(_)
+            | ExperimentError::StageCheck(_) => ErrorKind::Certificate,
             ExperimentError::Plan(_) | ExperimentError::Excitation(_) => ErrorKind::Plan,
             ExperimentError::Motor(error) => motor_kind(error),
             ExperimentError::Margin(_) => ErrorKind::Margin,

@@ -24,6 +24,8 @@ pub enum ErrorKind {
     Calibration,
     /// The stability margin of the loop is too small.
     Margin,
+    /// The certificate cannot be used, or does not allow to close the loop.
+    Certificate,
     /// A recording cannot be written or read.
     Recording,
     /// The data do not allow the analysis.

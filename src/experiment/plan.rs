@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
+use super::certificate::{CertificateText, OverrideReason};
 use super::command_plan::{self, CommandPlan, CommandSummary};
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
@@ -14,7 +15,7 @@ use super::swept_reference;
 use crate::config::{self, CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::command::CommandFilter;
-use crate::excitation::{Extremes, Staircase, ZeroCurrent};
+use crate::excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
 use crate::model::plant::{self, ModalModel};
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, Correction};
@@ -23,11 +24,19 @@ use crate::rt::program::{Control, Excite, Program};
 /// Name of the attachment with the controller.
 const CONTROLLER: &str = "controller.toml";
 /// Name of the attachment with the calibration in use.
-const CALIBRATION: &str = "calibration.toml";
+pub(super) const CALIBRATION: &str = "calibration.toml";
 /// Name of the attachment with the points of the reference.
 const REFERENCE: &str = "reference.csv";
 /// Name of the attachment with the filters of the command.
 const COMMAND: &str = "command.toml";
+/// Name of the attachment with the certificate.
+const CERTIFICATE: &str = "certificate.json";
+/// Name of the attachment with the frequency response of the certificate.
+const CERTIFICATE_FRF: &str = "certificate_frf.csv";
+/// Name of the attachment with the settings of a stage check.
+const STAGE_CHECK: &str = "stage_check.toml";
+/// Metadata key of [`Plan::override_reason`].
+pub(super) const OVERRIDE: &str = "override";
 /// Metadata key of the kind of run.
 pub(super) const KIND: &str = "run";
 /// Metadata key of [`Plan::ramp_ticks`]. Recordings of older versions do not have it: the current ended in one step.
@@ -51,14 +60,17 @@ pub enum RunKind {
     Calibrate,
     /// No current, to measure the rest position.
     Quiet,
+    /// A small step with two tones, open loop, before a loop closes.
+    StageCheck,
 }
 
 impl RunKind {
-    const ALL: [RunKind; 4] = [
+    const ALL: [RunKind; 5] = [
         RunKind::Chirp,
         RunKind::Control,
         RunKind::Calibrate,
         RunKind::Quiet,
+        RunKind::StageCheck,
     ];
 
     /// The name in file names and metadata.
@@ -68,6 +80,7 @@ impl RunKind {
             RunKind::Control => "control",
             RunKind::Calibrate => "calibrate",
             RunKind::Quiet => "quiet",
+            RunKind::StageCheck => "stage-check",
         }
     }
 }
@@ -87,6 +100,12 @@ pub struct Plan {
     pub devices: Vec<(&'static str, String)>,
     /// The thermal state of the motor with which the interlocks start.
     pub motor: MotorStart,
+    /// The certificate of a closed loop, if one is configured.
+    pub certificate: Option<CertificateText>,
+    /// Why an operator closes the loop without a valid certificate.
+    pub override_reason: Option<OverrideReason>,
+    /// Step and tones of a stage check.
+    pub stage_check: Option<StageCheckSettings>,
     /// Extremes of a swept reference by the model.
     pub predicted_extremes: Option<Extremes>,
     /// Text of the file of the reference, if it has one.
@@ -119,6 +138,9 @@ impl Plan {
             calibration: None,
             devices: Vec::new(),
             motor: MotorStart::default(),
+            certificate: None,
+            override_reason: None,
+            stage_check: None,
             predicted_extremes: None,
             reference: None,
             command: None,
@@ -133,10 +155,13 @@ impl Plan {
         let is_swept = config.control.reference.is_swept();
         let reference = config.control.reference.design().text()?;
         let command = command_plan::planned(&config, &controller)?;
+        let certificate = config.control.certificate.as_deref();
+        let certificate = certificate.map(CertificateText::read).transpose()?;
         let plan = Plan {
             command,
             controller: Some(controller),
             reference,
+            certificate,
             predicted_extremes,
             ..Plan::excitation(RunKind::Control, config)
         };
@@ -146,6 +171,26 @@ impl Plan {
             reference_check::predicted(&plan.planned_reference(), controller)?;
         }
         Ok(plan)
+    }
+
+    /// The check of the stage before this plan, with the same rig, calibration and evidence.
+    pub(super) fn stage_check(&self, settings: StageCheckSettings) -> Plan {
+        Plan {
+            calibration: self.calibration.clone(),
+            devices: self.devices.clone(),
+            certificate: self.certificate.clone(),
+            override_reason: self.override_reason.clone(),
+            stage_check: Some(settings),
+            ..Plan::excitation(RunKind::StageCheck, self.config.clone())
+        }
+    }
+
+    /// The plan with the reason of an operator for closing the loop without a valid certificate.
+    pub fn with_override(self, reason: Option<OverrideReason>) -> Plan {
+        Plan {
+            override_reason: reason,
+            ..self
+        }
     }
 
     /// The plan of a recorded run.
@@ -169,6 +214,7 @@ impl Plan {
             calibration: calibration.transpose()?,
             reference: attached_text(recording, REFERENCE),
             command,
+            stage_check: attached_stage_check(recording)?,
             motor: motor_start(recording)?,
             ..Plan::excitation(kind(recording)?, config)
         })
@@ -237,7 +283,7 @@ impl Plan {
                 let reference = config.control.reference.design().name();
                 format!("control-{controller}-{reference}")
             }
-            RunKind::Calibrate | RunKind::Quiet => self.kind.name().into(),
+            RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => self.kind.name().into(),
         }
     }
 
@@ -251,6 +297,11 @@ impl Plan {
                 Box::new(Excite(Staircase::new(&config.calibrate.steps(), period_s)))
             }
             RunKind::Quiet => Box::new(Excite(zero_current(&config.campaign, period_s))),
+            RunKind::StageCheck => {
+                let settings = self.stage_check.as_ref();
+                let settings = settings.ok_or(PlanError::Missing("stage check"))?;
+                Box::new(Excite(StageCheckSignal::new(settings, period_s)))
+            }
         })
     }
 
@@ -300,11 +351,25 @@ impl Plan {
         let command = command
             .transpose()
             .map_err(|error| PlanError::Text(error.to_string()))?;
+        let certificate = self.certificate.as_ref();
+        let stage_check = self.stage_check.as_ref().map(toml::to_string).transpose();
+        let stage_check = stage_check.map_err(|error| PlanError::Text(error.to_string()))?;
         let attachments = [
             (COMMAND, "application/toml", command),
             (CONTROLLER, "application/toml", controller),
             (REFERENCE, "text/csv", self.reference.clone()),
             (CALIBRATION, "application/toml", calibration),
+            (
+                CERTIFICATE,
+                "application/json",
+                certificate.map(|text| text.json.clone()),
+            ),
+            (
+                CERTIFICATE_FRF,
+                "text/csv",
+                certificate.map(|text| text.frf_csv.clone()),
+            ),
+            (STAGE_CHECK, "application/toml", stage_check),
         ];
         let present = attachments.into_iter();
         let present = present.filter_map(|(name, media, text)| Some((name, media, text?)));
@@ -347,6 +412,14 @@ fn motor_start(recording: &Recording) -> Result<MotorStart, PlanError> {
 fn thermal_a2(text: &str) -> Option<f64> {
     let value: f64 = text.parse().ok()?;
     (value.is_finite() && value >= 0.0).then_some(value)
+}
+
+fn attached_stage_check(recording: &Recording) -> Result<Option<StageCheckSettings>, PlanError> {
+    let Some(text) = attached_text(recording, STAGE_CHECK) else {
+        return Ok(None);
+    };
+    let settings = toml::from_str(&text);
+    settings.map_err(|_| PlanError::Missing("readable stage check"))
 }
 
 fn attached_text(recording: &Recording, name: &str) -> Option<String> {

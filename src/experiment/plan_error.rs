@@ -1,5 +1,6 @@
 //! Why a run cannot be planned.
 
+use super::certificate::CertificateError;
 use crate::config::ConfigError;
 use crate::control::{ControllerError, MinimumTimeError};
 use crate::excitation::command::CommandFilterError;
@@ -18,6 +19,9 @@ pub enum PlanError {
     /// The reference is refused.
     #[error(transparent)]
     Reference(#[from] ReferenceError),
+    /// The certificate cannot be read.
+    #[error("refused: {0}; nothing was moved")]
+    Certificate(#[from] CertificateError),
     /// The model that a swept reference is planned from cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),

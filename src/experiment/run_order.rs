@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::certificate::{CertificateText, OverrideReason};
 use super::error::ExperimentError;
 use super::motor_start::MotorStart;
 use super::plan::{Plan, RunKind};
@@ -36,6 +37,12 @@ pub struct RunOrder {
     command: Option<CommandFilter>,
     /// A calibration instead of the configured one, as TOML.
     calibration_toml: Option<String>,
+    /// The certificate of a closed loop.
+    #[serde(default)]
+    certificate: Option<CertificateText>,
+    /// Why an operator closes the loop without a valid certificate.
+    #[serde(default)]
+    override_reason: Option<OverrideReason>,
     /// Pace of the loop.
     pub pace: Pace,
     /// Whether a stored fault of the amplifier is cleared first.
@@ -75,6 +82,8 @@ impl RunOrder {
             config_toml: plan.config_toml()?,
             reference: plan.reference_file().map(String::from),
             command: plan.command_filter().cloned(),
+            certificate: plan.certificate,
+            override_reason: plan.override_reason,
             controller: plan.controller.map(|found| (found.name, found.text)),
             calibration_toml: calibration_toml
                 .map_err(|error| PlanError::Text(error.to_string()))?,
@@ -93,13 +102,16 @@ impl RunOrder {
         let config = config::whole("the ordered configuration", &self.config_toml)?;
         let controller = self.controller.clone();
         let controller = controller.map(|(name, text)| ControllerText { name, text });
-        Ok(Plan::with_texts(
+        let mut plan = Plan::with_texts(
             self.kind,
             config,
             controller,
             self.reference.clone(),
             self.command.clone(),
-        ))
+        );
+        plan.certificate.clone_from(&self.certificate);
+        plan.override_reason.clone_from(&self.override_reason);
+        Ok(plan)
     }
 
     /// A calibration instead of the configured one.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use super::file_name;
-use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, Plan};
+use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, OVERRIDE, Plan};
 use super::run_error::RunError;
 use crate::recording::{
     Header, MIN_FREE_BYTES, Recorder, RecordingError, lacks_space, predicted_bytes,
@@ -30,6 +30,10 @@ pub(super) fn create_recording(
     for (name, media_type, text) in plan.attachments()? {
         let attached = recorder.attach(name, media_type, text.as_bytes());
         attached.map_err(RunError::Create)?;
+    }
+    if let Some(reason) = &plan.override_reason {
+        let noted = recorder.note_override(&reason.to_string());
+        noted.map_err(RunError::Create)?;
     }
     Ok(recorder)
 }
@@ -73,6 +77,9 @@ pub(super) fn metadata(
         (MOTOR_KNOWN_FROM, plan.motor.known_from.clone()),
     ];
     let devices = plan.devices.iter().cloned();
+    let reason = plan.override_reason.as_ref();
+    let reason = reason.map(|reason| (OVERRIDE, reason.to_string()));
+    let devices = devices.chain(reason);
     let pairs = pairs.into_iter().chain(of_scheduling(scheduling));
     let pairs = pairs.chain(devices);
     pairs.map(|(key, value)| (key.to_string(), value)).collect()

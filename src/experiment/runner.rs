@@ -7,6 +7,8 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
+use super::certificate::{OpenRig, require_evidence, require_evidence_or_warn};
+use super::ending::Ending;
 use super::error::ExperimentError;
 use super::live_rig::LiveRig;
 use super::loop_check::{Stage, closed_loop_of, require_margins};
@@ -18,7 +20,9 @@ use super::run::Run;
 use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::run_order::{RigOwner, RunConditions, run_elsewhere};
+use super::stage_check::{PlannedStageCheck, StageCheck};
 use crate::config::Config;
+use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
@@ -160,7 +164,9 @@ impl Runner {
         phase: &'static str,
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
-        require_stable_loop(plan, self.setup.stage(&plan.config))?;
+        let stage = self.setup.stage(&plan.config);
+        require_stable_loop(plan, stage)?;
+        require_evidence(plan, stage, None)?;
         if let Some(owner) = &self.setup.owner {
             self.progress.begin(phase, 0);
             let calibration = calibration.as_ref();
@@ -170,16 +176,56 @@ impl Runner {
         let mut bench = self.opened(&plan.config)?;
         bench.rig.set_hooks(self.hooks.clone());
         let plan = calibrated(plan, &bench.names, calibration)?;
+        let rig = OpenRig {
+            devices: &bench.names,
+            calibration: plan.calibration.as_ref(),
+        };
+        require_evidence_or_warn(&plan, stage, rig)?;
+        let ended = match self.checked_stage(&plan, stage, &mut bench)? {
+            CheckedStage::Ended(run) => *run,
+            CheckedStage::MayClose => self.run_on(plan, &mut bench, phase)?,
+        };
+        if ended.ended.trip.is_none() {
+            self.open.replace(Some(bench));
+        }
+        Ok(ended)
+    }
+
+    /// Checks the stage of a closed loop that has a certificate.
+    fn checked_stage(
+        &self,
+        plan: &Plan,
+        stage: Stage,
+        bench: &mut OpenBench,
+    ) -> Result<CheckedStage, ExperimentError> {
+        let Some(planned) = PlannedStageCheck::before(plan)? else {
+            return Ok(CheckedStage::MayClose);
+        };
+        let mut run = self.run_on(planned.plan.clone(), bench, "stage check")?;
+        if Ending::from(&run.ended) != Ending::Completed {
+            return Ok(CheckedStage::Ended(Box::new(run)));
+        }
+        run.totals()?;
+        let check = planned.evaluated(&Recording::open(&run.path)?)?;
+        close(run, &check)?;
+        require_agreement(&check, plan, stage)?;
+        Ok(CheckedStage::MayClose)
+    }
+
+    /// Runs a plan whose devices and calibration are known.
+    fn run_on(
+        &self,
+        plan: Plan,
+        bench: &mut OpenBench,
+        phase: &'static str,
+    ) -> Result<Run, ExperimentError> {
         let run = match self.setup.motor {
-            MotorHandling::Simulated => self.run_simulated_motor(plan, &mut bench, phase),
+            MotorHandling::Simulated => self.run_simulated_motor(plan, bench, phase),
             MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
-                self.run_remembered_motor(plan, &mut bench, phase)
+                self.run_remembered_motor(plan, bench, phase)
             }
         }?;
         self.motor_a2.set(Some(run.ended.thermal_a2));
-        if run.ended.trip.is_none() {
-            self.open.replace(Some(bench));
-        }
         Ok(run)
     }
 
@@ -237,6 +283,26 @@ impl Runner {
         let mut update = |done, total| self.progress.set(done, total);
         rig.run(plan, &self.setup.folder, &mut update)
     }
+}
+
+/// What follows from the check of a stage.
+enum CheckedStage {
+    /// The loop may close.
+    MayClose,
+    /// The run of the check did not come to its end.
+    Ended(Box<Run>),
+}
+
+/// Refuses a stage that does not agree with the certificate; only warns on the simulated stage, and with an override.
+fn require_agreement(check: &StageCheck, plan: &Plan, stage: Stage) -> Result<(), ExperimentError> {
+    let Some(refusal) = check.refusal() else {
+        return Ok(());
+    };
+    if stage == Stage::Devices && plan.override_reason.is_none() {
+        return Err(refusal.into());
+    }
+    tracing::warn!("{refusal}");
+    Ok(())
 }
 
 /// Refuses the loop of a plan, if it has one, before a device is opened.
@@ -301,11 +367,12 @@ mod tests {
     use super::*;
     use crate::config::{Purpose, Source, load};
     use crate::experiment::MarginError;
+    use crate::experiment::certificate::CertificateError;
 
-    #[test]
-    fn refuses_unstable_loop_before_a_device_is_opened() {
+    /// A loop on devices that do not exist.
+    fn refused(controller: &str) -> ExperimentError {
         let sets = [
-            "control.controller=fast",
+            &format!("control.controller={controller}"),
             "control.min_modulus_margin=0",
             "amplifier.device.interface=no-such-can",
             "probe.device.line.port=/dev/ttyNONE9",
@@ -320,7 +387,22 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let runner = Runner::new(Setup::on_devices(folder.path().into()));
         let refused = runner.run(&Plan::control(config).unwrap(), "control");
-        let error = refused.err().expect("a refusal");
+        refused.err().expect("a refusal")
+    }
+
+    #[test]
+    fn refuses_loop_without_certificate_before_a_device_is_opened() {
+        let error = refused("slow");
+        let is_missing = matches!(
+            error,
+            ExperimentError::Certificate(CertificateError::Missing)
+        );
+        assert!(is_missing, "{error}");
+    }
+
+    #[test]
+    fn refuses_unstable_loop_before_a_device_is_opened() {
+        let error = refused("fast");
         let is_unstable = matches!(
             error,
             ExperimentError::Margin(MarginError::UnstableOnDevices { .. })

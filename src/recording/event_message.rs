@@ -17,6 +17,7 @@ impl From<&Event> for Message {
             EventKind::ResetFailed { code, text } => of_failed_reset(code, text),
             EventKind::Completed => message("completed", "the program came to its end".into()),
             EventKind::Lost { records } => of_lost(records),
+            EventKind::Override => of_override(""),
             EventKind::Clock(times) => of_clock(times),
         };
         Message {
@@ -133,6 +134,14 @@ fn of_lost(records: u64) -> Message {
     }
 }
 
+/// The message of an override with the reason of the operator.
+pub(super) fn of_override(reason: &str) -> Message {
+    message(
+        "override",
+        format!("the operator closes the loop without a valid certificate: {reason}"),
+    )
+}
+
 fn of_clock(times: ClockTimes) -> Message {
     let ClockTimes {
         loop_ns,
@@ -166,6 +175,7 @@ impl TryFrom<&Message> for Event {
             "lost" => EventKind::Lost {
                 records: message.records,
             },
+            "override" => EventKind::Override,
             "clock" => EventKind::Clock(ClockTimes {
                 loop_ns: message.loop_ns,
                 monotonic_ns: message.monotonic_ns,

@@ -115,7 +115,7 @@ messages! {
     Event {
         /// The tick at which it took effect.
         field "1" (uint64) tick,
-        /// `order`, `state`, `trip`, `completed`, `lost` or `clock`.
+        /// `order`, `state`, `trip`, `completed`, `lost`, `override` or `clock`.
         field "2" (string) kind,
         /// Readable text, for every kind.
         field "3" (string) text,

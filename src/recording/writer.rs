@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use super::continuity::Continuity;
 use super::digest::Digest;
+use super::event_message::of_override;
 use super::log_time::LogTime;
 use super::messages;
 use super::schema::descriptor_set;
@@ -198,6 +199,11 @@ impl Recorder {
     /// Ticks recorded so far.
     pub fn ticks(&self) -> u64 {
         self.account.ticks()
+    }
+
+    /// Writes the event that an operator closes the loop without a valid certificate, before the first tick.
+    pub fn note_override(&mut self, reason: &str) -> Result<(), RecordingError> {
+        self.write(Topic::Event, 0, &of_override(reason))
     }
 
     fn tick(&mut self, tick: &TickRecord) -> Result<(), RecordingError> {

@@ -100,6 +100,9 @@ pub enum EventKind {
         /// How many.
         records: u64,
     },
+    /// The operator closes the loop without a valid certificate. The recorder writes it before the first tick; the reason is in
+    /// the text and in the metadata of the recording.
+    Override,
     /// The clocks at one moment in the tick; only in real time, at the start and once per second.
     Clock(ClockTimes),
 }

@@ -203,3 +203,36 @@ fn command_over_tcp_prints_what_it_prints_there() {
     assert_eq!(output.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&output.stderr).contains("needs the token"));
 }
+
+#[test]
+fn daemon_checks_certificate_and_stage_of_an_order_and_records_the_reason_of_an_override() {
+    let daemon = Daemon::start();
+    let folder = tempfile::tempdir().unwrap();
+    let run = |arguments: &[&str]| -> (serde_json::Value, String) {
+        let mut command = daemon.bench(folder.path(), arguments);
+        let output = command.output().expect("a process");
+        let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {errors}");
+        (
+            serde_json::from_slice(&output.stdout).expect("JSON"),
+            errors,
+        )
+    };
+    let sweep = ["--duration", "20s", "--start", "1Hz", "--stop", "100Hz"];
+    let (chirp, _) = run(&[&["chirp", "--json", "--out", "evidence"], &sweep[..]].concat());
+    let certificate = chirp["certificate"].as_str().expect("a path");
+    let control = ["control", "--slow", "--duration", "1s", "--json"];
+    let other_load = ["--asymmetry", "5%", "--certificate", certificate];
+    let (_, errors) = run(&[&control[..], &other_load].concat());
+    assert!(errors.contains("plant.mass_asymmetry = 0.1"), "{errors}");
+    let names = files(folder.path());
+    assert!(names.contains(&"stage-check.mcap".into()), "{names:?}");
+    let reason = "a reason of the operator";
+    let (report, _) = run(&[&control[..], &["--override", reason]].concat());
+    let path = folder
+        .path()
+        .join(report["recording"].as_str().expect("a path"));
+    let recording = bench::recording::Recording::open(&path).expect("a recording");
+    let recorded = recording.metadata().get("override").map(String::as_str);
+    assert_eq!(recorded, Some(reason));
+}

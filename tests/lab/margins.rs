@@ -252,7 +252,12 @@ fn rejects_virtual_pace_mixed_devices_and_missing_interfaces() {
     // No motion; the error names the missing device.
     let (code, _, errors) = bench(
         folder.path(),
-        &[&["control", "--config", "lab", "--slow"], &NO_DEVICES[..]].concat(),
+        &[
+            &["control", "--config", "lab", "--slow"][..],
+            &["--override", "no certificate in this test"],
+            &NO_DEVICES[..],
+        ]
+        .concat(),
     );
     assert!(
         code == 2 && errors.contains("/dev/ttyNONE9") && errors.contains("nothing was moved"),

@@ -19,7 +19,7 @@ def answer(question):
     omega = 2 * np.pi * table["frequency_hz"]
     plant = table["magnitude_m_per_a"] * np.exp(1j * np.radians(table["phase_deg"]))
     config = question["config"]
-    law = truth.sampled_controller(config, truth.on_circle(config, omega))
+    law = truth.law_response(config, truth.on_circle(config, omega))
     loop = control.FrequencyResponseData(plant * law, omega, smooth=True)
     gain, phase, distance, w_phase, w_gain, w_distance = control.stability_margins(loop, returnall=True)
     decibels = 20 * np.log10(gain)

@@ -400,7 +400,7 @@ def continuous_controller(config, s):
     return UM_PER_M * np.prod([np.polyval(n, s) / np.polyval(d, s) for n, d, _ in sections(config)], axis=0)
 
 
-def sampled_controller(config, z):
+def law_response(config, z):
     period = 1 / config["loop"]["rate_hz"]
     value = UM_PER_M
     for n, d, prewarp in sections(config):
@@ -497,7 +497,7 @@ def margins(q):
 
         def response(w):
             z = on_circle(config, w)
-            return resolvent(F, g, C, z) * z**-delay * sampled_controller(config, z)
+            return resolvent(F, g, C, z) * z**-delay * law_response(config, z)
 
     L = response(w)
     one = lambda f: (lambda x: float(f(response(x)[0])))
@@ -545,7 +545,7 @@ def points(q):
 
 def sensitivity(config, omega):
     z = on_circle(config, omega)
-    return 1 / (1 + sampled_plant(config, omega, False) * sampled_controller(config, z))
+    return 1 / (1 + sampled_plant(config, omega, False) * law_response(config, z))
 
 
 def loop(q):

@@ -4,11 +4,11 @@
 . "$(dirname "$0")/common.sh"
 
 act well
-./bench doctor --config real.toml --json >doctor.json 2>doctor.err
-echo $? >doctor.code
 run chirp chirp
-run swept control --reference chirp --duration 24 --amplitude 50um --set identify.curve=rational --set identify.resolution_ratio=0.0025 --set identify.min_half_width_bins=16
-run control control --duration 6 &
+./bench doctor --config real.toml --set "control.certificate=$(ls recordings/*_certificate.json)" --json >doctor.json 2>doctor.err
+echo $? >doctor.code
+closed swept --reference chirp --duration 24 --amplitude 50um --set identify.curve=rational --set identify.resolution_ratio=0.0025 --set identify.min_half_width_bins=16
+closed control --duration 6 &
 first=$!
 sleep 3
 pgrep -f 'bench control' | head -n 1 >control.pid
@@ -17,33 +17,33 @@ wait "$first"
 leave well
 
 act killed
-run killed control --duration 20 &
-sleep 3
+closed killed --duration 20 &
+sleep 6
 pkill -KILL -f 'bench control'
 wait $!
 sleep 1
-run after_kill control
+closed after_kill
 leave killed
 
 act terminated
-run terminated control --duration 20 &
-sleep 3
+closed terminated --duration 20 &
+sleep 6
 pkill -TERM -f 'bench control'
 wait $!
 leave terminated
 
 act cable
-run cable control --duration 20 &
-sleep 3
+closed cable --duration 20 &
+sleep 6
 ip link set vcan0 down
 wait $!
 ip link set vcan0 up
 sleep 1
-run after_cable control
+closed after_cable
 leave cable
 
-act fault --fault amplifier.fault=0x2310@1
-run fault control
+act fault --fault amplifier.fault=0x2310@4
+closed fault --duration 10
 leave fault
 
 store

@@ -68,10 +68,10 @@ well() {
   act well
   serve well
   run chirp chirp
-  run control control --duration 6
+  closed control --duration 6
   order chirp_api chirp
   follow chirp_api
-  order control_api control --duration 6
+  order control_api control "$(evidence "")" --duration 6
   follow control_api
   api GET /runs >well.runs.json
   end well
@@ -82,15 +82,15 @@ well() {
 cable() {
   act cable
   serve cable
-  order cable control --duration 20
-  sleep 3
+  order cable control "$(evidence "")" --duration 20
+  sleep 6
   ip link set vcan0 down
   follow cable
   await 'vcan0 is down'
   state cable
   ip link set vcan0 up
   await '"amplifier":"'
-  run after_cable control
+  closed after_cable
   end cable
   leave cable
 }
@@ -102,24 +102,24 @@ idle() {
   ip link set vcan0 down
   await 'vcan0 is down'
   state idle
-  run idle_pulled control
+  closed idle_pulled
   ip link set vcan0 up
   await '"fault":null'
   state idle_back
-  run after_idle control
+  closed after_idle
   end idle
   leave idle
 }
 
 # The probe is silent for three seconds.
 silence() {
-  act silence --fault probe.silence@3s..6s
+  act silence --fault probe.silence@4s..7s
   serve silence
-  order silence control --duration 20
+  order silence control "$(evidence "")" --duration 20
   follow silence
   state silence
   await '"position_m":[-0-9]'
-  run after_silence control
+  closed after_silence
   end silence
   leave silence
 }
@@ -128,35 +128,35 @@ silence() {
 power() {
   act power
   serve power
-  order power control --duration 20
-  sleep 3
+  order power control "$(evidence "")" --duration 20
+  sleep 6
   kill -KILL "$device"
   follow power
   await 'there is no such port'
   state power
   act power_back
   await '"amplifier":"'
-  run after_power control
+  closed after_power
   kill -KILL "$device"
   await 'there is no such port'
   state power_idle
   act power_idle
   await '"amplifier":"'
-  run after_power_idle control
+  closed after_power_idle
   end power
   leave power_idle
 }
 
 # The drive reports a fault, which the operator must clear.
 fault() {
-  act fault --fault amplifier.fault=0x2310@1s..2s
+  act fault --fault amplifier.fault=0x2310@4s..5s
   serve fault
-  order fault control --duration 20
+  order fault control "$(evidence "")" --duration 20
   follow fault
   await '--clear-fault'
   state fault
-  run uncleared control
-  run after_fault control --clear-fault
+  closed uncleared
+  closed after_fault --clear-fault
   end fault
   leave fault
 }
@@ -165,8 +165,8 @@ fault() {
 killed() {
   act killed
   serve killed
-  order killed control --duration 20
-  sleep 4
+  order killed control "$(evidence "")" --duration 20
+  sleep 7
   state killed
   newest killed
   kill -KILL "$daemon"
@@ -176,7 +176,7 @@ killed() {
   pgrep -fa 'bench (serve|control)' >killed.left
   cp killed.jsonl killed_before.jsonl
   serve after_kill
-  run after_kill control
+  closed after_kill
   end after_kill
   leave killed
 }
@@ -185,8 +185,8 @@ killed() {
 terminated() {
   act terminated
   serve terminated
-  order terminated control --duration 20
-  sleep 4
+  order terminated control "$(evidence "")" --duration 20
+  sleep 7
   state terminated
   newest terminated
   end terminated

@@ -10,4 +10,5 @@ mod joint_estimate;
 mod measured_margins;
 mod modes;
 mod residual_monitor;
+mod stage_check;
 mod verdicts;

@@ -38,7 +38,7 @@ pub enum EventClass {
 }
 
 impl EventView {
-    /// The event for clients; `None` for the clocks of the system.
+    /// The event for clients; `None` for the clocks of the system, and for an override, which the recorder writes.
     pub fn of(event: &Event, time_s: f64, run: u32) -> Option<EventView> {
         let kind = match event.kind {
             EventKind::Request(_) => EventClass::Request,
@@ -47,7 +47,7 @@ impl EventView {
             EventKind::ResetFailed { .. } => EventClass::ResetFailed,
             EventKind::Completed => EventClass::Completed,
             EventKind::Lost { .. } => EventClass::Lost,
-            EventKind::Clock(_) => return None,
+            EventKind::Override | EventKind::Clock(_) => return None,
         };
         Some(EventView {
             time_s,

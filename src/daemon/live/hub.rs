@@ -403,6 +403,7 @@ impl Follower {
             | EventKind::State { .. }
             | EventKind::ResetFailed { .. }
             | EventKind::Completed
+            | EventKind::Override
             | EventKind::Clock(_) => {}
         }
         let Some(view) = EventView::of(event, time_s, feed.number()).map(Arc::new) else {

@@ -13,6 +13,7 @@ export function formArguments() {
   const add = (option, id) => { const text = byId(id).value.trim(); if (text) args.push(option, text); };
   if (command === "control") {
     args.push(byId("controller").value, "--reference", reference);
+    add("--certificate", "certificate");
     if (WITH_FREQUENCY.includes(reference)) add("--frequency", "frequency");
   }
   if (command === "chirp" || (command === "control" && reference === "chirp")) {

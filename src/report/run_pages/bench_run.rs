@@ -24,7 +24,9 @@ const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, 
 pub struct BenchRun<'a> {
     /// Its analysis.
     pub(super) analysis: &'a Analysis,
-    recording: &'a Recording,
+    pub(super) recording: &'a Recording,
+    /// The configuration with which it ran.
+    pub(super) config: &'a Config,
     /// The signal path between set-point and reading, without the mechanics.
     chain: MeasurementChain,
     /// Title of the configuration.
@@ -37,10 +39,15 @@ pub struct BenchRun<'a> {
 
 impl<'a> BenchRun<'a> {
     /// A run with its analysis and the configuration that it ran with.
-    pub fn new(recording: &'a Recording, analysis: &'a Analysis, config: &Config) -> BenchRun<'a> {
+    pub fn new(
+        recording: &'a Recording,
+        analysis: &'a Analysis,
+        config: &'a Config,
+    ) -> BenchRun<'a> {
         BenchRun {
             analysis,
             recording,
+            config,
             chain: MeasurementChain::bench(config),
             title: config.title.clone(),
             excitation: match analysis.closed {
@@ -68,6 +75,7 @@ impl<'a> BenchRun<'a> {
             model: Some(&analysis.model),
             chain: self.chain.clone(),
             fit: analysis.fit.as_ref().ok(),
+            signs: analysis.signs.as_ref(),
             verdict: &analysis.verdict,
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: evidence(analysis),

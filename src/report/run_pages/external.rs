@@ -39,6 +39,7 @@ impl<'a> ExternalRecord<'a> {
             model: None,
             chain: MeasurementChain::Direct,
             fit,
+            signs: None,
             verdict: &analysis.verdict,
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),

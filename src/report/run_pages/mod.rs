@@ -20,6 +20,7 @@ mod run_facts;
 
 use nalgebra::Complex;
 
+use crate::experiment::certificate::SignCheck;
 use crate::identify::modal::{MeasurementChain, ModalFit};
 use crate::identify::verdict::Verdict;
 use crate::identify::{Frf, Unit};
@@ -57,6 +58,8 @@ pub struct RecordReport<'a> {
     pub chain: MeasurementChain,
     /// The fitted modes, if the fit succeeded.
     pub fit: Option<&'a ModalFit>,
+    /// The signs of the residues beside those of the model, if there is a model and a fit.
+    pub signs: Option<&'a SignCheck>,
     /// The verdict about CNMP zeros.
     pub verdict: &'a Verdict,
     /// Modes and zeros up to here count for the verdict, in rad/s.

@@ -10,7 +10,8 @@ use super::bench_run::BenchRun;
 use super::control_page::ControlReport;
 use super::page::page;
 use super::plots::{PlotKind, plots};
-use crate::experiment::{Analysis, ClosedResponses};
+use crate::experiment::certificate::{ResponseFile, SignCheck, certify};
+use crate::experiment::{Analysis, ClosedResponses, PlanError};
 use crate::identify::Frf;
 use crate::identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
 use crate::identify::linearity::Linearity;
@@ -25,6 +26,9 @@ pub enum OutputError {
     /// A plot cannot be drawn.
     #[error(transparent)]
     Plot(#[from] ReportError),
+    /// The certificate cannot be made.
+    #[error(transparent)]
+    Certificate(#[from] PlanError),
     /// A file cannot be written.
     #[error("cannot write {0}: {1}; free some space, or choose another folder with --out")]
     File(PathBuf, std::io::Error),
@@ -274,6 +278,10 @@ pub struct AnalysisOutputs {
     pub frf_csv: Option<String>,
     /// The FRF with the measured delay removed from its phases.
     pub frf_without_delay_csv: Option<String>,
+    /// The certificate of a completed chirp.
+    pub certificate: Option<String>,
+    /// The signs of the residues beside those of the model.
+    pub signs: Option<SignCheck>,
     /// Plots and page.
     #[serde(flatten)]
     pub pages: PageFiles,
@@ -311,13 +319,16 @@ impl AnalysisOutputs {
     ) -> Result<AnalysisOutputs, OutputError> {
         let analysis = run.analysis;
         let without_delay = analysis.frf.without_delay(analysis.measured_delay_s());
-        let frf_csv = results.write_frf("frf", &analysis.frf, METRES_PER_AMPERE)?;
+        let csv = frf_csv::to_string(&analysis.frf, METRES_PER_AMPERE);
+        let frf_csv = results.write("frf", "csv", &csv)?;
+        let certificate = write_certificate(run, results, &frf_csv, &csv)?;
         let frf_without_delay_csv =
             results.write_frf("frf_without_delay", &without_delay, METRES_PER_AMPERE)?;
         let pages = PageFiles::write(&run.report()?, results)?;
         let closed = analysis.closed.as_ref();
         Ok(AnalysisOutputs {
             frf_csv: Some(frf_csv),
+            certificate,
             frf_without_delay_csv: Some(frf_without_delay_csv),
             pages,
             closed: closed
@@ -335,6 +346,7 @@ impl AnalysisOutputs {
             delay_s: Some(analysis.delay_s),
             delay_beyond_model_s: analysis.excess_delay.map(|delay| delay.value),
             delay_beyond_model_sigma_s: analysis.excess_delay.map(|delay| delay.sigma),
+            signs: analysis.signs.clone(),
             summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
             linearity: analysis.linearity.clone(),
             ..AnalysisOutputs::without_analysis(AnalysisStatus::Analysed, "")
@@ -346,6 +358,8 @@ impl AnalysisOutputs {
             status,
             frf_csv: None,
             frf_without_delay_csv: None,
+            certificate: None,
+            signs: None,
             pages: PageFiles::default(),
             frequencies: 0,
             coherence_median: None,
@@ -375,4 +389,21 @@ impl AnalysisOutputs {
     pub fn is_cancelled(&self) -> bool {
         self.status == AnalysisStatus::Cancelled
     }
+}
+
+/// Writes the certificate of a completed chirp beside its frequency response; returns its path.
+fn write_certificate(
+    run: &BenchRun<'_>,
+    results: ResultFiles<'_>,
+    frf_path: &str,
+    csv: &str,
+) -> Result<Option<String>, OutputError> {
+    let name = Path::new(frf_path).file_name().unwrap_or_default();
+    let response = ResponseFile {
+        name: &name.to_string_lossy(),
+        csv,
+    };
+    let certificate = certify(run.recording, run.analysis, run.config, response)?;
+    let written = certificate.map(|made| results.write("certificate", "json", &made.to_json()));
+    written.transpose()
 }

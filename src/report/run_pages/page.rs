@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
+use crate::experiment::certificate::SIGNS_DIFFER;
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::identify::verdict::UncertainZero;
 use crate::report::html::{
@@ -15,6 +16,7 @@ pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
     let plots: String = plots.iter().map(plot).collect();
     let body = [
         heading(report),
+        other_signs(report),
         verdict(report),
         modes(report),
         zeros(report),
@@ -35,6 +37,19 @@ fn plot(plot: &Plot) -> String {
     section(
         plot.heading,
         &picture(&plot.svg, plot.heading, &plot.caption),
+    )
+}
+
+/// A warning in large letters, if the signs of the residues differ from those of the model.
+fn other_signs(report: &RecordReport<'_>) -> String {
+    let Some(signs) = report.signs.filter(|signs| signs.differ()) else {
+        return String::new();
+    };
+    let (measured, model) = (escaped(&signs.measured), escaped(&signs.model));
+    let text = escaped(SIGNS_DIFFER);
+    format!(
+        "<p class=\"verdict detected\"><strong>THE SIGNS OF THE RESIDUES DIFFER FROM THE MODEL: measured {measured}, model \
+         {model}</strong><br>{text}</p>\n"
     )
 }
 
