@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
     calibrate, campaign, chirp, completions, config, control, doctor, emulate, identify, linearity,
-    margins, model, recover, remote, replay, report, serve,
+    margins, model, recover, remote, replay, report, serve, tune,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -48,6 +48,8 @@ enum Command {
     /// Compute crossover, phase margin, gain margin and modulus margin of a controller with the model; exit code 1 if the
     /// loop is unstable
     Margins(margins::Args),
+    /// Design a controller for several operating points with tolerances; writes the controller file, a certificate and plots
+    Tune(tune::Args),
     /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
     /// Write a page with the frequency responses and steps of one or several recordings
@@ -132,6 +134,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),
+        Command::Tune(args) => tune::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),

@@ -29,6 +29,7 @@ mod state_space;
 mod step_metrics;
 mod swept;
 mod tuned;
+pub mod tuning;
 
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::ClosedLoop;

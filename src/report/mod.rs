@@ -3,7 +3,7 @@
 //! ```text
 //! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
 //!                      `-> overlay (several recordings) -------------------+
-//! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
+//! pole_zero (ellipse), stability, distortion, quadrants, design -----------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
 
@@ -11,6 +11,7 @@ pub mod bode;
 mod campaign;
 mod chart;
 mod coherence;
+mod design;
 mod distortion;
 pub mod ellipse;
 mod error;
@@ -31,6 +32,7 @@ pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };
 pub use coherence::coherence_svg;
+pub use design::{DesignLimits, design_loop_svg, design_nyquist_svg};
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use nyquist::nyquist_svg;
