@@ -133,12 +133,62 @@ pub(super) fn text(certificate: &Certificate, explain: bool, folder: &Path) -> S
     let files = format!(
         "files: {folder}/controller.toml, certificate.json, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
     );
-    let binding = if explain {
-        binding_text(&certificate.binding)
-    } else {
-        String::new()
+    let binding = match explain {
+        true => binding_text(&certificate.binding),
+        false => String::new(),
     };
-    wrap(&title, 0) + &table(&header, &rows) + &wrap(legend, 0) + &binding + &files
+    let extras = &certificate.extras;
+    let bound = extras.bound.as_ref();
+    let bound = bound.map_or(String::new(), |bound| {
+        bound_text(bound, certificate.attained)
+    });
+    let opposite = extras.opposite.as_ref();
+    let opposite = opposite.map_or(String::new(), opposite_text);
+    let parts = [
+        wrap(&title, 0),
+        table(&header, &rows),
+        wrap(legend, 0),
+        bound,
+        binding,
+        opposite,
+        files,
+    ];
+    parts.concat()
+}
+
+fn bound_text(bound: &ConvexBound, attained: f64) -> String {
+    let (limit, half) = (bound.limit_rad_s, bound.with_half_rad_s);
+    let (plant, functions) = (&bound.plant, bound.functions);
+    let percent = 100.0 * attained / limit;
+    // The value rises with the number of functions, so only one that hardly changes is a bound.
+    let state = match limit / half < CONVERGED {
+        true => "no linear controller of any order attains more".to_string(),
+        false => format!("not converged ({half:.0} rad/s with half of them), the bound is larger"),
+    };
+    let text = format!(
+        "convex bound: {limit:.0} rad/s at {plant} with {functions} functions, {state}; this design attains {percent:.0} % of it"
+    );
+    wrap(&text, 0)
+}
+
+/// Ratio of the values with all and with half of the functions below which the bound does not depend on their number.
+const CONVERGED: f64 = 1.05;
+
+fn opposite_text(opposite: &OppositeAsymmetry) -> String {
+    let percent = 100.0 * opposite.mass_asymmetry;
+    let states = opposite.plants.iter().map(|figures| {
+        let state = match figures.stable {
+            true => format!("modulus margin {:.3}", figures.modulus_margin),
+            false => "unstable".to_string(),
+        };
+        format!("{} {state}", figures.plant)
+    });
+    let states: Vec<String> = states.collect();
+    let text = format!(
+        "with the opposite asymmetry, {percent:+} %: {}",
+        states.join("; ")
+    );
+    wrap(&text, 0)
 }
 
 fn plant_row(figures: &PlantFigures) -> Vec<String> {

@@ -14,6 +14,8 @@ const HEIGHTS: [f64; 3] = [230.0, 260.0, 230.0];
 /// Height of the Nyquist plot in pixels, and the values that it shows.
 const NYQUIST_HEIGHT: f64 = 560.0;
 const NYQUIST_RANGE: (f64, f64) = (-3.0, 2.0);
+/// Part of half the sampling rate that is shown: at its end C has zeros by Tustin's rule, and |L| falls by many decades.
+const SHOWN: f64 = 0.9;
 /// Opacity of the disc around -1.
 const OPACITY: f64 = 0.2;
 
@@ -103,7 +105,9 @@ fn magnitudes(
 ) -> Chart {
     let chart = Chart::new("", Scale::logarithmic(""), Scale::logarithmic(label));
     curves.iter().enumerate().fold(chart, |chart, (k, curve)| {
-        let points = curve.omega_rad_s.iter().enumerate();
+        let [_, last] = ends(curves);
+        let shown = curve.omega_rad_s.iter().take_while(|w| **w <= SHOWN * last);
+        let points = shown.enumerate();
         let points = points.map(|(i, w)| {
             let value = magnitude(curve.open_loop[i], curve.controller[i]);
             (hz(*w), value)

@@ -22,7 +22,7 @@ pub struct LoopCurve {
 pub fn loop_curves(task: &DesignTask, design: &Design) -> Vec<LoopCurve> {
     let plants = task.plants.iter();
     let pairs = design.cascade.pairs();
-    let sampled = plants.map(|plant| SampledPlant::of(plant, &task.bound, Spacing::Search, &pairs));
+    let sampled = plants.map(|plant| SampledPlant::of(plant, &task.bound, Spacing::Fine, &pairs));
     sampled.map(|plant| LoopCurve::of(plant, design)).collect()
 }
 

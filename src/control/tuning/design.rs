@@ -169,7 +169,7 @@ impl DesignTask {
         let fine = fine_samples(&self.plants, &self.bound, &self.disturbance, cascade);
         let slacks = self.requirements.slacks(&fine, cascade, target);
         let mut missed = vec![Vec::new(); fine.len()];
-        for slack in valleys(&slacks).filter(|slack| slack.value < -0.2 * RESERVE) {
+        for slack in valleys(&slacks).filter(|slack| slack.value < 0.0) {
             missed[slack.plant].push(fine[slack.plant].omega_rad_s[slack.point]);
         }
         missed
