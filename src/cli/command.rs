@@ -9,7 +9,7 @@ use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
     calibrate, campaign, chirp, completions, config, control, controller, doctor, emulate,
-    identify, linearity, margins, model, recover, remote, replay, report, serve,
+    identify, linearity, margins, model, recover, remote, replay, report, serve, tune,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -50,6 +50,8 @@ enum Command {
     Margins(margins::Args),
     /// Convert a controller that was designed with MATLAB or Python (MAT-file, numpy archive, JSON) to a controller file
     Controller(controller::Args),
+    /// Design a controller for several operating points with tolerances; writes the controller file, a certificate and plots
+    Tune(tune::Args),
     /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
     /// Write a page with the frequency responses and steps of one or several recordings
@@ -135,6 +137,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Model(args) => model::run(&args),
         Command::Margins(args) => margins::run(&args),
         Command::Controller(args) => controller::run(&args),
+        Command::Tune(args) => tune::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Replay(args) => replay::run(&args),

@@ -4,6 +4,7 @@ use clap::error::ContextKind;
 use serde::Serialize;
 
 use super::outcome::Outcome;
+use crate::control::tuning::TuneError;
 use crate::experiment::campaign::CampaignError;
 use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use crate::identify::IdentifyError;
@@ -32,6 +33,9 @@ pub enum CliError {
     /// The campaign is refused, or its files cannot be used.
     #[error(transparent)]
     Campaign(CampaignError),
+    /// No controller was designed.
+    #[error(transparent)]
+    Tune(#[from] TuneError),
     /// Any other failure.
     #[error("{0}")]
     Failed(String),
@@ -65,7 +69,7 @@ impl CliError {
     fn is_failure(&self) -> bool {
         match self {
             CliError::Experiment(error) => error.is_failure(),
-            CliError::Identify(_) | CliError::Failed(_) => true,
+            CliError::Identify(_) | CliError::Tune(_) | CliError::Failed(_) => true,
             CliError::Table(error) => !matches!(error, ExternalCsvError::Columns(_)),
             CliError::Campaign(error) => matches!(
                 error,
@@ -86,6 +90,7 @@ impl CliError {
             CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
             CliError::Campaign(_) => ErrorKind::Campaign,
+            CliError::Tune(_) => ErrorKind::Controller,
             CliError::Failed(_) => ErrorKind::Failed,
         }
     }

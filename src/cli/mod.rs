@@ -42,6 +42,8 @@ mod report;
 mod run_options;
 mod serve;
 mod table;
+mod tune;
+mod tune_output;
 mod value_range;
 
 pub use crate::experiment::ErrorKind;

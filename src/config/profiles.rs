@@ -29,8 +29,7 @@ pub const PROFILES: &[EmbeddedFile] =
     embedded!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab");
 
 /// All embedded controllers. To add one, add its file and its name here.
-pub const CONTROLLERS: &[EmbeddedFile] =
-    embedded!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass");
+pub const CONTROLLERS: &[EmbeddedFile] = embedded!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass", "stage-disturbance", "lab-disturbance");
 
 /// The entry called `name`.
 pub fn find(list: &[EmbeddedFile], name: &str) -> Option<EmbeddedFile> {

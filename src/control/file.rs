@@ -238,7 +238,7 @@ impl ControllerText {
 }
 
 impl SectionSettings {
-    fn section(&self) -> Section {
+    pub(super) fn section(&self) -> Section {
         let (numerator, denominator) = self.coefficients();
         Section {
             numerator,

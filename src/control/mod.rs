@@ -38,6 +38,7 @@ mod step_metrics;
 mod swept;
 mod transfer;
 mod tuned;
+pub mod tuning;
 
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};

@@ -5,7 +5,7 @@
 //!                      |-> overlay (several recordings) -------------------+
 //!                      `-> measured_loop_plots (L, S and T, with bands) ---+
 //! loop_plots, run_signals, error_spectrum (closed loop) -------------------+
-//! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
+//! pole_zero (ellipse), stability, distortion, quadrants, design -----------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
 
@@ -13,6 +13,7 @@ pub mod bode;
 mod campaign;
 mod chart;
 mod coherence;
+mod design;
 mod distortion;
 pub mod ellipse;
 mod error;
@@ -37,6 +38,7 @@ pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };
 pub use coherence::coherence_svg;
+pub use design::{DesignLimits, design_loop_svg, design_nyquist_svg};
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;

@@ -1,0 +1,327 @@
+//! `bench tune`: designs a controller.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use clap::ValueEnum;
+
+use super::error::CliError;
+use super::help::GLOSSARY;
+use super::options::BenchOptions;
+use super::outcome::Outcome;
+use super::output::print_result;
+use super::progress::ProgressLine;
+use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
+use crate::config::{Config, OptionSetting, Purpose};
+use crate::control::tuning::{
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, NamedPlant, Requirements,
+    SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+};
+use crate::model::plant::SignalPath;
+use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
+use crate::util::atomic_file::write_atomic;
+use crate::util::progress::Progress;
+use crate::util::quantity::{AngularFrequency, OfRatio, OperatingPoint, si};
+use crate::util::units::UM_PER_M;
+
+/// What is designed, and for which plants.
+#[derive(Clone, Debug, clap::Args)]
+#[command(mut_arg("operating_point", |arg| arg.hide(true)))]
+#[command(after_help = GLOSSARY)]
+pub(super) struct Args {
+    #[command(flatten)]
+    bench: BenchOptions,
+    /// What is best: `disturbance` is the largest slope bandwidth w_s, |S(jw)| <= 0.707 w/w_s for all w <= w_s; `bandwidth`
+    /// is the largest frequency up to which |S| <= 0.707; `rms` is the smallest standard deviation of the error
+    #[arg(long, value_enum, default_value_t = GoalName::Disturbance)]
+    goal: GoalName,
+    /// Number of poles of the controller, with that of the integrator
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u8).range(1..=20))]
+    order: u8,
+    /// Least modulus margin 1/max|S| at all frequencies of all plants
+    #[arg(long, value_name = "RATIO", default_value = "0.5", value_parser = margin)]
+    modulus_margin: f64,
+    /// Operating points for which the one controller is designed: lengths, or % of the beam length [default: five points from 0
+    /// to the configured one]
+    #[arg(long, value_name = "LENGTH,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = OperatingPoint::with_unit)]
+    operating_points: Vec<OperatingPoint>,
+    /// Upper limit of |S| at a frequency, as 0.141@10rad/s (repeatable)
+    #[arg(long, value_name = "RATIO@FREQUENCY", value_parser = sensitivity_limit)]
+    max_sensitivity: Vec<SensitivityLimit>,
+    /// Upper limit of |K S|, the response from noise to current, in A/um
+    #[arg(long, value_name = "A_PER_UM", value_parser = positive)]
+    max_control_sensitivity: Option<f64>,
+    /// Relative tolerance of the mode frequencies, of the first mode and of all others together
+    #[arg(long, value_name = "RATIO", default_value = "1%", value_parser = si::<OfRatio>)]
+    frequency_tolerance: f64,
+    /// Factor of the damping ratios in the least damped plant
+    #[arg(long, value_name = "RATIO", default_value = "0.7", value_parser = factor)]
+    damping_factor: f64,
+    /// Relative tolerance of the frequencies of modes that the model lacks (sim.unmodelled); their phases are unknown
+    #[arg(long, value_name = "RATIO", default_value = "3%", value_parser = si::<OfRatio>)]
+    unmodelled_tolerance: f64,
+    /// Seed of the search
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// Also print which requirement limits the design at which plant and frequency, and what the controller does to the stage with
+    /// the opposite mass asymmetry
+    #[arg(long)]
+    explain: bool,
+    /// Leave out the convex bound, the largest value of the goal that a linear controller of any order attains
+    #[arg(long)]
+    without_bound: bool,
+    /// Folder for controller.toml, certificate.json, loop.svg and nyquist.svg
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// The goal as typed.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum GoalName {
+    /// Largest slope bandwidth.
+    Disturbance,
+    /// Largest sensitivity bandwidth.
+    Bandwidth,
+    /// Smallest standard deviation of the error.
+    Rms,
+}
+
+impl From<GoalName> for Goal {
+    fn from(name: GoalName) -> Goal {
+        match name {
+            GoalName::Disturbance => Goal::Disturbance,
+            GoalName::Bandwidth => Goal::Bandwidth,
+            GoalName::Rms => Goal::Rms,
+        }
+    }
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    let number = f64::from_str(text).ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| format!("`{text}` is not a number; give one, such as 0.5"))
+}
+
+/// A modulus margin. For clap.
+fn margin(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (0.05..=0.95).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 0.05 and 0.95; a usual value is 0.5"
+        )),
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    match value > 0.0 {
+        true => Ok(value),
+        false => Err(format!("{value} is not positive; give a limit above 0")),
+    }
+}
+
+fn factor(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    match (0.01..=1.0).contains(&value) {
+        true => Ok(value),
+        false => Err(format!(
+            "{value} is not between 0.01 and 1; 1 leaves the damping unchanged"
+        )),
+    }
+}
+
+/// A limit such as `0.141@10rad/s`. For clap.
+fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> {
+    let form = "give a ratio and a frequency, as in 0.141@10rad/s";
+    let (magnitude, frequency) = text
+        .split_once('@')
+        .ok_or_else(|| format!("`{text}` has no @; {form}"))?;
+    let frequency: AngularFrequency = frequency.parse().map_err(|e| format!("{e}; {form}"))?;
+    let omega_rad_s = frequency.si();
+    match omega_rad_s > 0.0 {
+        true => Ok(SensitivityLimit {
+            magnitude: positive(magnitude)?,
+            omega_rad_s,
+        }),
+        false => Err(format!("`{text}`: the frequency is not positive; {form}")),
+    }
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let config = args.bench.load(Purpose::Model, &[])?;
+    let plants = plants(args, &config, &[])?;
+    let task = DesignTask::new(&config, &plants, options(args))?;
+    let progress = Progress::new("tune");
+    let line = ProgressLine::show(&progress);
+    let design = design(&task, &progress)?;
+    progress.begin("convex bound", 0);
+    let bound = match args.without_bound {
+        true => None,
+        false => bound_of(&task, design.attained),
+    };
+    drop(line);
+    let opposite = opposite_asymmetry(args, &config, &task, &design)?;
+    let extras = Extras { bound, opposite };
+    let certificate = Certificate::new(args.bench.profile(), &config, &task, &design, extras);
+    write(args, &task, &design, &certificate)?;
+    print_result(args.bench.json, &certificate, |certificate| {
+        text(certificate, args.explain, &args.out)
+    })?;
+    Ok(Outcome::Done)
+}
+
+fn options(args: &Args) -> DesignOptions {
+    DesignOptions {
+        requirements: Requirements {
+            goal: args.goal.into(),
+            modulus_margin: args.modulus_margin,
+            max_sensitivity: args.max_sensitivity.clone(),
+            max_control_sensitivity_a_per_m: args
+                .max_control_sensitivity
+                .map(|limit_a_per_um| limit_a_per_um * UM_PER_M),
+        },
+        tolerances: Tolerances {
+            frequency_ratio: args.frequency_tolerance,
+            damping_factor: args.damping_factor,
+        },
+        unmodelled_ratio: args.unmodelled_tolerance,
+        order: usize::from(args.order),
+        effort: Effort::default(),
+        seed: args.seed,
+    }
+}
+
+/// With --explain, the figures of the controller with the opposite mass asymmetry, which changes the signs of the residues.
+fn opposite_asymmetry(
+    args: &Args,
+    config: &Config,
+    task: &DesignTask,
+    design: &Design,
+) -> Result<Option<OppositeAsymmetry>, CliError> {
+    let asymmetry = config
+        .plant
+        .mass_asymmetry()
+        .filter(|d| *d != 0.0 && args.explain);
+    let Some(asymmetry) = asymmetry.map(|d| -d) else {
+        return Ok(None);
+    };
+    let setting = OptionSetting::new("plant.mass_asymmetry", asymmetry, "--explain");
+    let plants = plants(args, config, &[setting])?;
+    let path = SignalPath::from(config);
+    let plants = plants.into_iter();
+    let plants: Vec<_> = plants
+        .map(|p| DesignPlant::new(p.name, &path, p.modes))
+        .collect();
+    Ok(Some(OppositeAsymmetry {
+        mass_asymmetry: asymmetry,
+        plants: evaluate(task, &design.cascade, &plants),
+    }))
+}
+
+/// The plant at each operating point, or the configured one if it has none; `more` are further settings.
+fn plants(
+    args: &Args,
+    config: &Config,
+    more: &[OptionSetting],
+) -> Result<Vec<NamedPlant>, CliError> {
+    if args.bench.operating_point.is_some() {
+        return Err(CliError::Usage(
+            "--operating-point is one point, but a design is for several ones; use --operating-points".into(),
+        ));
+    }
+    let points_m = points_m(args, config)?;
+    if points_m.is_empty() {
+        let plant = args.bench.load(Purpose::Model, more)?.plant;
+        return Ok(vec![NamedPlant::of("the plant", &plant)?]);
+    }
+    let plants = points_m
+        .into_iter()
+        .map(|point_m| plant_at(args, point_m, more));
+    plants.collect()
+}
+
+/// The operating points in metres; none for a plant without them.
+fn points_m(args: &Args, config: &Config) -> Result<Vec<f64>, CliError> {
+    const COUNT: u32 = 5;
+    let configured = config.plant.operating_point_m();
+    let usage = |error: crate::util::quantity::QuantityError| CliError::Usage(error.to_string());
+    match (args.operating_points.is_empty(), configured) {
+        (true, Some(end_m)) => {
+            let parts = f64::from(COUNT - 1);
+            Ok((0..COUNT).map(|i| end_m * f64::from(i) / parts).collect())
+        }
+        (true, None) => Ok(Vec::new()),
+        (false, None) => Err(CliError::Usage(format!(
+            "--operating-points is not for the model `{}`, which has no operating point; leave it out",
+            config.plant.model()
+        ))),
+        (false, Some(_)) => {
+            let length_m = config.plant.beam_length_m();
+            let points = args.operating_points.iter();
+            points
+                .map(|point| point.metres(length_m).map_err(usage))
+                .collect()
+        }
+    }
+}
+
+fn plant_at(args: &Args, point_m: f64, more: &[OptionSetting]) -> Result<NamedPlant, CliError> {
+    let mut settings = more.to_vec();
+    settings.push(OptionSetting::new(
+        "plant.operating_point_m",
+        point_m,
+        "--operating-points",
+    ));
+    let plant = args.bench.load(Purpose::Model, &settings)?.plant;
+    let name = match plant.beam_length_m() {
+        Some(length_m) => format!("{} % of L", rounded_percent(point_m / length_m)),
+        None => format!("{} mm", point_m * 1e3),
+    };
+    Ok(NamedPlant::of(&name, &plant)?)
+}
+
+/// A ratio in percent without the rounding of its division.
+fn rounded_percent(ratio: f64) -> f64 {
+    (ratio * 1e6).round() / 1e4
+}
+
+/// Writes all files of the design.
+fn write(
+    args: &Args,
+    task: &DesignTask,
+    design: &Design,
+    certificate: &Certificate,
+) -> Result<(), CliError> {
+    let failed = |what: String| CliError::Failed(what);
+    std::fs::create_dir_all(&args.out).map_err(|e| cannot_write(&args.out, &e))?;
+    let json = serde_json::to_string_pretty(certificate);
+    let json = json.map_err(|e| failed(format!("cannot write JSON: {e}; report this")))?;
+    let curves = loop_curves(task, design);
+    let limits = DesignLimits::of(&task.requirements, design.attained);
+    let title = certificate.title();
+    let picture = |svg: Result<String, ReportError>| svg.map_err(|e| failed(e.to_string()));
+    let files = [
+        ("controller.toml", certificate.controller_file()),
+        ("certificate.json", json + "\n"),
+        (
+            "loop.svg",
+            picture(design_loop_svg(&curves, limits, &title))?,
+        ),
+        (
+            "nyquist.svg",
+            picture(design_nyquist_svg(&curves, limits, &title))?,
+        ),
+    ];
+    for (name, text) in files {
+        let path = args.out.join(name);
+        write_atomic(&path, &text).map_err(|e| cannot_write(&path, &e))?;
+    }
+    Ok(())
+}
+
+fn cannot_write(path: &Path, error: &std::io::Error) -> CliError {
+    CliError::Failed(format!(
+        "cannot write {}: {error}; choose another folder with --out",
+        path.display()
+    ))
+}

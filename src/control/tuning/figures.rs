@@ -1,0 +1,129 @@
+//! The verification of a design: stability from the poles of the closed loop, and margins on a fine grid.
+
+use serde::Serialize;
+
+use super::cascade::Cascade;
+use super::disturbance::Disturbance;
+use super::plant::DesignPlant;
+use super::requirement::{sensitivity_bandwidth_rad_s, slope_bandwidth_rad_s};
+use super::sampled::{SampledPlant, Spacing};
+use super::unmodelled::UnmodelledBound;
+use super::variance::sigma_m;
+use crate::control::StateSpace;
+use crate::util::units::UM_PER_M;
+
+/// Figures of the loop with one plant, with the modes that its model lacks at their most unfavourable phase.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct PlantFigures {
+    /// Name of the plant.
+    pub plant: String,
+    /// Whether all poles of the sampled closed loop lie inside the unit circle.
+    pub stable: bool,
+    /// Smallest |1 + L| - |C| U.
+    pub modulus_margin: f64,
+    /// Frequency in rad/s of the smallest one.
+    pub modulus_margin_at_rad_s: f64,
+    /// Largest ws with |S(jw)| <= w/(sqrt(2) ws) for all w <= ws.
+    pub slope_bandwidth_rad_s: f64,
+    /// Lowest frequency at which |S| rises through 1/sqrt(2).
+    pub sensitivity_bandwidth_rad_s: f64,
+    /// |S| at 10 rad/s.
+    pub sensitivity_at_10_rad_s: f64,
+    /// Largest |K S| in A/um.
+    pub control_sensitivity_a_per_um: f64,
+    /// Standard deviation of the error in metres under the disturbance and the noise of the configuration.
+    pub error_rms_m: f64,
+}
+
+/// The plants on fine grids that also follow the zeros and poles of the controller.
+pub fn fine_samples(
+    plants: &[DesignPlant],
+    bound: &UnmodelledBound,
+    disturbance: &Disturbance,
+    cascade: &Cascade,
+) -> Vec<SampledPlant> {
+    let mut features = cascade.pairs();
+    features.retain(|(_, damping_ratio)| *damping_ratio < 0.5);
+    features.extend(disturbance.features());
+    let sampled = plants.iter().map(|plant| {
+        let sampled = SampledPlant::of(plant, bound, Spacing::Fine, &features);
+        with_variances(sampled, plant, disturbance)
+    });
+    sampled.collect()
+}
+
+/// The sampled plant with the variances of disturbance and noise.
+pub fn with_variances(
+    sampled: SampledPlant,
+    plant: &DesignPlant,
+    disturbance: &Disturbance,
+) -> SampledPlant {
+    let period_s = plant.plant.period_s();
+    let variances = disturbance.variances(&plant.modes, &sampled.omega_rad_s, period_s);
+    SampledPlant {
+        variances,
+        ..sampled
+    }
+}
+
+/// The figures of each plant; `fine` are the plants of [`fine_samples`].
+pub fn figures(
+    plants: &[DesignPlant],
+    fine: &[SampledPlant],
+    cascade: &Cascade,
+) -> Vec<PlantFigures> {
+    let pairs = plants.iter().zip(fine);
+    pairs
+        .map(|(plant, fine)| PlantFigures::of(plant, fine, cascade))
+        .collect()
+}
+
+impl PlantFigures {
+    fn of(plant: &DesignPlant, fine: &SampledPlant, cascade: &Cascade) -> PlantFigures {
+        let grid = &fine.omega_rad_s;
+        let controller = fine.warped.iter().map(|s| cascade.response(*s));
+        let controller: Vec<_> = controller.collect();
+        let points = 0..grid.len();
+        let distances: Vec<f64> = points
+            .map(|i| {
+                let l = fine.response[i] * controller[i];
+                (l + 1.0).norm() - controller[i].norm() * fine.unmodelled[i]
+            })
+            .collect();
+        let lowest = (0..grid.len()).min_by(|a, b| distances[*a].total_cmp(&distances[*b]));
+        let lowest = lowest.unwrap_or(0);
+        let at_10 = grid.partition_point(|w| *w < 10.0).min(grid.len() - 1);
+        let control = controller.iter().zip(&distances);
+        let control = control.map(|(c, distance)| c.norm() / distance / UM_PER_M);
+        PlantFigures {
+            plant: plant.name.clone(),
+            stable: is_stable(plant, cascade),
+            modulus_margin: distances[lowest],
+            modulus_margin_at_rad_s: grid[lowest],
+            slope_bandwidth_rad_s: slope_bandwidth_rad_s(grid, distances.iter().copied()),
+            sensitivity_bandwidth_rad_s: sensitivity_bandwidth_rad_s(
+                grid,
+                distances.iter().copied(),
+            ),
+            sensitivity_at_10_rad_s: 1.0 / distances[at_10],
+            control_sensitivity_a_per_um: control.fold(0.0, f64::max),
+            error_rms_m: sigma_m(fine, cascade),
+        }
+    }
+}
+
+/// Whether all poles of the sampled closed loop lie inside the unit circle.
+fn is_stable(plant: &DesignPlant, cascade: &Cascade) -> bool {
+    let period_s = plant.plant.period_s();
+    let sections = cascade.sections();
+    let biquads = sections
+        .iter()
+        .map(|section| section.section().tustin(period_s));
+    let controller = biquads.fold(StateSpace::gain(UM_PER_M), |law, biquad| {
+        law.then(&StateSpace::from(&biquad))
+    });
+    let (a, b, c) = plant.plant.state_space();
+    let plant = StateSpace { a, b, c, d: 0.0 };
+    let poles = controller.then(&plant).closed_poles();
+    poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+}

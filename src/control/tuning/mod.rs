@@ -1,0 +1,48 @@
+//! Design of a controller for a set of plants.
+//!
+//! ```text
+//!  operating points, tolerances -> plant ---------------+
+//!  modes that the model lacks ---> unmodelled (bound U) -+-> sampled -> requirement, variance (slacks and their derivatives)
+//!  lines of the floor, noise ----> disturbance ----------+          |
+//!                                                                    v
+//!  cascade (parameters are logarithms) <--- subproblem (linear programme) <--- descent (trust region, nyquist)
+//!                                                                    |
+//!                    search (rising order, several starts) -> design (figures on a fine grid, binding requirements)
+//! ```
+//!
+//! The controller is evaluated at s = j (2/T) tan(w T/2), where a continuous section has exactly the response of the section that
+//! Tustin's rule makes of it: what is designed is what runs.
+
+mod binding;
+mod bound;
+mod cascade;
+mod cone_programme;
+mod curves;
+mod descent;
+mod design;
+mod disturbance;
+mod error;
+mod figures;
+mod nyquist;
+mod plant;
+mod requirement;
+mod sampled;
+mod search;
+mod subproblem;
+mod task;
+mod unmodelled;
+mod variance;
+
+pub use binding::Binding;
+pub use bound::ConvexBound;
+pub use cascade::{Cascade, ParameterLimits};
+pub use curves::{LoopCurve, loop_curves};
+pub use design::{Design, DesignTask, bound_of, design, evaluate};
+pub use disturbance::Disturbance;
+pub use error::{Conflict, TuneError};
+pub use figures::PlantFigures;
+pub use plant::{DesignPlant, Tolerances};
+pub use requirement::{Goal, Kind, Requirements, SensitivityLimit};
+pub use search::Effort;
+pub use task::{DesignOptions, NamedPlant};
+pub use unmodelled::UnmodelledBound;

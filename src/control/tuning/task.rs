@@ -1,0 +1,112 @@
+//! A design task from the settings of a bench.
+
+use super::cascade::ParameterLimits;
+use super::design::DesignTask;
+use super::disturbance::Disturbance;
+use super::error::TuneError;
+use super::plant::{DesignPlant, Tolerances};
+use super::requirement::Requirements;
+use super::search::Effort;
+use super::unmodelled::UnmodelledBound;
+use crate::config::Config;
+use crate::model::plant::{self, ModalModel, Mode, PlantError, PlantSettings, SignalPath};
+
+/// What is designed, and how.
+#[derive(Clone, Debug)]
+pub struct DesignOptions {
+    /// Goal and limits.
+    pub requirements: Requirements,
+    /// Tolerances of the modes.
+    pub tolerances: Tolerances,
+    /// Relative tolerance of the frequencies of modes that the model lacks.
+    pub unmodelled_ratio: f64,
+    /// Number of poles of the controller.
+    pub order: usize,
+    /// How much is tried.
+    pub effort: Effort,
+    /// Seed of the search.
+    pub seed: u64,
+}
+
+/// A plant of a design by its name, for example its operating point.
+#[derive(Clone, Debug)]
+pub struct NamedPlant {
+    /// Name, for messages.
+    pub name: String,
+    /// The modes.
+    pub modes: Vec<Mode>,
+}
+
+impl NamedPlant {
+    /// The modes of the plant of some settings.
+    ///
+    /// # Errors
+    /// The settings describe no plant.
+    pub fn of(name: &str, settings: &PlantSettings) -> Result<NamedPlant, PlantError> {
+        Ok(NamedPlant {
+            name: name.into(),
+            modes: ModalModel::of(&plant::build(settings)?)?.modes,
+        })
+    }
+}
+
+/// Damping ratio of pairs of poles from which on they are robust against the rounding of a file and of the tolerances of modes.
+const LEAST_POLE_DAMPING: f64 = 0.08;
+/// The largest frequency of a pole as part of half the sampling rate: at 5 kHz it is 6000 rad/s.
+const POLE_RANGE: f64 = 6000.0 / (std::f64::consts::PI * 5000.0);
+/// The smallest frequency of zeros and poles as part of that of the first mode.
+const LOWEST_RATIO: f64 = 5e-3;
+
+impl DesignTask {
+    /// The task for some plants at the signal path, with disturbances and unmodelled modes, of a configuration.
+    ///
+    /// # Errors
+    /// There is no plant.
+    pub fn new(
+        config: &Config,
+        plants: &[NamedPlant],
+        options: DesignOptions,
+    ) -> Result<DesignTask, TuneError> {
+        let path = SignalPath::from(config);
+        let first = plants.first().ok_or(TuneError::NoPlant)?;
+        let unmodelled = &config.sim.unmodelled;
+        let varied = plants.iter().flat_map(|plant| {
+            let (name, modes) = (&plant.name, &plant.modes);
+            DesignPlant::with_tolerances(name, &path, modes, &options.tolerances)
+        });
+        Ok(DesignTask {
+            plants: varied.collect(),
+            bound: UnmodelledBound::of(&path, unmodelled, options.unmodelled_ratio),
+            disturbance: disturbance(config),
+            limits: limits(&path, &first.modes),
+            requirements: options.requirements,
+            order: options.order,
+            effort: options.effort,
+            seed: options.seed,
+        })
+    }
+}
+
+/// Lines of the floor, and noise and quantisation of the probe: a step q has the variance q^2/12.
+fn disturbance(config: &Config) -> Disturbance {
+    let (noise_m, step_m) = (
+        config.sim.probe_noise_rms_m,
+        config.sim.probe_quantisation_m,
+    );
+    Disturbance {
+        floor: config.sim.floor.clone(),
+        noise_rms_m: (noise_m * noise_m + step_m * step_m / 12.0).sqrt(),
+    }
+}
+
+fn limits(path: &SignalPath, modes: &[Mode]) -> ParameterLimits {
+    let nyquist_rad_s = std::f64::consts::PI / path.period_s;
+    let pole_rad_s = POLE_RANGE * nyquist_rad_s;
+    let first = modes.iter().find(|mode| mode.omega_rad_s > 0.0);
+    let first_rad_s = first.map_or(pole_rad_s, |mode| mode.omega_rad_s);
+    ParameterLimits {
+        pole_rad_s,
+        lowest_rad_s: LOWEST_RATIO * first_rad_s.min(pole_rad_s),
+        pole_damping_ratio: LEAST_POLE_DAMPING,
+    }
+}
