@@ -195,6 +195,7 @@ impl Observed {
             | EventKind::State { .. }
             | EventKind::Lost { .. }
             | EventKind::ResetFailed { .. }
+            | EventKind::Override
             | EventKind::Clock(_) => {}
         }
     }

@@ -44,7 +44,7 @@ impl<'a> PlannedReference<'a> {
     }
 
     /// What reduces current and travel.
-    fn to_lower(&self) -> &'static str {
+    fn to_lower(self) -> &'static str {
         match self.config.control.feedforward.is_none() {
             true => "the values of the reference, or its slope",
             false => "the values of the reference, its slope, or control.feedforward.bandwidth_hz",

@@ -167,10 +167,10 @@ fn rejects_another_servo_rate() {
 fn rejects_a_transfer_function_that_rounding_defines_too_badly() {
     // Twelve poles at z = 0.99...: the coefficients, up to 924, define the response at low frequency to 1e-16 * 2^12/0.01^12, which is
     // no digit. The product of the printed coefficients has poles outside of the unit circle, or a response that is not reproducible.
-    let mut falling = vec![1.0];
-    for _ in 0..12 {
-        falling.push(0.0);
-        for i in (1..falling.len()).rev() {
+    let mut falling = vec![0.0; 13];
+    falling[0] = 1.0;
+    for order in 1..=12 {
+        for i in (1..=order).rev() {
             falling[i] -= 0.99 * falling[i - 1];
         }
     }

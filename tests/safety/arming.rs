@@ -271,6 +271,7 @@ fn failed_resets(bench: &Bench) -> Vec<(u64, i64)> {
         | EventKind::Trip(_)
         | EventKind::Completed
         | EventKind::Lost { .. }
+        | EventKind::Override
         | EventKind::Clock(_) => None,
     });
     failed.collect()

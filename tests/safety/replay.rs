@@ -197,6 +197,7 @@ fn tripped_runs_replay_bit_for_bit() {
                 | EventKind::State { .. }
                 | EventKind::Completed
                 | EventKind::ResetFailed { .. }
+                | EventKind::Override
                 | EventKind::Clock(_)
                 | EventKind::Lost { .. } => None,
             });

@@ -266,9 +266,7 @@ fn structure(bytes: &mut Bytes<'_>, shape: &[usize], depth: usize) -> Result<Val
     if length == 0 || names.len() / length > MAX_FIELDS {
         return Err(bytes.damaged("the names of fields"));
     }
-    let names = names
-        .chunks_exact(length)
-        .map(|name| text_before_null(name));
+    let names = names.chunks_exact(length).map(text_before_null);
     let fields = names.map(|name| Ok((name, inner(bytes, depth)?)));
     Ok(Value::Fields(fields.collect::<Result<_, FormatError>>()?))
 }

@@ -143,8 +143,8 @@ impl DesignTask {
 
     /// Frequencies in rad/s of the modes of the operating points, and of those that the model lacks.
     fn modes_rad_s(&self) -> Vec<f64> {
-        let nominal = self.plants.iter().filter(|plant| plant.is_nominal);
-        let modelled = nominal.last().map(DesignPlant::features);
+        let last = self.plants.iter().rfind(|plant| plant.is_nominal);
+        let modelled = last.map(DesignPlant::features);
         let features = modelled.unwrap_or_default().into_iter();
         features.chain(self.bound.edges()).map(|(w, _)| w).collect()
     }
