@@ -115,6 +115,7 @@ impl TestLoop {
                     EventKind::Request(_)
                     | EventKind::State { .. }
                     | EventKind::ResetFailed { .. }
+                    | EventKind::Override
                     | EventKind::Lost { .. }
                     | EventKind::Clock(_) => {}
                 },
