@@ -1,4 +1,6 @@
 //! Accepted settings: layers, units, profiles, and their output.
+use std::path::PathBuf;
+
 use serde_json::json;
 
 use crate::program::{self, Bench, number};
@@ -77,13 +79,27 @@ fn profiles_and_controllers_are_valid_and_found_by_name() {
     }
     for path in &toml_files(&bench_config().join("controllers")) {
         let name = path.file_stem().expect("a name").to_str().expect("UTF-8");
-        let margins = |controller: &str| bench.json(&format!("margins --controller {controller}"));
+        let profile = profile_of(name, &profiles);
+        let margins = |controller: &str| {
+            bench.json(&format!(
+                "margins --config {profile} --controller {controller}"
+            ))
+        };
         assert_eq!(
             margins(name),
             margins(path.to_str().expect("UTF-8")),
             "{name}"
         );
     }
+}
+
+/// The profile whose name begins the name of a controller; otherwise the default one.
+fn profile_of<'a>(controller: &str, profiles: &'a [PathBuf]) -> &'a str {
+    let names = profiles
+        .iter()
+        .map(|path| path.file_stem().expect("a name").to_str().expect("UTF-8"));
+    let mut names = names.filter(|name| controller.starts_with(*name));
+    names.next().unwrap_or("stage")
 }
 
 #[test]

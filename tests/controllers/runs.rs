@@ -155,8 +155,8 @@ fn discrete_zpk_has_the_margins_of_the_sections_that_the_loop_discretises() {
 fn run_with_a_discrete_controller_is_predicted_recorded_and_replayed() {
     let bench = Bench::new();
     bench.write("slow.toml", discrete_slow());
-    let run = bench.json("control --controller slow.toml --duration 0.6s --out run");
-    let slow = bench.json("control --slow --duration 0.6s --out reference");
+    let run = bench.json("control --controller slow.toml --duration 2s --out run");
+    let slow = bench.json("control --slow --duration 2s --out reference");
     // The same controller around the same stage with the same noise: measured and predicted agree to the digits of its poles.
     for name in ["measured", "predicted"] {
         let (a, b) = (

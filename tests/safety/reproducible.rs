@@ -68,10 +68,11 @@ fn two_second_run_has_the_reference_digest() {
 }
 
 /// The modules from the settings to a command.
-const COMMAND_PATH: [&str; 21] = [
+const COMMAND_PATH: [&str; 22] = [
     "rt",
     "rig/simulated",
     "excitation",
+    "excitation/command",
     "excitation/reference",
     "control/biquad.rs",
     "control/section.rs",

@@ -169,10 +169,10 @@ mod tests {
 
     #[test]
     fn zero_vibration_impulses_are_those_of_singer_and_seering() {
-        // zeta = 0.1: K = exp(-0.1 pi/sqrt(0.99)) = 0.729248, 1/(1 + K) = 0.578286; Td/2 = pi/(180 sqrt(0.99)) = 17.5413 ms.
+        // zeta = 0.1: K = exp(-0.1 pi/sqrt(0.99)) = 0.729248, 1/(1 + K) = 0.578286; Td/2 = pi/(180 sqrt(0.99)) = 17.54122 ms.
         let impulses = ImpulseShaper::Zv.impulses(&mode(0.1));
         assert!((impulses[0].amplitude - 0.578286).abs() < 5e-7);
-        assert!((impulses[1].time_s - 17.5413e-3).abs() < 5e-8);
+        assert!((impulses[1].time_s - 17.54122e-3).abs() < 5e-9);
     }
 
     #[test]

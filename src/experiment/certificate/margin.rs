@@ -203,7 +203,7 @@ mod tests {
         let without_begin = &rising[10..];
         assert_eq!(
             first_gap(without_begin, 1.0, 200.0),
-            Some((1.0, 1.1f64.powi(10)))
+            Some((1.0, rising[10]))
         );
         let (last_hz, to_hz) = (rising[59], 2.0 * rising[59]);
         assert_eq!(first_gap(&rising, 1.0, to_hz), Some((last_hz, to_hz)));

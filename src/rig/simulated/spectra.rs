@@ -59,17 +59,21 @@ impl DisturbanceSpectra {
         let response: Complex<f64> = modes
             .map(|mode| mode.resonance(s) * (mode.sensor_gain * mode.floor_gain))
             .sum();
-        acceleration * response.norm_sqr() * sinc(frequency_hz / self.rate_hz).powi(2)
+        acceleration * response.norm_sqr() * squared(sinc(frequency_hz / self.rate_hz))
     }
 
     /// The error of a reading, below half the rate of the loop.
     pub fn noise_m2_per_hz(&self, frequency_hz: f64) -> f64 {
         let white = 2.0 * self.noise_m2 / self.reading_hz;
         match self.reading_hz < self.rate_hz {
-            true => white * sinc(frequency_hz / self.reading_hz).powi(2),
+            true => white * squared(sinc(frequency_hz / self.reading_hz)),
             false => white,
         }
     }
+}
+
+fn squared(x: f64) -> f64 {
+    x * x
 }
 
 /// Spectrum of the acceleration of a line in (m/s^2)^2/Hz.
