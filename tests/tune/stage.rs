@@ -93,9 +93,10 @@ fn rms_goal_gives_a_smaller_error_than_the_goal_disturbance() {
     let disturbance = designed(requirements(Goal::Disturbance)).unwrap();
     let error_m = |design: &Design| design.figures[0].error_rms_m;
     assert!(error_m(&rms) < error_m(&disturbance));
-    // The thesis measured 0.050 um and 0.066 um with its two controllers, and 0.048 um is close to the floor's part at 70 Hz.
+    // The thesis measured 0.066 um with its slow controller, with |S| near 1 at 70 Hz, where most of the floor vibrates. No loop with this
+    // modulus margin has |S| below 0.3 there, with the first mode at 29 Hz and a sensitivity bandwidth below 70 Hz.
     assert!(
-        (0.03e-6..0.06e-6).contains(&error_m(&rms)),
+        (0.02e-6..0.06e-6).contains(&error_m(&rms)),
         "{}",
         error_m(&rms)
     );

@@ -12,8 +12,9 @@
 //! ```
 //!
 //! Q = M sum of x_n phi_n, where M has the lightly damped poles of the plant as zeros, and the phi_n are the orthonormal functions of
-//! Takenaka and Malmquist with real poles spread over the decades. M has a stable inverse, so that nothing is lost but what the finite
-//! number of functions lacks. The frequencies are those of a grid, which makes the bound larger, never smaller.
+//! Takenaka and Malmquist: half of their poles are real, spread over the decades, and half are pairs (Kautz 1954) at the modes and
+//! where the bound of the unmodelled modes bends. M has a stable inverse, so that nothing is lost but what the finite number of functions
+//! lacks. The frequencies are those of a grid, which makes the bound larger, never smaller.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -45,9 +46,22 @@ const FEASIBLE: f64 = 1e-5;
 /// The bound of unmodelled modes is left out below this part of |P|: the result is larger, never smaller.
 const NEGLIGIBLE: f64 = 0.02;
 
+/// A pole of the basis in the z plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum BasisPole {
+    Real(f64),
+    /// A pair by its real part and the square of its magnitude.
+    Pair {
+        re: f64,
+        square: f64,
+    },
+}
+
 /// The smallest bound of some plants. `None` for the goal [`Goal::Rms`], or if the solver fails.
+/// `bends_rad_s`: frequencies where the bound of the unmodelled modes bends.
 pub fn convex_bound(
     plants: &[(&DesignPlant, &SampledPlant)],
+    bends_rad_s: &[f64],
     requirements: &Requirements,
     attained: f64,
 ) -> Option<ConvexBound> {
@@ -56,7 +70,7 @@ pub fn convex_bound(
     }
     let (few, many) = FUNCTIONS;
     let bounds = plants.iter().filter_map(|(plant, sampled)| {
-        let basis = Basis::of(plant, sampled, few);
+        let basis = Basis::of(plant, sampled, bends_rad_s, few);
         Some((
             plant,
             sampled,
@@ -65,7 +79,7 @@ pub fn convex_bound(
     });
     let lowest = bounds.min_by(|a, b| a.2.total_cmp(&b.2))?;
     let (plant, sampled, with_half_rad_s) = lowest;
-    let basis = Basis::of(plant, sampled, many);
+    let basis = Basis::of(plant, sampled, bends_rad_s, many);
     Some(ConvexBound {
         plant: plant.name.clone(),
         limit_rad_s: basis.largest_target(sampled, requirements, with_half_rad_s)?,
@@ -81,9 +95,16 @@ struct Basis {
 }
 
 impl Basis {
-    fn of(plant: &DesignPlant, sampled: &SampledPlant, functions: usize) -> Basis {
+    fn of(
+        plant: &DesignPlant,
+        sampled: &SampledPlant,
+        bends_rad_s: &[f64],
+        functions: usize,
+    ) -> Basis {
         let period_s = plant.plant.period_s();
-        let poles = real_poles(plant, functions);
+        let pairs = functions / 4;
+        let mut poles = real_poles(plant, functions - 2 * pairs);
+        poles.extend(pole_pairs(plant, bends_rad_s, pairs));
         let at = |w: &f64| {
             let (sine, cosine) = libm::sincos(w * period_s);
             let z = Complex::new(cosine, sine);
@@ -168,26 +189,71 @@ impl Basis {
     }
 }
 
-/// Real poles of the basis from a tenth of the first mode to half the sampling rate, in the z plane.
-fn real_poles(plant: &DesignPlant, functions: usize) -> Vec<f64> {
+/// Real poles of the basis from a tenth of the first mode to half the sampling rate.
+fn real_poles(plant: &DesignPlant, functions: usize) -> Vec<BasisPole> {
     let period_s = plant.plant.period_s();
     let high = 0.6 * std::f64::consts::PI / period_s;
     let first = plant.modes.iter().find(|mode| mode.omega_rad_s > 0.0);
     let low = 0.1 * first.map_or(high, |mode| mode.omega_rad_s).min(high);
     let last = functions.saturating_sub(2).max(1) as f64;
-    (0..functions - 1)
+    (0..functions.saturating_sub(1))
         .map(|i| low * libm::pow(high / low, i as f64 / last))
-        .map(|rate| libm::exp(-rate * period_s))
+        .map(|rate| BasisPole::Real(libm::exp(-rate * period_s)))
         .collect()
 }
 
-/// 1, and the functions sqrt(1 - a_n^2)/(z - a_n) product over j < n of (1 - a_j z)/(z - a_j).
-fn orthonormal(poles: &[f64], z: Complex<f64>) -> Vec<Complex<f64>> {
+/// Damping ratios of the pairs, in the order in which they are used.
+const PAIR_DAMPING: [f64; 4] = [0.1, 0.3, 0.03, 0.6];
+
+/// Pairs of poles at the modes and at `bends_rad_s`, below half the sampling rate: all frequencies with the first damping ratio, then
+/// all with the next one.
+fn pole_pairs(plant: &DesignPlant, bends_rad_s: &[f64], count: usize) -> Vec<BasisPole> {
+    let period_s = plant.plant.period_s();
+    let modes = plant.features().into_iter().map(|(w, _)| w);
+    let places = modes.chain(bends_rad_s.iter().copied());
+    let places: Vec<f64> = places
+        .filter(|w| w * period_s < std::f64::consts::PI)
+        .collect();
+    let pairs = PAIR_DAMPING
+        .iter()
+        .flat_map(|zeta| places.iter().map(move |w| (*w, *zeta)));
+    pairs
+        .take(count)
+        .map(|(w, zeta)| pole_pair(w * period_s, zeta))
+        .collect()
+}
+
+fn pole_pair(angle: f64, damping_ratio: f64) -> BasisPole {
+    let radius = libm::exp(-damping_ratio * angle);
+    let turn = angle * (1.0 - damping_ratio * damping_ratio).sqrt();
+    BasisPole::Pair {
+        re: radius * libm::cos(turn),
+        square: radius * radius,
+    }
+}
+
+/// The constant 1, and the functions of Takenaka and Malmquist at z: each is a low pass or a resonance times the all-passes of the
+/// poles before it, with which the functions are orthonormal on the unit circle. A real pole a gives sqrt(1 - a^2)/(z - a); a pair with
+/// the denominator d = z^2 - 2 re z + square gives sqrt(1 - square^2) (z - b)/d and sqrt((1 - square^2)(1 - b^2))/d, where
+/// b = 2 re/(1 + square).
+fn orthonormal(poles: &[BasisPole], z: Complex<f64>) -> Vec<Complex<f64>> {
     let mut values = vec![Complex::new(1.0, 0.0)];
     let mut all_pass = Complex::new(1.0, 0.0);
-    for a in poles {
-        values.push(all_pass * (1.0 - a * a).sqrt() / (z - a));
-        all_pass *= (-z * a + 1.0) / (z - a);
+    for pole in poles {
+        match *pole {
+            BasisPole::Real(a) => {
+                values.push(all_pass * (1.0 - a * a).sqrt() / (z - a));
+                all_pass *= (-z * a + 1.0) / (z - a);
+            }
+            BasisPole::Pair { re, square } => {
+                let denominator = z * z - z * (2.0 * re) + square;
+                let b = 2.0 * re / (1.0 + square);
+                let scale = (1.0 - square * square).sqrt();
+                values.push(all_pass * (z - b) * scale / denominator);
+                values.push(all_pass * (scale * (1.0 - b * b).sqrt()) / denominator);
+                all_pass *= (z * z * square - z * (2.0 * re) + 1.0) / denominator;
+            }
+        }
     }
     values
 }
@@ -208,4 +274,33 @@ fn notch(plant: &DesignPlant, z: Complex<f64>) -> Complex<f64> {
         value *= zeros / (pole * pole);
     }
     value
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn basis_functions_are_orthonormal_on_the_unit_circle() {
+        let poles = [
+            BasisPole::Real(0.7),
+            pole_pair(0.4, 0.1),
+            BasisPole::Real(-0.2),
+            pole_pair(1.3, 0.5),
+        ];
+        // The mean over N points equals the integral up to the largest radius, 0.96, to the power of N.
+        const POINTS: usize = 2000;
+        let values: Vec<Vec<Complex<f64>>> = (0..POINTS)
+            .map(|k| std::f64::consts::TAU * k as f64 / POINTS as f64)
+            .map(|angle| orthonormal(&poles, Complex::from_polar(1.0, angle)))
+            .collect();
+        for i in 0..7 {
+            for j in 0..7 {
+                let products = values.iter().map(|phi| phi[i] * phi[j].conj());
+                let mean = products.sum::<Complex<f64>>() / POINTS as f64;
+                let expected = if i == j { 1.0 } else { 0.0 };
+                assert!((mean - expected).norm() < 1e-12, "{i} {j}: {mean}");
+            }
+        }
+    }
 }

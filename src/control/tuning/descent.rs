@@ -187,6 +187,10 @@ impl Walk<'_> {
         while stride > shortest && self.steps > 0 {
             self.radius = self.radius.clamp(0.02, WIDEST);
             let next = self.problem.requirements.harder(attained, stride);
+            // Zero and infinity do not become harder.
+            if next == attained || !next.is_finite() {
+                break;
+            }
             let ascent = self.ascend(from, next);
             from = ascent.cascade;
             if ascent.slack >= 0.0 {

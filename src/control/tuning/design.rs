@@ -104,7 +104,9 @@ pub fn bound_of(task: &DesignTask, attained: f64) -> Option<ConvexBound> {
         .iter()
         .map(|(plant, sampled)| (*plant, sampled))
         .collect();
-    convex_bound(&pairs, &task.requirements, attained)
+    let bends = task.bound.edges().into_iter().map(|(w, _)| w);
+    let bends_rad_s: Vec<f64> = bends.collect();
+    convex_bound(&pairs, &bends_rad_s, &task.requirements, attained)
 }
 
 impl DesignTask {

@@ -346,8 +346,8 @@ pub fn slope_bandwidth_rad_s(omega_rad_s: &[f64], distances: impl Iterator<Item 
         }
         let figure = w * distance.max(0.0) / std::f64::consts::SQRT_2;
         if figure < w {
-            let (w0, e0) = before.unwrap_or((0.0, 0.0));
-            let crossing = w0 + (w - w0) * e0 / (e0 + w - figure);
+            // Below the first frequency L is K/s, and F nearly constant.
+            let crossing = before.map_or(figure, |(w0, e0)| w0 + (w - w0) * e0 / (e0 + w - figure));
             return attained.min(crossing);
         }
         attained = attained.min(figure);
