@@ -35,10 +35,21 @@ impl Default for Effort {
     }
 }
 
+impl Effort {
+    /// Half of the cascades.
+    fn half(&self) -> Effort {
+        Effort {
+            kept: (2 * self.kept).div_ceil(3),
+            grown: (3 * self.grown).div_ceil(4),
+            ..*self
+        }
+    }
+}
+
 /// The best cascade of an order: searched with the plants of `problem`, finally improved with those of `whole`.
 ///
-/// For the goal [`Goal::Bandwidth`] half of the starts come from a search for the goal [`Goal::Disturbance`]: such a loop has much
-/// rejection at low frequency, which can be exchanged for bandwidth.
+/// For the goals [`Goal::Bandwidth`] and [`Goal::Rms`] half of the effort is a search for the goal [`Goal::Disturbance`]: such a loop
+/// has much rejection at low frequency, which can be exchanged for bandwidth or for less error elsewhere.
 pub fn search(
     problem: &Problem,
     whole: &Problem,
@@ -47,10 +58,14 @@ pub fn search(
     seed: u64,
     progress: &Progress,
 ) -> Candidate {
-    let mut kept = grow(problem, order, effort, seed, progress);
-    if problem.requirements.goal == Goal::Bandwidth {
+    let mut kept = Vec::new();
+    if problem.requirements.goal == Goal::Disturbance {
+        kept = grow(problem, order, effort, seed, progress);
+    } else {
         let guide = problem.with_goal(Goal::Disturbance);
-        kept.extend(grow(&guide, order, effort, seed, progress));
+        for problem in [problem, &guide] {
+            kept.extend(grow(problem, order, &effort.half(), seed, progress));
+        }
     }
     progress.begin("improvement", kept.len() as u64);
     let improved = kept.iter().map(|candidate| {
