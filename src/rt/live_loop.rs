@@ -178,8 +178,9 @@ impl LoopEnds {
 
     /// One run.
     fn serve(&mut self, servo: &mut Servo, run: Box<ServoRun>, clock: impl Clock) {
-        let idle = servo.exchange(run);
+        let mut idle = servo.exchange(run);
         run_to_end(servo, clock);
+        idle.restart_clocks();
         let ended = servo.exchange(idle);
         // The ring holds one run, and the next one begins after this one was taken.
         let _ = self.ended.push(ended);

@@ -98,6 +98,11 @@ pub struct RunOutcome {
 }
 
 impl ServoRun {
+    /// Its time begins at 0 again: the clocks of the system are published at its next tick.
+    pub(super) fn restart_clocks(&mut self) {
+        self.clocks_due_ns = 0;
+    }
+
     /// A run without a program: it comes with a request.
     pub fn new(interlocks: Interlocks, connections: Connections) -> Self {
         ServoRun {
