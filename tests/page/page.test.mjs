@@ -80,6 +80,10 @@ test("every control does its work", async () => {
   await fill("run-note", "note of anna");
   await choose("on-disconnect", "stop");
   assert.ok(await page.isDisabled("#start"), "no start without a plan");
+  await fill("certificate", "missing_certificate.json");
+  await click("plan");
+  await planSays(page, "missing_certificate.json: cannot read the file");
+  await fill("certificate", "");
   await click("plan");
   await planSays(page, "Travel.*Current.*Duration");
   await click("start");
@@ -205,7 +209,7 @@ test("every control does its work", async () => {
   const controls = await page.evaluate(() => [...document.querySelectorAll("button[id], select[id], input[id], textarea[id], canvas[tabindex]")].map((control) => control.id));
   const unused = controls.filter((id) => !used.has(id) && id !== "token");
   assert.deepEqual(unused, [], "controls without a test");
-  assert.deepEqual(page.faults, ["422 /api/v1/tune"], "only the gain is refused");
+  assert.deepEqual(page.faults, ["422 /api/v1/plan", "422 /api/v1/tune"], "only the missing certificate and the gain are refused");
   await page.context().close();
 });
 
