@@ -66,7 +66,7 @@ pub struct ZpkSettings {
     pub gain: f64,
 }
 
-/// Matrices, continuous or discrete: x' = A x + B e or x[k+1] = A x[k] + B e[k], and u = C x + D e.
+/// Matrices, continuous or discrete: x' = A x + B e or x+ = A x + B e, and u = C x + D e.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SsSettings {
