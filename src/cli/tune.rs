@@ -9,13 +9,13 @@ use super::error::CliError;
 use super::help::GLOSSARY;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::print_result;
+use super::output::{print_result, warn};
 use super::progress::ProgressLine;
 use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, NamedPlant, Requirements,
-    SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, NamedPlant, PlantFigures,
+    Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
 };
 use crate::model::plant::SignalPath;
 use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
@@ -167,7 +167,20 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.bench.json, &certificate, |certificate| {
         text(certificate, args.explain, &args.out)
     })?;
-    Ok(Outcome::Done)
+    Ok(match design.misses_margin(args.modulus_margin) {
+        None => Outcome::Done,
+        Some(figures) => {
+            warn(&[missed_margin(figures, args.modulus_margin)]);
+            Outcome::Failed
+        }
+    })
+}
+
+fn missed_margin(figures: &PlantFigures, least: f64) -> String {
+    format!(
+        "the modulus margin at {} is {:.4} at {:.0} rad/s, below the limit of {least} (--modulus-margin): the search ended before it fulfilled it; choose another --seed, or a lower --order",
+        figures.plant, figures.modulus_margin, figures.modulus_margin_at_rad_s
+    )
 }
 
 fn options(args: &Args) -> DesignOptions {

@@ -48,6 +48,23 @@ pub struct Design {
     pub binding: Vec<Binding>,
 }
 
+impl Design {
+    /// The plant with the smallest modulus margin, if it is below `least`: the search ended before it fulfilled the limit between the
+    /// frequencies of its grid.
+    pub fn misses_margin(&self, least: f64) -> Option<&PlantFigures> {
+        let margin = |figures: &&PlantFigures| figures.modulus_margin;
+        let smallest = self
+            .figures
+            .iter()
+            .min_by(|a, b| margin(a).total_cmp(&margin(b)));
+        smallest.filter(|figures| {
+            // A margin that is not a number misses the limit.
+            let fulfils = figures.modulus_margin >= least;
+            !fulfils
+        })
+    }
+}
+
 /// The search designs for a modulus margin that is larger by this ratio, so that rounding and the grid cost nothing.
 const RESERVE: f64 = 1e-3;
 /// Rounds of verification and improvement.
