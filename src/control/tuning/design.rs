@@ -8,7 +8,7 @@ use super::disturbance::Disturbance;
 use super::error::{Conflict, TuneError};
 use super::figures::{PlantFigures, figures, fine_samples, with_variances};
 use super::plant::DesignPlant;
-use super::requirement::{Goal, Requirements};
+use super::requirement::{Goal, Kind, Requirements, Slack};
 use super::sampled::{SampledPlant, Spacing};
 use super::search::{Effort, search};
 use super::unmodelled::UnmodelledBound;
@@ -67,8 +67,13 @@ impl Design {
 
 /// The search designs for a modulus margin that is larger by this ratio, so that rounding and the grid cost nothing.
 const RESERVE: f64 = 1e-3;
-/// Rounds of verification and improvement.
-const ROUNDS: usize = 4;
+/// Factor of the reserve from one round of verification to the next: the valleys between the frequencies of the grid become
+/// flatter with each round, and the reserve deeper.
+const RESERVE_GROWTH: f64 = 1.5;
+/// Rounds of verification and improvement in which a missed limit is mended.
+const ROUNDS: usize = 10;
+/// Of these, rounds in which a missed goal is mended too. Later only the goal that is attained counts.
+const GOAL_ROUNDS: usize = 4;
 /// Slack up to which a requirement binds.
 const BINDING: f64 = 0.01;
 
@@ -81,18 +86,19 @@ pub fn design(task: &DesignTask, progress: &Progress) -> Result<Design, TuneErro
     let (order, effort, seed) = (task.order, &task.effort, task.seed);
     let extremes = task.with_extreme_plants(&problem);
     let mut candidate = search(&extremes, &problem, order, effort, seed, progress);
-    progress.begin("verification", ROUNDS as u64);
-    for _ in 0..ROUNDS {
+    progress.begin("verification", 0);
+    for round in 0..ROUNDS {
         let target = candidate
             .target
             .ok_or_else(|| task.conflict(&problem, &candidate))?;
-        let missed = task.missed(&candidate.cascade, target);
+        let mends_goal = round < GOAL_ROUNDS;
+        let missed = task.missed(&candidate.cascade.clone().rounded(), target, mends_goal);
         if missed.iter().all(Vec::is_empty) {
             break;
         }
         task.add_points(&mut problem, &missed);
+        problem.requirements.modulus_margin = task.margin_with_reserve(round + 1);
         candidate = problem.improve(&candidate.cascade, task.effort.final_steps / 2);
-        progress.advance(1);
     }
     match candidate.target {
         Some(_) => task.verified(candidate.cascade),
@@ -133,16 +139,21 @@ impl DesignTask {
             let sampled = SampledPlant::of(plant, &self.bound, Spacing::Search, &features);
             self.completed(sampled, plant)
         });
-        let margin = self.requirements.modulus_margin * (1.0 + RESERVE);
         Problem {
             plants: plants.collect(),
             requirements: Requirements {
-                modulus_margin: margin,
+                modulus_margin: self.margin_with_reserve(0),
                 ..self.requirements.clone()
             },
             limits: self.limits,
             modes_rad_s: self.modes_rad_s(),
         }
+    }
+
+    /// The modulus margin for which a round of verification designs.
+    fn margin_with_reserve(&self, round: usize) -> f64 {
+        let reserve = RESERVE * libm::pow(RESERVE_GROWTH, round as f64);
+        self.requirements.modulus_margin * (1.0 + reserve)
     }
 
     /// The problem with the variations of the first and of the last operating point only, and all operating points themselves.
@@ -183,12 +194,16 @@ impl DesignTask {
         }
     }
 
-    /// For each plant the frequencies in rad/s of the fine grid where a requirement is missed.
-    fn missed(&self, cascade: &Cascade, target: f64) -> Vec<Vec<f64>> {
+    /// For each plant the frequencies in rad/s of the fine grid where a limit is missed, or also the goal.
+    fn missed(&self, cascade: &Cascade, target: f64, with_goal: bool) -> Vec<Vec<f64>> {
         let fine = fine_samples(&self.plants, &self.bound, &self.disturbance, cascade);
         let slacks = self.requirements.slacks(&fine, cascade, target);
+        let counts = |slack: &&Slack| with_goal || slack.kind != Kind::Goal;
         let mut missed = vec![Vec::new(); fine.len()];
-        for slack in valleys(&slacks).filter(|slack| slack.value < 0.0) {
+        for slack in valleys(&slacks)
+            .filter(|slack| slack.value < 0.0)
+            .filter(counts)
+        {
             missed[slack.plant].push(fine[slack.plant].omega_rad_s[slack.point]);
         }
         missed
