@@ -14,8 +14,9 @@ use super::progress::ProgressLine;
 use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, NamedPlant, PlantFigures,
-    Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, NamedPlant,
+    PlantFigures, Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate,
+    loop_curves,
 };
 use crate::model::plant::SignalPath;
 use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
@@ -41,6 +42,12 @@ pub(super) struct Args {
     /// Least modulus margin 1/max|S| at all frequencies of all plants
     #[arg(long, value_name = "RATIO", default_value = "0.5", value_parser = margin)]
     modulus_margin: f64,
+    /// Least gain margin, a ratio above 1, kept by a disc that L must not enter [default: what the modulus margin guarantees]
+    #[arg(long, value_name = "RATIO", value_parser = gain_margin)]
+    gain_margin: Option<f64>,
+    /// Least phase margin in degrees, kept by the same disc [default: what the modulus margin guarantees]
+    #[arg(long, value_name = "DEGREES", value_parser = phase_margin_deg)]
+    phase_margin: Option<f64>,
     /// Operating points for which the one controller is designed: lengths, or % of the beam length [default: five points from 0
     /// to the configured one]
     #[arg(long, value_name = "LENGTH,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = OperatingPoint::with_unit)]
@@ -51,12 +58,18 @@ pub(super) struct Args {
     /// Upper limit of |K S|, the response from noise to current, in A/um
     #[arg(long, value_name = "A_PER_UM", value_parser = positive)]
     max_control_sensitivity: Option<f64>,
+    /// Upper limit of the standard deviation of the current in A, under the disturbance and noise of the configuration
+    #[arg(long, value_name = "A", value_parser = positive)]
+    max_current_rms: Option<f64>,
     /// Relative tolerance of the mode frequencies, of the first mode and of all others together
     #[arg(long, value_name = "RATIO", default_value = "1%", value_parser = si::<OfRatio>)]
     frequency_tolerance: f64,
     /// Factor of the damping ratios in the least damped plant
     #[arg(long, value_name = "RATIO", default_value = "0.7", value_parser = factor)]
     damping_factor: f64,
+    /// Relative tolerance of the gain, for example of the force constant
+    #[arg(long, value_name = "RATIO", default_value = "0", value_parser = si::<OfRatio>)]
+    gain_tolerance: f64,
     /// Relative tolerance of the frequencies of modes that the model lacks (sim.unmodelled); their phases are unknown
     #[arg(long, value_name = "RATIO", default_value = "3%", value_parser = si::<OfRatio>)]
     unmodelled_tolerance: f64,
@@ -112,6 +125,28 @@ fn margin(text: &str) -> Result<f64, String> {
     }
 }
 
+/// A gain margin. For clap.
+fn gain_margin(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (1.01..=100.0).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 1.01 and 100; a usual value is 2"
+        )),
+    }
+}
+
+/// A phase margin in degrees. For clap.
+fn phase_margin_deg(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (1.0..=80.0).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 1 and 80; a usual value is 40"
+        )),
+    }
+}
+
 fn positive(text: &str) -> Result<f64, String> {
     let value = number(text)?;
     match value > 0.0 {
@@ -150,7 +185,7 @@ fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> {
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
     let plants = plants(args, &config, &[])?;
-    let task = DesignTask::new(&config, &plants, options(args))?;
+    let task = DesignTask::new(&config, &plants, options(args)?)?;
     let progress = Progress::new("tune");
     let line = ProgressLine::show(&progress);
     let design = design(&task, &progress)?;
@@ -183,8 +218,11 @@ fn missed_margin(figures: &PlantFigures, least: f64) -> String {
     )
 }
 
-fn options(args: &Args) -> DesignOptions {
-    DesignOptions {
+fn options(args: &Args) -> Result<DesignOptions, CliError> {
+    let phase_margin_rad = args.phase_margin.map(f64::to_radians);
+    let margin_disc = MarginDisc::of(args.modulus_margin, args.gain_margin, phase_margin_rad)
+        .map_err(|e| CliError::Usage(e.to_string()))?;
+    Ok(DesignOptions {
         requirements: Requirements {
             goal: args.goal.into(),
             modulus_margin: args.modulus_margin,
@@ -192,16 +230,19 @@ fn options(args: &Args) -> DesignOptions {
             max_control_sensitivity_a_per_m: args
                 .max_control_sensitivity
                 .map(|limit_a_per_um| limit_a_per_um * UM_PER_M),
+            margin_disc,
+            max_current_rms_a: args.max_current_rms,
         },
         tolerances: Tolerances {
             frequency_ratio: args.frequency_tolerance,
             damping_factor: args.damping_factor,
+            gain_ratio: args.gain_tolerance,
         },
         unmodelled_ratio: args.unmodelled_tolerance,
         order: usize::from(args.order),
         effort: Effort::default(),
         seed: args.seed,
-    }
+    })
 }
 
 /// With --explain, the figures of the controller with the opposite mass asymmetry, which changes the signs of the residues.

@@ -126,9 +126,12 @@ pub(super) fn text(certificate: &Certificate, explain: bool, folder: &Path) -> S
         "|S| at 10",
         "|KS| A/um",
         "rms um",
+        "rms A",
+        "gain margin",
+        "phase deg",
     ];
     let rows: Vec<Vec<String>> = certificate.plants.iter().map(plant_row).collect();
-    let legend = "margin: modulus margin; slope, bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; rms: error under the disturbance and noise of the configuration";
+    let legend = "margin: modulus margin; slope, bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; rms: error and current under the disturbance and noise of the configuration; gain margin, phase: gain margin and phase margin";
     let folder = folder.display();
     let files = format!(
         "files: {folder}/controller.toml, certificate.json, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
@@ -200,7 +203,14 @@ fn plant_row(figures: &PlantFigures) -> Vec<String> {
         format!("{:.4}", figures.sensitivity_at_10_rad_s),
         format!("{:.4}", figures.control_sensitivity_a_per_um),
         format!("{:.4}", figures.error_rms_m * 1e6),
+        format!("{:.4}", figures.current_rms_a),
+        optional(figures.gain_margin, 2),
+        optional(figures.phase_margin_deg, 1),
     ]
+}
+
+fn optional(value: Option<f64>, digits: usize) -> String {
+    value.map_or("none".into(), |value| format!("{value:.digits$}"))
 }
 
 fn binding_text(binding: &[Binding]) -> String {

@@ -6,6 +6,7 @@ mod estimators;
 mod fit_intervals;
 mod frf_bias_and_coverage;
 mod frf_noise;
+mod held_out_designs;
 mod joint_estimate;
 mod measured_margins;
 mod modes;

@@ -73,6 +73,7 @@ fn integrator_for_a_static_plant_with_delay_has_the_best_slope_bandwidth_of_a_sc
         tolerances: Tolerances {
             frequency_ratio: 0.0,
             damping_factor: 1.0,
+            gain_ratio: 0.0,
         },
         unmodelled_ratio: 0.0,
         order: 1,

@@ -2,13 +2,18 @@
 
 use bench::config::{Config, Source, load};
 use bench::control::tuning::{
-    Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, SensitivityLimit,
-    Tolerances, TuneError, design,
+    Design, DesignOptions, DesignTask, Effort, Goal, MarginDisc, NamedPlant, Requirements,
+    SensitivityLimit, Tolerances, TuneError, design,
 };
 use bench::util::progress::Progress;
 
 pub fn config(sets: &[&str]) -> Config {
+    config_of("stage", sets)
+}
+
+fn config_of(profile: &str, sets: &[&str]) -> Config {
     load(&Source {
+        config: Some(profile.into()),
         sets: sets.iter().map(|set| set.to_string()).collect(),
         ..Source::default()
     })
@@ -21,17 +26,24 @@ pub fn requirements(goal: Goal) -> Requirements {
         modulus_margin: 0.5,
         max_sensitivity: Vec::new(),
         max_control_sensitivity_a_per_m: None,
+        margin_disc: None,
+        max_current_rms_a: None,
     }
 }
 
 /// A design of order 4 for the configured operating point with its tolerances, with little effort.
 pub fn task(config: &Config, requirements: Requirements) -> DesignTask {
     let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
-    let options = DesignOptions {
+    DesignTask::new(config, &[plant], options(requirements)).unwrap()
+}
+
+fn options(requirements: Requirements) -> DesignOptions {
+    DesignOptions {
         requirements,
         tolerances: Tolerances {
             frequency_ratio: 0.01,
             damping_factor: 0.7,
+            gain_ratio: 0.0,
         },
         unmodelled_ratio: 0.03,
         order: 4,
@@ -42,8 +54,16 @@ pub fn task(config: &Config, requirements: Requirements) -> DesignTask {
             final_steps: 40,
         },
         seed: 3,
-    };
-    DesignTask::new(config, &[plant], options).unwrap()
+    }
+}
+
+/// The message with which a design for the stage of a profile is refused.
+fn refused(profile: &str, sets: &[&str]) -> String {
+    let config = config_of(profile, sets);
+    let plant = NamedPlant::of("the plant", &config.plant).unwrap();
+    let task =
+        DesignTask::new(&config, &[plant], options(requirements(Goal::Disturbance))).unwrap();
+    design(&task, &Progress::default()).unwrap_err().to_string()
 }
 
 fn designed(requirements: Requirements) -> Result<Design, TuneError> {
@@ -122,4 +142,99 @@ fn limits_that_exclude_each_other_are_named() {
     ] {
         assert!(message.contains(part), "{part}: {message}");
     }
+}
+
+#[test]
+fn design_keeps_gain_and_phase_margin_at_all_plants() {
+    let disc = MarginDisc::of(0.5, Some(2.5), Some(40f64.to_radians())).unwrap();
+    let limited = Requirements {
+        margin_disc: disc,
+        ..requirements(Goal::Disturbance)
+    };
+    let found = designed(limited).unwrap();
+    for figures in &found.figures {
+        let (gain, phase_deg) = (
+            figures.gain_margin.unwrap(),
+            figures.phase_margin_deg.unwrap(),
+        );
+        // 0.1 % of reserve on the grid of the search, and the crossings are interpolated.
+        assert!((2.49..20.0).contains(&gain), "{figures:?}");
+        assert!((39.8..120.0).contains(&phase_deg), "{figures:?}");
+    }
+    let free = designed(requirements(Goal::Disturbance)).unwrap();
+    assert!(found.attained < free.attained);
+}
+
+#[test]
+fn design_keeps_the_limit_of_the_rms_current() {
+    let free = designed(requirements(Goal::Rms)).unwrap();
+    let limit_a = 0.7 * free.figures[0].current_rms_a;
+    let limited = Requirements {
+        max_current_rms_a: Some(limit_a),
+        ..requirements(Goal::Rms)
+    };
+    let found = designed(limited).unwrap();
+    let figures = &found.figures[0];
+    // The sum over the grid of the search differs from that over the fine grid.
+    assert!(
+        (0.5 * limit_a..1.01 * limit_a).contains(&figures.current_rms_a),
+        "{figures:?} for {limit_a} A"
+    );
+    assert!(figures.error_rms_m > free.figures[0].error_rms_m);
+}
+
+#[test]
+fn gain_tolerance_adds_two_plants_that_keep_the_margin() {
+    let config = config(&[]);
+    let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
+    let mut options = options(requirements(Goal::Disturbance));
+    options.tolerances.gain_ratio = 0.1;
+    let task = DesignTask::new(&config, &[plant], options).unwrap();
+    let found = design(&task, &Progress::default()).unwrap();
+    assert_eq!(found.figures.len(), 8);
+    let names: Vec<&str> = found.figures.iter().map(|f| f.plant.as_str()).collect();
+    assert!(names.contains(&"8 % of L, gain +10 %") && names.contains(&"8 % of L, gain -10 %"));
+    assert!(
+        found
+            .figures
+            .iter()
+            .all(|f| f.stable && f.modulus_margin > 0.4995)
+    );
+}
+
+#[test]
+fn refuses_a_stage_without_a_spring_to_ground() {
+    let message = refused("four-mass", &[]);
+    assert!(
+        message.contains("frequency zero") && message.contains("spring to ground"),
+        "{message}"
+    );
+}
+
+#[test]
+fn refuses_a_negative_static_compliance() {
+    let message = refused(
+        "three-mass",
+        &[
+            "plant.nodes.u.sensor=-0.1148",
+            "plant.nodes.v.sensor=-0.0733",
+            "plant.nodes.b.sensor=-0.6873",
+        ],
+    );
+    assert!(
+        message.contains("negative") && message.contains("sign"),
+        "{message}"
+    );
+}
+
+/// The modes have damping ratios of 0.001: resonances and the zeros near them are narrower than the grid of the search.
+#[test]
+fn finds_a_controller_for_a_stage_with_little_damping() {
+    let config = config_of("chapter2", &[]);
+    let plant = NamedPlant::of("5 % of L", &config.plant).unwrap();
+    let options = options(requirements(Goal::Disturbance));
+    let task = DesignTask::new(&config, &[plant], options).unwrap();
+    let found = design(&task, &Progress::default()).unwrap();
+    assert!(found.misses_margin(0.5).is_none(), "{:?}", found.figures);
+    assert!(found.figures.iter().all(|figures| figures.stable));
 }

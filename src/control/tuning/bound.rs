@@ -88,6 +88,22 @@ pub fn convex_bound(
     })
 }
 
+/// The first plant for which the limits alone, without a goal, have no solution with the full number of basis functions.
+/// `None` if there is a solution for each plant alone, or if the solver fails.
+pub fn excluded_plant(
+    plants: &[(&DesignPlant, &SampledPlant)],
+    bends_rad_s: &[f64],
+    requirements: &Requirements,
+) -> Option<String> {
+    const NO_GOAL: f64 = 0.0;
+    let excluded = plants.iter().find(|(plant, sampled)| {
+        let basis = Basis::of(plant, sampled, bends_rad_s, FUNCTIONS.1);
+        let programme = basis.programme(sampled, requirements, NO_GOAL);
+        programme.least_violation().is_some_and(|v| v > FEASIBLE)
+    });
+    excluded.map(|(plant, _)| plant.name.clone())
+}
+
 /// The basis functions M phi_n at the frequencies of a grid.
 struct Basis {
     /// For each frequency the values of all functions.

@@ -55,15 +55,22 @@ const GAIN_RANGE: (f64, f64) = (-40.0, 60.0);
 pub struct Cascade {
     factors: Vec<Factor>,
     /// The logarithms.
-    pub parameters: Vec<f64>,
+    parameters: Vec<f64>,
+    /// Their exponentials: gain, frequencies and damping ratios.
+    values: Vec<f64>,
 }
 
 impl Cascade {
     /// An integrator of gain `gain_a_per_m_s` in A/(m s).
     pub fn integrator(gain_a_per_m_s: f64) -> Cascade {
+        Cascade::new(Vec::new(), vec![libm::log(gain_a_per_m_s)])
+    }
+
+    fn new(factors: Vec<Factor>, parameters: Vec<f64>) -> Cascade {
         Cascade {
-            factors: Vec::new(),
-            parameters: vec![libm::log(gain_a_per_m_s)],
+            factors,
+            values: parameters.iter().map(|p| libm::exp(*p)).collect(),
+            parameters,
         }
     }
 
@@ -72,7 +79,7 @@ impl Cascade {
         self.factors.push(Factor::ZeroPole);
         let logs = [zero_rad_s, pole_rad_s].map(libm::log);
         self.parameters.extend(logs);
-        self
+        Cascade::new(self.factors, self.parameters)
     }
 
     /// The same cascade with another biquad; frequency in rad/s and damping ratio of its zeros and poles.
@@ -80,21 +87,23 @@ impl Cascade {
         self.factors.push(Factor::Biquad);
         let logs = [zeros.0, zeros.1, poles.0, poles.1].map(libm::log);
         self.parameters.extend(logs);
-        self
+        Cascade::new(self.factors, self.parameters)
     }
 
     /// The same cascade with other values of its parameters.
     pub fn with_parameters(&self, parameters: Vec<f64>) -> Cascade {
-        Cascade {
-            factors: self.factors.clone(),
-            parameters,
-        }
+        Cascade::new(self.factors.clone(), parameters)
+    }
+
+    /// The logarithms of gain, frequencies and damping ratios.
+    pub fn parameters(&self) -> &[f64] {
+        &self.parameters
     }
 
     /// The same cascade with the gain in another ratio.
     pub fn scaled(mut self, ratio: f64) -> Cascade {
         self.parameters[0] += libm::log(ratio);
-        self
+        Cascade::new(self.factors, self.parameters)
     }
 
     /// Number of poles.
@@ -105,7 +114,7 @@ impl Cascade {
 
     /// C(s) in A/m.
     pub fn response(&self, s: Complex<f64>) -> Complex<f64> {
-        let mut response = Complex::from(libm::exp(self.parameters[0])) / s;
+        let mut response = Complex::from(self.values[0]) / s;
         for (factor, values) in self.with_values() {
             response *= match factor {
                 Factor::ZeroPole => zero(s, values[0]) / zero(s, values[1]),
@@ -156,7 +165,7 @@ impl Cascade {
         for (value, (low, high)) in self.parameters.iter_mut().zip(bounds) {
             *value = value.clamp(low, high);
         }
-        self
+        Cascade::new(self.factors, self.parameters)
     }
 
     /// The cascade whose parameters have the values that [`Cascade::sections`] writes.
@@ -164,15 +173,15 @@ impl Cascade {
         for value in &mut self.parameters[1..] {
             *value = libm::log(rounded(libm::exp(*value)));
         }
-        self
+        Cascade::new(self.factors, self.parameters)
     }
 
     /// The sections of a controller file, with seven significant digits. The gain is that of the integrator.
     pub fn sections(&self) -> Vec<SectionSettings> {
-        let mut gain = libm::exp(self.parameters[0]) / UM_PER_M;
+        let mut gain = self.values[0] / UM_PER_M;
         let mut sections = Vec::new();
         for (factor, values) in self.with_values() {
-            let values: Vec<f64> = values.iter().map(|x| rounded(libm::exp(*x))).collect();
+            let values: Vec<f64> = values.iter().map(|x| rounded(*x)).collect();
             let (ratio, section) = section(factor, &values);
             gain *= ratio;
             sections.push(section);
@@ -187,15 +196,15 @@ impl Cascade {
         let biquads = self
             .with_values()
             .filter(|(factor, _)| *factor == Factor::Biquad);
-        let pair = |logs: &[f64]| (libm::exp(logs[0]), libm::exp(logs[1]));
+        let pair = |values: &[f64]| (values[0], values[1]);
         biquads
             .flat_map(|(_, values)| [pair(&values[..2]), pair(&values[2..])])
             .collect()
     }
 
-    /// Each factor with its parameters.
+    /// Each factor with its frequencies and damping ratios.
     fn with_values(&self) -> impl Iterator<Item = (Factor, &[f64])> {
-        let mut rest = &self.parameters[1..];
+        let mut rest = &self.values[1..];
         self.factors.iter().map(move |factor| {
             let (values, tail) = rest.split_at(factor.parameters());
             rest = tail;
@@ -234,25 +243,25 @@ fn rounded(value: f64) -> f64 {
 }
 
 /// 1 + s/z.
-fn zero(s: Complex<f64>, log_zero: f64) -> Complex<f64> {
-    s / libm::exp(log_zero) + 1.0
+fn zero(s: Complex<f64>, zero: f64) -> Complex<f64> {
+    s / zero + 1.0
 }
 
 /// d ln(1 + s/z)/d ln z.
-fn zero_gradient(s: Complex<f64>, log_zero: f64) -> Complex<f64> {
-    -s / (s + libm::exp(log_zero))
+fn zero_gradient(s: Complex<f64>, zero: f64) -> Complex<f64> {
+    -s / (s + zero)
 }
 
 /// 1 + 2 zeta s/w + s^2/w^2.
-fn pair(s: Complex<f64>, log_omega: f64, log_damping: f64) -> Complex<f64> {
-    let x = s / libm::exp(log_omega);
-    x * x + x * (2.0 * libm::exp(log_damping)) + 1.0
+fn pair(s: Complex<f64>, omega_rad_s: f64, damping_ratio: f64) -> Complex<f64> {
+    let x = s / omega_rad_s;
+    x * x + x * (2.0 * damping_ratio) + 1.0
 }
 
 /// The derivatives of ln(1 + 2 zeta s/w + s^2/w^2) with respect to ln w and ln zeta.
-fn pair_gradient(s: Complex<f64>, log_omega: f64, log_damping: f64) -> [Complex<f64>; 2] {
-    let x = s / libm::exp(log_omega);
-    let linear = x * (2.0 * libm::exp(log_damping));
+fn pair_gradient(s: Complex<f64>, omega_rad_s: f64, damping_ratio: f64) -> [Complex<f64>; 2] {
+    let x = s / omega_rad_s;
+    let linear = x * (2.0 * damping_ratio);
     let whole = x * x + linear + 1.0;
     [-(x * x * 2.0 + linear) / whole, linear / whole]
 }

@@ -136,7 +136,7 @@ impl Problem {
     /// The box around a cascade, within the limits of the parameters.
     fn range(&self, cascade: &Cascade, radius: f64) -> Vec<(f64, f64)> {
         let bounds = cascade.bounds(&self.limits);
-        let values = cascade.parameters.iter().zip(bounds);
+        let values = cascade.parameters().iter().zip(bounds);
         values
             .map(|(value, (low, high))| {
                 let down = (low - value).clamp(-radius, 0.0);
@@ -224,7 +224,7 @@ impl Walk<'_> {
             if expected < LEAST_RISE {
                 break;
             }
-            let parameters = at.cascade.parameters.iter().zip(&step.change);
+            let parameters = at.cascade.parameters().iter().zip(&step.change);
             let cascade = at
                 .cascade
                 .with_parameters(parameters.map(|(p, d)| p + d).collect());

@@ -1,14 +1,14 @@
 //! A complete design: search, verification on a fine grid, and improvement with the frequencies that the search missed.
 
 use super::binding::{Binding, tightest, valleys};
-use super::bound::{ConvexBound, convex_bound};
+use super::bound::{ConvexBound, convex_bound, excluded_plant};
 use super::cascade::{Cascade, ParameterLimits};
 use super::descent::{Candidate, Problem};
 use super::disturbance::Disturbance;
 use super::error::{Conflict, TuneError};
 use super::figures::{PlantFigures, figures, fine_samples, with_variances};
 use super::plant::DesignPlant;
-use super::requirement::{Goal, Kind, Requirements, Slack};
+use super::requirement::{Goal, Kind, Requirements};
 use super::sampled::{SampledPlant, Spacing};
 use super::search::{Effort, search};
 use super::unmodelled::UnmodelledBound;
@@ -67,13 +67,15 @@ impl Design {
 
 /// The search designs for a modulus margin that is larger by this ratio, so that rounding and the grid cost nothing.
 const RESERVE: f64 = 1e-3;
-/// Factor of the reserve from one round of verification to the next: the valleys between the frequencies of the grid become
-/// flatter with each round, and the reserve deeper.
+/// Factor of the reserve after a round of verification that finds a missed limit: the valleys between the frequencies of the grid
+/// become flatter with each round, and the reserve deeper.
 const RESERVE_GROWTH: f64 = 1.5;
-/// Rounds of verification and improvement in which a missed limit is mended.
+/// Rounds of verification and improvement of each candidate.
 const ROUNDS: usize = 10;
-/// Of these, rounds in which a missed goal is mended too. Later only the goal that is attained counts.
-const GOAL_ROUNDS: usize = 4;
+/// Candidates of the search that are verified.
+const VERIFIED: usize = 2;
+/// A goal that is missed by less between the frequencies of the grid is not mended: what is attained counts.
+const GOAL_TOLERANCE: f64 = 2e-3;
 /// Slack up to which a requirement binds.
 const BINDING: f64 = 0.01;
 
@@ -82,28 +84,20 @@ const BINDING: f64 = 0.01;
 /// # Errors
 /// No controller of this order that the search found fulfils all limits.
 pub fn design(task: &DesignTask, progress: &Progress) -> Result<Design, TuneError> {
-    let mut problem = task.problem();
+    task.check_start()?;
+    let problem = task.problem();
     let (order, effort, seed) = (task.order, &task.effort, task.seed);
     let extremes = task.with_extreme_plants(&problem);
-    let mut candidate = search(&extremes, &problem, order, effort, seed, progress);
-    progress.begin("verification", 0);
-    for round in 0..ROUNDS {
-        let target = candidate
-            .target
-            .ok_or_else(|| task.conflict(&problem, &candidate))?;
-        let mends_goal = round < GOAL_ROUNDS;
-        let missed = task.missed(&candidate.cascade.clone().rounded(), target, mends_goal);
-        if missed.iter().all(Vec::is_empty) {
-            break;
-        }
-        task.add_points(&mut problem, &missed);
-        problem.requirements.modulus_margin = task.margin_with_reserve(round + 1);
-        candidate = problem.improve(&candidate.cascade, task.effort.final_steps / 2);
-    }
-    match candidate.target {
-        Some(_) => task.verified(candidate.cascade),
-        None => Err(task.conflict(&problem, &candidate)),
-    }
+    let mut candidates = search(&extremes, &problem, order, effort, seed, progress);
+    candidates.truncate(VERIFIED);
+    progress.begin("verification", candidates.len() as u64);
+    let designs = candidates.into_iter().map(|candidate| {
+        let design = task.mended(problem.clone(), candidate);
+        progress.advance(1);
+        design
+    });
+    let best = designs.reduce(|best, other| task.better(best, other));
+    best.unwrap_or(Err(TuneError::NoPlant))
 }
 
 /// The figures of a controller with other plants than those of its design, at the same signal path and with the same disturbances.
@@ -114,25 +108,40 @@ pub fn evaluate(task: &DesignTask, cascade: &Cascade, plants: &[DesignPlant]) ->
 
 /// The bound of the goal that no linear controller passes, over the operating points of a task.
 pub fn bound_of(task: &DesignTask, attained: f64) -> Option<ConvexBound> {
-    let nominal = task.plants.iter().filter(|plant| plant.is_nominal);
-    let sampled: Vec<(&DesignPlant, SampledPlant)> = nominal
-        .map(|plant| {
-            (
-                plant,
-                SampledPlant::of(plant, &task.bound, Spacing::Search, &[]),
-            )
-        })
-        .collect();
-    let pairs: Vec<_> = sampled
-        .iter()
-        .map(|(plant, sampled)| (*plant, sampled))
-        .collect();
-    let bends = task.bound.edges().into_iter().map(|(w, _)| w);
-    let bends_rad_s: Vec<f64> = bends.collect();
-    convex_bound(&pairs, &bends_rad_s, &task.requirements, attained)
+    let sampled = task.sampled_operating_points();
+    let pairs: Vec<_> = sampled.iter().map(|(plant, at)| (*plant, at)).collect();
+    convex_bound(&pairs, &task.bends_rad_s(), &task.requirements, attained)
+}
+
+/// Where a design misses its requirements.
+struct Missed {
+    /// Frequencies in rad/s for each plant.
+    frequencies_rad_s: Vec<Vec<f64>>,
+    /// Whether a limit is missed, and not only the goal.
+    limits: bool,
 }
 
 impl DesignTask {
+    /// Whether a weak integrator stabilises every plant, as the first controller of the search does.
+    fn check_start(&self) -> Result<(), TuneError> {
+        for plant in &self.plants {
+            let name = || plant.name.clone();
+            if plant.modes.iter().any(|mode| mode.omega_rad_s <= 0.0) {
+                return Err(TuneError::NoSpring { plant: name() });
+            }
+            let compliance_m_per_a = plant.plant.response(0.0).re;
+            // A compliance that is not a number is not positive.
+            let is_positive = compliance_m_per_a > 0.0;
+            if !is_positive {
+                return Err(TuneError::NegativeCompliance {
+                    plant: name(),
+                    compliance_m_per_a,
+                });
+            }
+        }
+        Ok(())
+    }
+
     fn problem(&self) -> Problem {
         let features = self.disturbance_features();
         let plants = self.plants.iter().map(|plant| {
@@ -150,9 +159,9 @@ impl DesignTask {
         }
     }
 
-    /// The modulus margin for which a round of verification designs.
-    fn margin_with_reserve(&self, round: usize) -> f64 {
-        let reserve = RESERVE * libm::pow(RESERVE_GROWTH, round as f64);
+    /// The modulus margin for which the search designs, after some growths of the reserve.
+    fn margin_with_reserve(&self, growths: i32) -> f64 {
+        let reserve = RESERVE * libm::pow(RESERVE_GROWTH, f64::from(growths));
         self.requirements.modulus_margin * (1.0 + reserve)
     }
 
@@ -180,33 +189,104 @@ impl DesignTask {
     }
 
     fn disturbance_features(&self) -> Vec<(f64, f64)> {
-        match self.requirements.goal {
-            Goal::Rms => self.disturbance.features(),
-            Goal::Disturbance | Goal::Bandwidth => Vec::new(),
+        match self.requirements.needs_variances() {
+            true => self.disturbance.features(),
+            false => Vec::new(),
         }
     }
 
-    /// The sampled plant with what the goal needs.
+    /// The sampled plant with what the requirements need.
     fn completed(&self, sampled: SampledPlant, plant: &DesignPlant) -> SampledPlant {
-        match self.requirements.goal {
-            Goal::Rms => with_variances(sampled, plant, &self.disturbance),
-            Goal::Disturbance | Goal::Bandwidth => sampled,
+        match self.requirements.needs_variances() {
+            true => with_variances(sampled, plant, &self.disturbance),
+            false => sampled,
         }
     }
 
-    /// For each plant the frequencies in rad/s of the fine grid where a limit is missed, or also the goal.
-    fn missed(&self, cascade: &Cascade, target: f64, with_goal: bool) -> Vec<Vec<f64>> {
+    /// Where a limit is missed on the fine grid, or the goal by more than [`GOAL_TOLERANCE`].
+    fn missed(&self, cascade: &Cascade, target: f64) -> Missed {
         let fine = fine_samples(&self.plants, &self.bound, &self.disturbance, cascade);
         let slacks = self.requirements.slacks(&fine, cascade, target);
-        let counts = |slack: &&Slack| with_goal || slack.kind != Kind::Goal;
-        let mut missed = vec![Vec::new(); fine.len()];
-        for slack in valleys(&slacks)
-            .filter(|slack| slack.value < 0.0)
-            .filter(counts)
-        {
-            missed[slack.plant].push(fine[slack.plant].omega_rad_s[slack.point]);
+        let mut missed = Missed {
+            frequencies_rad_s: vec![Vec::new(); fine.len()],
+            limits: false,
+        };
+        for slack in valleys(&slacks) {
+            let tolerance = match slack.kind {
+                Kind::Goal => GOAL_TOLERANCE,
+                _ => 0.0,
+            };
+            if slack.value < -tolerance {
+                let omega_rad_s = fine[slack.plant].omega_rad_s[slack.point];
+                missed.frequencies_rad_s[slack.plant].push(omega_rad_s);
+                missed.limits |= slack.kind != Kind::Goal;
+            }
         }
         missed
+    }
+
+    /// The candidate after rounds of verification on a fine grid, and of improvement with the frequencies where it misses a limit.
+    fn mended(&self, mut problem: Problem, mut candidate: Candidate) -> Result<Design, TuneError> {
+        let mut growths = 0;
+        for _ in 0..ROUNDS {
+            let target = candidate
+                .target
+                .ok_or_else(|| self.conflict(&problem, &candidate))?;
+            let missed = self.missed(&candidate.cascade.clone().rounded(), target);
+            if missed.frequencies_rad_s.iter().all(Vec::is_empty) {
+                break;
+            }
+            growths += i32::from(missed.limits);
+            self.add_points(&mut problem, &missed.frequencies_rad_s);
+            problem.requirements.modulus_margin = self.margin_with_reserve(growths);
+            candidate = problem.improve(&candidate.cascade, self.effort.final_steps);
+        }
+        match candidate.target {
+            Some(_) => self.verified(candidate.cascade),
+            None => Err(self.conflict(&problem, &candidate)),
+        }
+    }
+
+    /// The operating points on the grid of the search.
+    fn sampled_operating_points(&self) -> Vec<(&DesignPlant, SampledPlant)> {
+        let nominal = self.plants.iter().filter(|plant| plant.is_nominal);
+        let sampled = nominal.map(|plant| {
+            let at = SampledPlant::of(plant, &self.bound, Spacing::Search, &[]);
+            (plant, at)
+        });
+        sampled.collect()
+    }
+
+    /// Frequencies in rad/s where the bound of the unmodelled modes bends.
+    fn bends_rad_s(&self) -> Vec<f64> {
+        self.bound.edges().into_iter().map(|(w, _)| w).collect()
+    }
+
+    /// The design that keeps the modulus margin and attains more.
+    fn better(
+        &self,
+        one: Result<Design, TuneError>,
+        other: Result<Design, TuneError>,
+    ) -> Result<Design, TuneError> {
+        let (first, second) = match (one, other) {
+            (Ok(first), Ok(second)) => (first, second),
+            (Ok(design), Err(_)) | (Err(_), Ok(design)) => return Ok(design),
+            (Err(error), Err(_)) => return Err(error),
+        };
+        let rank = |design: &Design| {
+            let keeps = design
+                .misses_margin(self.requirements.modulus_margin)
+                .is_none();
+            let attained = match self.requirements.goal {
+                Goal::Rms => -design.attained,
+                Goal::Disturbance | Goal::Bandwidth => design.attained,
+            };
+            (keeps, attained)
+        };
+        match rank(&second) > rank(&first) {
+            true => Ok(second),
+            false => Ok(first),
+        }
     }
 
     fn add_points(&self, problem: &mut Problem, missed: &[Vec<f64>]) {
@@ -249,10 +329,13 @@ impl DesignTask {
         let first = tight.next();
         let differs = |other: &Binding| first.as_ref().is_some_and(|first| first.differs(other));
         let second = tight.find(differs);
+        let sampled = self.sampled_operating_points();
+        let pairs: Vec<_> = sampled.iter().map(|(plant, at)| (*plant, at)).collect();
         TuneError::Conflict(Box::new(Conflict {
             order: self.order,
             first,
             second,
+            excluded_plant: excluded_plant(&pairs, &self.bends_rad_s(), &self.requirements),
         }))
     }
 }

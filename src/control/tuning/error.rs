@@ -21,14 +21,39 @@ pub enum TuneError {
     /// No plant to design for.
     #[error("there is no plant to design for; give at least one operating point")]
     NoPlant,
-    /// A loop of the plant with a weak integrator is unstable.
+    /// The plant has a mode without stiffness, so that a loop with an integrator alone is unstable.
     #[error(
-        "{plant} is not stable with a weak integrator, so the search has no first controller; only stages with a spring to ground and a positive static compliance are supported"
+        "{plant} has a mode of frequency zero, so a weak integrator does not stabilise it and the search has no first controller; bench tune needs a stage with a spring to ground"
     )]
-    NoStart {
+    NoSpring {
         /// The plant.
         plant: String,
     },
+    /// A positive current moves the plant in the negative direction.
+    #[error(
+        "the static compliance of {plant} is negative ({compliance_m_per_a:.3e} m/A), so an integrator of positive gain makes the loop unstable; change the sign of the motor (its leads) or of the probe"
+    )]
+    NegativeCompliance {
+        /// The plant.
+        plant: String,
+        /// The response at the lowest frequency of the grid.
+        compliance_m_per_a: f64,
+    },
+}
+
+/// A gain margin and a phase margin that no disc contains.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a phase margin of {:.1} deg needs a gain margin above {least_gain_margin:.2}, not {gain_margin:.2}; raise --gain-margin or lower --phase-margin",
+    phase_margin_rad.to_degrees()
+)]
+pub struct DiscError {
+    /// The gain margin, given or that of the modulus margin.
+    pub gain_margin: f64,
+    /// The phase margin in rad, given or that of the modulus margin.
+    pub phase_margin_rad: f64,
+    /// The smallest gain margin that goes with the phase margin.
+    pub least_gain_margin: f64,
 }
 
 /// Two requirements that exclude each other.
@@ -40,6 +65,8 @@ pub struct Conflict {
     pub first: Option<Binding>,
     /// The tightest one that differs from it.
     pub second: Option<Binding>,
+    /// An operating point for which no controller of any order fulfils the limits, by the convex programme of the bound.
+    pub excluded_plant: Option<String>,
 }
 
 impl fmt::Display for Conflict {
@@ -56,6 +83,12 @@ impl fmt::Display for Conflict {
                 ": {first}, missed by {percent:.1} %, conflicts with {second}"
             )?;
         }
-        f.write_str("; relax one of them, or raise --order")
+        match &self.excluded_plant {
+            Some(plant) => write!(
+                f,
+                "; a convex programme finds no controller of any order for {plant} alone; relax one of the limits"
+            ),
+            None => f.write_str("; relax one of them, or raise --order"),
+        }
     }
 }

@@ -3,12 +3,13 @@
 use serde::Serialize;
 
 use super::cascade::Cascade;
+use super::classical_margins::{gain_margin, phase_margin_deg};
 use super::disturbance::Disturbance;
 use super::plant::DesignPlant;
 use super::requirement::{sensitivity_bandwidth_rad_s, slope_bandwidth_rad_s};
 use super::sampled::{SampledPlant, Spacing};
 use super::unmodelled::UnmodelledBound;
-use super::variance::sigma_m;
+use super::variance::{current_sigma_a, sigma_m};
 use crate::control::StateSpace;
 use crate::util::units::UM_PER_M;
 
@@ -33,6 +34,12 @@ pub struct PlantFigures {
     pub control_sensitivity_a_per_um: f64,
     /// Standard deviation of the error in metres under the disturbance and the noise of the configuration.
     pub error_rms_m: f64,
+    /// Standard deviation of the current in A under the same.
+    pub current_rms_a: f64,
+    /// Smallest factor above 1 by which L may grow before it reaches -1, without the modes that the model lacks.
+    pub gain_margin: Option<f64>,
+    /// Smallest angle between L and -1 where |L| = 1, without the modes that the model lacks.
+    pub phase_margin_deg: Option<f64>,
 }
 
 /// The plants on fine grids that also follow the zeros and poles of the controller.
@@ -83,12 +90,11 @@ impl PlantFigures {
         let grid = &fine.omega_rad_s;
         let controller = fine.warped.iter().map(|s| cascade.response(*s));
         let controller: Vec<_> = controller.collect();
+        let products = fine.response.iter().zip(&controller);
+        let open_loop: Vec<_> = products.map(|(p, c)| p * c).collect();
         let points = 0..grid.len();
         let distances: Vec<f64> = points
-            .map(|i| {
-                let l = fine.response[i] * controller[i];
-                (l + 1.0).norm() - controller[i].norm() * fine.unmodelled[i]
-            })
+            .map(|i| (open_loop[i] + 1.0).norm() - controller[i].norm() * fine.unmodelled[i])
             .collect();
         let lowest = (0..grid.len()).min_by(|a, b| distances[*a].total_cmp(&distances[*b]));
         let lowest = lowest.unwrap_or(0);
@@ -108,6 +114,9 @@ impl PlantFigures {
             sensitivity_at_10_rad_s: 1.0 / distances[at_10],
             control_sensitivity_a_per_um: control.fold(0.0, f64::max),
             error_rms_m: sigma_m(fine, cascade),
+            current_rms_a: current_sigma_a(fine, cascade),
+            gain_margin: gain_margin(&open_loop),
+            phase_margin_deg: phase_margin_deg(&open_loop),
         }
     }
 }

@@ -12,6 +12,8 @@ pub struct Tolerances {
     pub frequency_ratio: f64,
     /// Factor of the damping ratios of the least damped plant.
     pub damping_factor: f64,
+    /// Relative tolerance of the gain, for example of the force constant.
+    pub gain_ratio: f64,
 }
 
 /// A plant at the end of a signal path, with its modes.
@@ -38,8 +40,8 @@ impl DesignPlant {
         }
     }
 
-    /// The plant, and its variations: the first mode lower and higher, all other modes lower and higher, all modes less damped.
-    /// The residues do not change.
+    /// The plant, and its variations: the first mode lower and higher, all other modes lower and higher, all modes less damped, the
+    /// gain lower and higher.
     pub fn with_tolerances(
         name: &str,
         path: &SignalPath,
@@ -83,6 +85,11 @@ fn variations(modes: &[Mode], tolerances: &Tolerances) -> Vec<(String, Vec<Mode>
     }
     let damped = changed(modes, |_, mode| mode.damping_ratio *= factor);
     variations.push((format!(", damping x {factor}"), damped));
+    for (sign, ratio) in [("-", -tolerances.gain_ratio), ("+", tolerances.gain_ratio)] {
+        let percent = 100.0 * ratio.abs();
+        let scaled = changed(modes, |_, mode| mode.force_gain *= 1.0 + ratio);
+        variations.push((format!(", gain {sign}{percent} %"), scaled));
+    }
     variations.retain(|(_, varied)| varied.as_slice() != modes);
     variations.insert(0, (String::new(), modes.to_vec()));
     variations

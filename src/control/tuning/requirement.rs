@@ -6,21 +6,24 @@
 //!  g(w) = |1 + L| - |C| U
 //!
 //!  modulus margin       g/m - 1 >= 0               at all frequencies
+//!  gain, phase margin   (|L + x| - |C| U)/r - 1 >= 0  at all frequencies: disc of margin_disc.rs
 //!  sensitivity          g s - 1 >= 0               at given frequencies: |S| <= s
 //!  control sensitivity  g c/|C| - 1 >= 0           at all frequencies: |K S| <= c
+//!  current              ln(c/sigma_i) >= 0         sigma_i: standard deviation of the current
 //!  goal disturbance     ln(g w/(sqrt(2) ws)) >= 0  for w <= ws: |S| <= w/(sqrt(2) ws)
 //!  goal bandwidth       ln(g/sqrt(2)) >= 0         for w <= wb: |S| <= 1/sqrt(2)
 //! ```
 //!
-//! The modulus margin and the limit of |K S| hold for all plants; goal and limits of |S| for the operating points themselves, not
+//! The margins and the limit of |K S| hold for all plants; goal, current and limits of |S| for the operating points themselves, not
 //! for their variations. Each slack is relative, so that a slack of -0.01 misses its limit by 1 %.
 
 use nalgebra::Complex;
 use serde::Serialize;
 
 use super::cascade::Cascade;
+use super::margin_disc::MarginDisc;
 use super::sampled::SampledPlant;
-use super::variance::{sigma_gradient, sigma_m};
+use super::variance::{current_sigma_a, current_sigma_gradient, sigma_gradient, sigma_m};
 
 /// What a design maximises or minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -54,6 +57,10 @@ pub struct Requirements {
     pub max_sensitivity: Vec<SensitivityLimit>,
     /// Upper limit of |K S| in A/m.
     pub max_control_sensitivity_a_per_m: Option<f64>,
+    /// The disc of a gain margin and a phase margin, at all frequencies of all plants.
+    pub margin_disc: Option<MarginDisc>,
+    /// Upper limit of the standard deviation of the current in A, under disturbance and noise.
+    pub max_current_rms_a: Option<f64>,
 }
 
 /// A kind of requirement.
@@ -62,10 +69,14 @@ pub struct Requirements {
 pub enum Kind {
     /// The modulus margin.
     ModulusMargin,
+    /// The disc of a gain margin and a phase margin.
+    MarginDisc,
     /// An upper limit of |S|.
     Sensitivity,
     /// The upper limit of |K S|.
     ControlSensitivity,
+    /// The upper limit of the standard deviation of the current.
+    CurrentRms,
     /// The goal.
     Goal,
 }
@@ -74,8 +85,10 @@ impl std::fmt::Display for Kind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Kind::ModulusMargin => "modulus margin",
+            Kind::MarginDisc => "gain and phase margin",
             Kind::Sensitivity => "limit of |S|",
             Kind::ControlSensitivity => "limit of |KS|",
+            Kind::CurrentRms => "limit of the rms current",
             Kind::Goal => "goal",
         })
     }
@@ -114,9 +127,15 @@ impl Loop {
         }
     }
 
-    /// The derivatives of g, given those of ln C: Re(conj(1 + L)/|1 + L| L dlnC) - |C| U Re dlnC.
-    fn distance_gradient(&self, unmodelled: f64, log: &[Complex<f64>]) -> Vec<f64> {
-        let direction = self.difference.conj() / self.difference.norm().max(f64::MIN_POSITIVE);
+    /// |L + x| - |C| U.
+    fn distance_from(&self, centre: f64, unmodelled: f64) -> f64 {
+        (self.difference - 1.0 + centre).norm() - self.controller.norm() * unmodelled
+    }
+
+    /// The derivatives of |L + x| - |C| U, given those of ln C: Re(conj(L + x)/|L + x| L dlnC) - |C| U Re dlnC.
+    fn distance_gradient(&self, centre: f64, unmodelled: f64, log: &[Complex<f64>]) -> Vec<f64> {
+        let difference = self.difference - 1.0 + centre;
+        let direction = difference.conj() / difference.norm().max(f64::MIN_POSITIVE);
         let weight = direction * (self.difference - 1.0) - self.controller.norm() * unmodelled;
         log.iter().map(|d| (weight * d).re).collect()
     }
@@ -161,6 +180,10 @@ impl Requirements {
                 point,
                 Some(at.distance / self.modulus_margin - 1.0),
             );
+            let disc = self.margin_disc.map(|disc| {
+                at.distance_from(disc.centre, plant.unmodelled[point]) / disc.radius - 1.0
+            });
+            add(Kind::MarginDisc, point, disc);
             add(Kind::ControlSensitivity, point, self.control_slack(at));
             if plant.is_nominal {
                 add(Kind::Goal, point, self.goal_slack(at, w, target));
@@ -173,6 +196,10 @@ impl Requirements {
             let point = nearest(&plant.omega_rad_s, limit.omega_rad_s);
             let slack = loops[point].distance * limit.magnitude - 1.0;
             add(Kind::Sensitivity, point, Some(slack));
+        }
+        if let Some(limit_a) = self.max_current_rms_a {
+            let slack = libm::log(limit_a / current_sigma_a(plant, cascade));
+            add(Kind::CurrentRms, 0, Some(slack));
         }
         if self.goal == Goal::Rms {
             let sigma_m = sigma_m(plant, cascade);
@@ -213,16 +240,27 @@ impl Requirements {
         if slack.kind == Kind::Goal && self.goal == Goal::Rms {
             return sigma_gradient(plant, cascade);
         }
+        if slack.kind == Kind::CurrentRms {
+            return current_sigma_gradient(plant, cascade);
+        }
         let at = Loop::of(plant, slack.point, cascade);
         let log = cascade.log_gradient(plant.warped[slack.point]);
-        let gradient = at.distance_gradient(plant.unmodelled[slack.point], &log);
+        let unmodelled = plant.unmodelled[slack.point];
+        if let (Kind::MarginDisc, Some(disc)) = (slack.kind, self.margin_disc) {
+            let gradient = at.distance_gradient(disc.centre, unmodelled, &log);
+            return scaled(gradient, 1.0 / disc.radius);
+        }
+        let gradient = at.distance_gradient(1.0, unmodelled, &log);
         match slack.kind {
             Kind::ModulusMargin => scaled(gradient, 1.0 / self.modulus_margin),
             Kind::Sensitivity => {
                 let w = plant.omega_rad_s[slack.point];
                 scaled(gradient, self.sensitivity_limit(&plant.omega_rad_s, w))
             }
-            Kind::Goal => scaled(gradient, 1.0 / at.distance.max(LEAST_DISTANCE)),
+            // The disc and the current are answered above.
+            Kind::Goal | Kind::MarginDisc | Kind::CurrentRms => {
+                scaled(gradient, 1.0 / at.distance.max(LEAST_DISTANCE))
+            }
             Kind::ControlSensitivity => {
                 let ratio =
                     self.max_control_sensitivity_a_per_m.unwrap_or(0.0) / at.controller.norm();
@@ -281,6 +319,11 @@ impl Requirements {
         let here = limits.filter(|limit| nearest(grid, limit.omega_rad_s) == point);
         let weights = here.map(|limit| 1.0 / limit.magnitude);
         weights.fold(self.modulus_margin.max(goal), f64::max)
+    }
+
+    /// Whether the variances of disturbance and noise are needed.
+    pub fn needs_variances(&self) -> bool {
+        self.goal == Goal::Rms || self.max_current_rms_a.is_some()
     }
 
     /// A target that every loop attains.

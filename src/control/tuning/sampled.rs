@@ -89,10 +89,10 @@ fn lowest_rad_s(plant: &DesignPlant) -> f64 {
     4e-3 * first_rad_s.min(nyquist_rad_s)
 }
 
-/// A logarithmic grid of 60 points per decade, with points w (1 + zeta sinh x) around each feature, and three points around each
+/// A logarithmic grid of 90 points per decade, with points w (1 + zeta sinh x) around each feature, and three points around each
 /// edge of the bound.
 fn coarse_grid((low, high): (f64, f64), features: &[(f64, f64)], edges: &[(f64, f64)]) -> Vec<f64> {
-    const PER_DECADE: f64 = 60.0;
+    const PER_DECADE: f64 = 90.0;
     let decades = libm::log10(high / low);
     let count = libm::ceil(decades * PER_DECADE) as usize;
     let even = (0..=count).map(|i| low * libm::pow(10.0, decades * i as f64 / count as f64));

@@ -46,7 +46,7 @@ impl Effort {
     }
 }
 
-/// The best cascade of an order: searched with the plants of `problem`, finally improved with those of `whole`.
+/// The best cascades of an order, the best first: searched with the plants of `problem`, finally improved with those of `whole`.
 ///
 /// For the goals [`Goal::Bandwidth`] and [`Goal::Rms`] half of the effort is a search for the goal [`Goal::Disturbance`]: such a loop
 /// has much rejection at low frequency, which can be exchanged for bandwidth or for less error elsewhere.
@@ -57,7 +57,7 @@ pub fn search(
     effort: &Effort,
     seed: u64,
     progress: &Progress,
-) -> Candidate {
+) -> Vec<Candidate> {
     let mut kept = Vec::new();
     if problem.requirements.goal == Goal::Disturbance {
         kept = grow(problem, order, effort, seed, progress);
@@ -73,8 +73,7 @@ pub fn search(
         progress.advance(1);
         improved
     });
-    let mut improved = best(problem, improved.collect(), 1);
-    improved.swap_remove(0)
+    best(problem, improved.collect(), kept.len())
 }
 
 /// The best cascades of an order, grown from lower orders.
