@@ -86,12 +86,14 @@ fn print_plan(
     warn(&report.evidence.defects);
     print_result(args.bench.json, &report, |report| {
         let command = report.command.as_ref().map(control_output::command_text);
-        plan_output::control_text(
+        let text = plan_output::control_text(
             &(report.reference.clone() + &command.unwrap_or_default()),
             report.expected.as_ref(),
             &report.limits,
             report.motor.as_ref(),
-        )
+        );
+        text + &control_output::evidence_text(&report.evidence)
+            + &control_output::conditions_table(&report.evidence.conditions)
     })?;
     Ok(Outcome::Done)
 }

@@ -11,11 +11,12 @@ use super::error::CliError;
 use super::margins::text as margins_text;
 use super::output::warn;
 use super::run_options::run_text;
-use super::table::labelled;
+use super::table::{labelled, table};
 use crate::config::Config;
 use crate::control::{Margins, Pole, StepMetrics};
 use crate::excitation::Extremes;
-use crate::experiment::certificate::Evidence;
+use crate::experiment::certificate::{Agreement, Condition, Evidence};
+use crate::experiment::stage_check::RestAfterCheck;
 use crate::experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
@@ -164,17 +165,62 @@ impl fmt::Display for PlanText<'_> {
 }
 
 /// The certificate and the margin that it proves, and an override.
-fn evidence_text(evidence: &Evidence) -> String {
+pub(super) fn evidence_text(evidence: &Evidence) -> String {
     let certificate = evidence.certificate.as_ref().map_or(String::new(), |file| {
         let margin = evidence
             .modulus_margin_lower
             .map_or("no modulus margin by its response".into(), |margin| {
                 format!("modulus margin at least {margin:.3} by its response (95 %)")
             });
-        labelled("evidence", &format!("{file}: {margin}"))
+        let conditions = conditions_text(&evidence.conditions);
+        labelled("evidence", &format!("{file}: {margin}; {conditions}"))
     });
+    let rest = evidence.rest_after_check.as_ref();
+    let certificate = certificate + &rest.map_or(String::new(), rest_text);
     let reason = evidence.override_reason.as_ref();
     certificate + &reason.map_or(String::new(), |reason| labelled("override", reason))
+}
+
+/// How many of the compared conditions agree.
+fn conditions_text(conditions: &[Condition]) -> String {
+    let count = |agreement: Agreement| {
+        let found = conditions.iter();
+        found.filter(|found| found.agreement == agreement).count()
+    };
+    let (agree, differ) = (count(Agreement::Agrees), count(Agreement::Differs));
+    format!("{agree} of {} conditions agree", agree + differ)
+}
+
+/// The conditions of a certificate as a table.
+pub(super) fn conditions_table(conditions: &[Condition]) -> String {
+    let rows: Vec<Vec<String>> = conditions.iter().map(condition_row).collect();
+    match rows.is_empty() {
+        true => String::new(),
+        false => table(&["condition", "certificate", "today", "result"], &rows),
+    }
+}
+
+fn condition_row(condition: &Condition) -> Vec<String> {
+    vec![
+        condition.subject.name().into(),
+        condition.certificate.clone(),
+        condition.today.clone(),
+        condition.agreement.name().into(),
+    ]
+}
+
+/// The rest between the check of the stage and the closing of the loop.
+fn rest_text(rest: &RestAfterCheck) -> String {
+    let (left_um, permitted_um) = (rest.left_m * 1e6, rest.permitted_m * 1e6);
+    let limited = match rest.is_limited {
+        true => format!(", above the permitted {permitted_um:.2} um because the rest is limited"),
+        false => String::new(),
+    };
+    let text = format!(
+        "{:.2} s with zero current after the check of the stage; at most {left_um:.2} um of its vibration are left{limited}",
+        rest.rest_s
+    );
+    labelled("rest", &text)
 }
 
 fn travel_text(extremes: &Extremes) -> String {

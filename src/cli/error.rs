@@ -113,7 +113,12 @@ pub(super) struct ErrorReport {
 
 impl ErrorReport {
     pub(super) fn of(error: &CliError) -> ErrorReport {
-        ErrorReport::new(error.to_string(), error.kind(), error.place())
+        match error {
+            CliError::Experiment(error) => ErrorReport {
+                error: error.object(),
+            },
+            _ => ErrorReport::new(error.to_string(), error.kind(), error.place()),
+        }
     }
 
     /// The report of a command line that cannot be parsed.

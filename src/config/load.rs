@@ -10,7 +10,7 @@ use super::cross_checks::cross_checks;
 use super::error::{ConfigError, MAX_ERRORS};
 use super::layer::{Layer, overlay, same_kind};
 use super::overrides::{
-    OptionSetting, convert_quantities, in_terms_of_option, options_table, sets,
+    OptionSetting, convert_quantities, in_terms_of_option, overlay_options, sets,
 };
 use super::profiles::{self, EmbeddedFile};
 use super::purpose::Purpose;
@@ -92,10 +92,17 @@ fn merge(schema: &Json, layers: &[Layer], options: &[OptionSetting]) -> (Value, 
     for layer in layers {
         overlay(&mut merged, &layer.table, same_kind);
     }
-    overlay(&mut merged, &options_table(options), same_kind);
-    let sets = layers.last().filter(|layer| layer.name == Layer::SETS);
-    let findings = sets.map(|sets| convert_quantities(schema, &sets.table, &mut merged));
-    (Value::Table(merged), findings.unwrap_or_default())
+    let sets = sets_of(layers);
+    let mut findings = overlay_options(&mut merged, sets, options);
+    let unconverted = sets.map(|sets| convert_quantities(schema, sets, &mut merged));
+    findings.extend(unconverted.unwrap_or_default());
+    (Value::Table(merged), findings)
+}
+
+/// The settings of `--set`.
+fn sets_of(layers: &[Layer]) -> Option<&Table> {
+    let sets = layers.last().filter(|layer| layer.name == Layer::SETS)?;
+    Some(&sets.table)
 }
 
 /// Checks a configuration that was changed after it was loaded.
@@ -123,8 +130,9 @@ fn refuse(
     schema: &Json,
     merged: &Value,
 ) -> Result<(), ConfigError> {
+    let sets = sets_of(layers);
     let line = |finding: &Finding| {
-        in_terms_of_option(options, finding, schema, merged).unwrap_or_else(|| {
+        in_terms_of_option(options, sets, finding, schema, merged).unwrap_or_else(|| {
             let place = place(layers, finding.at());
             format!("  {place}: `{}` {}", finding.path, finding.what)
         })

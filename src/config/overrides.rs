@@ -7,12 +7,14 @@ use toml::{Table, Value};
 
 use super::ConfigError;
 use super::check;
-use super::layer::{Layer, overlay};
+use super::layer::{Layer, overlay, same_kind};
 use crate::util::finding::Finding;
 use crate::util::quantity::{Dimension, Quantity};
 
 /// Largest number of parts of a key. The deepest key of a configuration has 5.
 const MAX_KEY_PARTS: usize = 32;
+/// The key that states what the other keys of a table are.
+const KIND: &str = "kind";
 
 /// A setting that a command-line option sets. Errors name the option as typed, not the setting.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,6 +44,20 @@ impl OptionSetting {
         rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
     }
 
+    /// Whether it is a table in which `--set` states `path`.
+    fn is_changed_by(&self, sets: Option<&Table>, path: &str) -> bool {
+        self.value.is_table() && sets.is_some_and(|sets| at(sets, path).is_some())
+    }
+
+    /// The contradiction of a table that `--set` gives another kind.
+    fn other_kind(&self, set: Option<&Value>) -> Option<Finding> {
+        let set = set?.get(KIND)?;
+        let is_other = self.value.get(KIND).is_some_and(|kind| kind != set);
+        let path = check::join(&self.key, KIND);
+        let what = format!("contradicts `--set {path}={set}`, leave one of them out");
+        is_other.then(|| Finding::new(&self.key, what))
+    }
+
     /// ` (did you mean 8mm?)` for a number without a unit that would be allowed with one.
     fn hint(&self, path: &str, schema: &Json, merged: &Value) -> String {
         let number = self.option.rsplit(' ').next();
@@ -69,8 +85,31 @@ fn readings(number: f64, path: &str, allowed: &RangeInclusive<f64>) -> Vec<Strin
     readings
 }
 
+/// Merges the options into the layers. The table of an option (`--reference sine`) contains default values, so `--set` changes them;
+/// an option for a single value (`--amplitude 20um`) is over `--set`. Another kind in `--set` contradicts the option.
+pub(super) fn overlay_options(
+    merged: &mut Table,
+    sets: Option<&Table>,
+    options: &[OptionSetting],
+) -> Vec<Finding> {
+    let (tables, values): (Vec<_>, Vec<_>) =
+        options.iter().partition(|option| option.value.is_table());
+    overlay(merged, &options_table(&tables), same_kind);
+    let mut findings = Vec::new();
+    for option in tables {
+        let set = sets.and_then(|sets| at(sets, &option.key));
+        match (set, option.other_kind(set)) {
+            (_, Some(finding)) => findings.push(finding),
+            (Some(set), None) => overlay_at(merged, &option.key, set.clone()),
+            (None, None) => {}
+        }
+    }
+    overlay(merged, &options_table(&values), same_kind);
+    findings
+}
+
 /// The settings of the options as a layer.
-pub(super) fn options_table(options: &[OptionSetting]) -> Table {
+fn options_table(options: &[&OptionSetting]) -> Table {
     let mut table = Table::new();
     for option in options {
         overlay_at(&mut table, &option.key, option.value.clone());
@@ -78,16 +117,28 @@ pub(super) fn options_table(options: &[OptionSetting]) -> Table {
     table
 }
 
-/// The error of a setting in terms of the option that made the setting, if there is one.
+/// The value at a key of several parts.
+fn at<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
+    let (outer, last) = match key.rsplit_once('.') {
+        Some((outer, last)) => (at(table, outer)?.as_table()?, last),
+        None => (table, key),
+    };
+    outer.get(last)
+}
+
+/// The error of a setting in terms of the option that made the setting, if there is one. What `--set` changed in the table of an
+/// option is not made by the option.
 pub(super) fn in_terms_of_option(
     options: &[OptionSetting],
+    sets: Option<&Table>,
     finding: &Finding,
     schema: &Json,
     merged: &Value,
 ) -> Option<String> {
     let around = options
         .iter()
-        .filter(|option| option.contains(&finding.path));
+        .filter(|option| option.contains(&finding.path))
+        .filter(|option| option.key == finding.path || !option.is_changed_by(sets, &finding.path));
     let option = around.max_by_key(|option| option.key.len())?;
     let hint = option.hint(&finding.path, schema, merged);
     Some(format!("  {} {}{hint}", option.option, finding.what))
@@ -157,12 +208,15 @@ fn overlay_at(table: &mut Table, key: &str, value: Value) {
     }
 }
 
-/// Converts the quantities with units among the values of `--set` to numbers, if a number is expected.
+/// Converts the quantities with units among the values of `--set` to numbers, if a number is expected and no option replaced them.
 pub(super) fn convert_quantities(schema: &Json, sets: &Table, merged: &mut Table) -> Vec<Finding> {
     let mut texts = Vec::new();
     collect_texts(sets, "", &mut texts);
     let tree = Value::Table(merged.clone());
-    texts.retain(|(path, _)| check::expects_number(schema, &tree, path));
+    texts.retain(|(path, text)| {
+        let is_used = at(merged, path).and_then(Value::as_str) == Some(text);
+        is_used && check::expects_number(schema, &tree, path)
+    });
     let mut findings = Vec::new();
     for (path, text) in texts {
         let Ok(quantity) = text.parse::<Quantity>() else {

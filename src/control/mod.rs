@@ -33,6 +33,7 @@ mod minimum_time;
 mod pole;
 mod quadratic;
 mod section;
+mod solver_settings;
 mod state_space;
 mod step_metrics;
 mod swept;

@@ -1,7 +1,7 @@
 //! Why an experiment was refused or failed.
 
 use super::analysis_error::AnalysisError;
-use super::certificate::CertificateError;
+use super::certificate::CertificateDefects;
 use super::error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 use super::loop_check::MarginError;
 use super::measured_frf::FrfError;
@@ -27,8 +27,8 @@ pub enum ExperimentError {
     #[error(transparent)]
     Margin(#[from] MarginError),
     /// The certificate does not allow to close the loop.
-    #[error("refused: {0}, or add --override \"REASON\"; nothing was moved")]
-    Certificate(#[from] CertificateError),
+    #[error(transparent)]
+    Certificate(#[from] CertificateDefects),
     /// The stage does not agree with the certificate.
     #[error("refused before the loop closed: {0}, or add --override \"REASON\"")]
     StageCheck(#[from] StageCheckError),
@@ -94,7 +94,7 @@ impl From<RunError> for ExperimentError {
 impl From<&ExperimentError> for RemoteError {
     fn from(error: &ExperimentError) -> RemoteError {
         RemoteError {
-            error: ErrorObject::new(error.to_string(), error.kind(), error.place()),
+            error: error.object(),
             is_failure: error.is_failure(),
         }
     }
@@ -121,6 +121,27 @@ impl ExperimentError {
             | ExperimentError::Calibration(_)
             | ExperimentError::Motor(MotorError::Warm { .. } | MotorError::Never { .. })
             | ExperimentError::Refused(_) => false,
+        }
+    }
+
+    /// The error as an object.
+    pub fn object(&self) -> ErrorObject {
+        match self {
+            ExperimentError::Remote(error) => error.error.clone(),
+            _ => ErrorObject {
+                defects: self.defects(),
+                ..ErrorObject::new(self.to_string(), self.kind(), self.place())
+            },
+        }
+    }
+
+    /// The texts of the defects of a certificate.
+    fn defects(&self) -> Box<[String]> {
+        match self {
+            ExperimentError::Certificate(defects) => {
+                defects.as_slice().iter().map(ToString::to_string).collect()
+            }
+            _ => Box::default(),
         }
     }
 

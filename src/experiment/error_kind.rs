@@ -50,6 +50,9 @@ pub struct ErrorObject {
     pub place: Option<String>,
     /// What to do, as part of the message.
     pub remedy: Option<String>,
+    /// All defects of a certificate, each as `what is wrong; what to do`.
+    #[serde(default, skip_serializing_if = "<[String]>::is_empty")]
+    pub defects: Box<[String]>,
 }
 
 impl ErrorObject {
@@ -61,6 +64,7 @@ impl ErrorObject {
             kind,
             place,
             remedy,
+            defects: Box::default(),
         }
     }
 }

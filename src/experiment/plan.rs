@@ -8,9 +8,11 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
 use super::command_plan::{self, CommandPlan, CommandSummary};
+use super::loop_check::closed_loop_of;
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
 use super::reference_check::{self, PlannedReference};
+use super::stage_check::RestAfterCheck;
 use super::swept_reference;
 use crate::config::{self, CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
@@ -106,6 +108,9 @@ pub struct Plan {
     pub override_reason: Option<OverrideReason>,
     /// Step and tones of a stage check.
     pub stage_check: Option<StageCheckSettings>,
+    /// The rest between the check of the stage and the closing of the loop, with a certificate. It is part of
+    /// `config.control.settle_s`.
+    pub rest_after_check: Option<RestAfterCheck>,
     /// Extremes of a swept reference by the model.
     pub predicted_extremes: Option<Extremes>,
     /// Text of the file of the reference, if it has one.
@@ -141,6 +146,7 @@ impl Plan {
             certificate: None,
             override_reason: None,
             stage_check: None,
+            rest_after_check: None,
             predicted_extremes: None,
             reference: None,
             command: None,
@@ -151,17 +157,22 @@ impl Plan {
     /// contains them.
     pub fn control(config: Config) -> Result<Plan, PlanError> {
         let controller = ControllerText::find(&config.control.controller)?;
-        let (config, predicted_extremes) = swept_reference::planned(config, &controller)?;
+        let (mut config, predicted_extremes) = swept_reference::planned(config, &controller)?;
         let is_swept = config.control.reference.is_swept();
         let reference = config.control.reference.design().text()?;
         let command = command_plan::planned(&config, &controller)?;
         let certificate = config.control.certificate.as_deref();
         let certificate = certificate.map(CertificateText::read).transpose()?;
+        let rest_after_check = rest_after_check(certificate.as_ref(), &controller, &config)?;
+        if let Some(rest) = rest_after_check {
+            config.control.settle_s = rest.rest_s;
+        }
         let plan = Plan {
             command,
             controller: Some(controller),
             reference,
             certificate,
+            rest_after_check,
             predicted_extremes,
             ..Plan::excitation(RunKind::Control, config)
         };
@@ -412,6 +423,19 @@ fn motor_start(recording: &Recording) -> Result<MotorStart, PlanError> {
 fn thermal_a2(text: &str) -> Option<f64> {
     let value: f64 = text.parse().ok()?;
     (value.is_finite() && value >= 0.0).then_some(value)
+}
+
+/// The rest after the check of the stage. A damaged certificate is refused later, by the check of the evidence.
+fn rest_after_check(
+    certificate: Option<&CertificateText>,
+    controller: &ControllerText,
+    config: &Config,
+) -> Result<Option<RestAfterCheck>, PlanError> {
+    let Some(Ok(loaded)) = certificate.map(CertificateText::load) else {
+        return Ok(None);
+    };
+    let model = closed_loop_of(controller, config)?;
+    Ok(RestAfterCheck::of(&loaded, &model, config))
 }
 
 fn attached_stage_check(recording: &Recording) -> Result<Option<StageCheckSettings>, PlanError> {

@@ -394,8 +394,9 @@ mod tests {
     fn refuses_loop_without_certificate_before_a_device_is_opened() {
         let error = refused("slow");
         let is_missing = matches!(
-            error,
-            ExperimentError::Certificate(CertificateError::Missing)
+            &error,
+            ExperimentError::Certificate(defects)
+                if *defects.as_slice() == [CertificateError::Missing]
         );
         assert!(is_missing, "{error}");
     }

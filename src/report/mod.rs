@@ -3,9 +3,9 @@
 //! ```text
 //! trace (checked responses, unwrapped phase) -> bode, nyquist, coherence --.
 //!                      |-> overlay (several recordings) -------------------+
-//!                      `-> measured_loop_plots (L, S and T, with bands) ---+
-//! loop_plots, run_signals, error_spectrum (closed loop) -------------------+
-//! pole_zero (ellipse), stability, distortion, quadrants, design -----------+-> chart (the engine) -> SVG
+//!                      `-> loops (L, S and T: model, measured, designed) --+
+//! run_signals, error_spectrum (closed loop) -------------------------------+
+//! pole_zero (ellipse), stability, distortion, quadrants -------------------+-> chart (the engine) -> SVG
 //! run_pages (plots and page of one record) -> html, number
 //! ```
 
@@ -13,14 +13,12 @@ pub mod bode;
 mod campaign;
 mod chart;
 mod coherence;
-mod design;
 mod distortion;
 pub mod ellipse;
 mod error;
 mod error_spectrum;
 pub mod html;
-mod loop_plots;
-mod measured_loop_plots;
+mod loops;
 pub mod number;
 mod nyquist;
 mod overlay;
@@ -38,14 +36,13 @@ pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };
 pub use coherence::coherence_svg;
-pub use design::{DesignLimits, design_loop_svg, design_nyquist_svg};
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;
-pub use loop_plots::{LoopPlot, loop_bode_svg, loop_nyquist_svg, sensitivity_svg};
-pub use measured_loop_plots::{
-    MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
-    measured_sensitivity_svg,
+pub use loops::{
+    DesignLimits, LoopPlot, MeasuredLoopPlot, MeasuredMark, design_loop_svg, design_nyquist_svg,
+    loop_bode_svg, loop_nyquist_svg, measured_bode_svg, measured_nyquist_svg,
+    measured_sensitivity_svg, sensitivity_svg,
 };
 pub use nyquist::nyquist_svg;
 pub use overlay::{StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, step_svg};

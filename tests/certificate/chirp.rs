@@ -1,10 +1,14 @@
 //! What a completed chirp leaves.
 use std::process::Command;
 
-use bench::experiment::certificate::{SignAgreement, SignCheck};
+use bench::experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
+use bench::experiment::{self, Plan, analyse};
 use bench::identify::modal::FittedMode;
 use bench::identify::{Estimate, SIGMAS_95};
 use bench::model::plant::{ModalModel, build};
+use bench::recording::Recording;
+use bench::rig::simulated::SimulatedRig;
+use bench::rt::thread::Pace;
 use serde_json::Value;
 
 use crate::stage::{Chirp, chirp, config, reversed_chirp};
@@ -118,4 +122,46 @@ fn uncertain_or_missing_signs_do_not_differ() {
     reversed[1].residue_per_kg.sigma = 1.01 * size / SIGMAS_95;
     assert_eq!(agreement(&reversed), SignAgreement::Incomplete);
     assert_eq!(agreement(&exact(1e-4)[..2]), SignAgreement::Incomplete);
+}
+
+/// A recording of a run of the simulated stage with more settings.
+fn recorded(plan: impl FnOnce(bench::config::Config) -> Plan, more: &[&str]) -> Recording {
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = config(more);
+    let rig = Box::new(SimulatedRig::new(&config).expect("a rig"));
+    let run = experiment::run(
+        &plan(config),
+        rig,
+        Pace::Virtual,
+        folder.path(),
+        &mut |_, _| {},
+    );
+    let run = run.expect("a run");
+    let path = run.path.clone();
+    run.finish("{}").expect("a good disk");
+    Recording::open(&path).expect("a recording")
+}
+
+#[test]
+fn only_a_completed_chirp_leaves_a_certificate() {
+    let config = config(&[]);
+    let complete = Recording::open(&chirp().file("recording")).expect("a recording");
+    let analysis = analyse(&complete, &config).expect("an analysis");
+    let certificate = |recording: &Recording| {
+        let response = ResponseFile {
+            name: "frf.csv",
+            csv: "",
+        };
+        certify(recording, &analysis, &config, response).expect("TOML")
+    };
+    assert!(certificate(&complete).is_some());
+    // 5 um of travel: the chirp trips.
+    let tripped = recorded(
+        Plan::chirp,
+        &["interlock.soft_limit_m=5e-6", "control.reference.kind=hold"],
+    );
+    let other = recorded(Plan::quiet, &[]);
+    for recording in [&tripped, &other] {
+        assert_eq!(certificate(recording), None);
+    }
 }

@@ -135,3 +135,66 @@ fn defects_are_warnings_on_the_simulated_stage() {
         answer.err
     );
 }
+
+#[test]
+fn all_mismatches_are_listed_in_text_and_json_before_a_device_is_opened() {
+    let bench = Bench::new();
+    let certificate = chirp().file("certificate");
+    // The certificate is that of the simulated stage at 5 kHz.
+    let control = format!(
+        "control {NO_DEVICES} --slow --certificate {} --json",
+        certificate.display()
+    );
+    let refused = bench.run(&control);
+    assert_eq!(refused.code, 2, "{}", refused.err);
+    let error = &refused.json()["error"];
+    let defects = error["defects"].as_array().expect("a list");
+    assert!(defects.len() >= 3, "{error}");
+    let text = refused.err.clone();
+    for (number, defect) in (1..).zip(defects) {
+        let defect = defect.as_str().expect("a text");
+        assert!(defect.contains("; "), "{defect}");
+        assert!(text.contains(&format!("\n  {number}. {defect}")), "{text}");
+    }
+    for table in ["[amplifier]", "[probe]"] {
+        let line = format!("the settings in {table} differ");
+        assert!(text.contains(&line), "{table}: {text}");
+    }
+    assert!(!text.contains("ttyNONE9"), "{text}");
+}
+
+#[test]
+fn plan_shows_the_table_of_conditions_and_the_rest_after_the_check() {
+    let bench = Bench::new();
+    let control = format!(
+        "control {SETTINGS} --asymmetry 9% --plan --certificate {}",
+        chirp().file("certificate").display()
+    );
+    let answer = bench.run(&control);
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let row = |name: &str| -> String {
+        let lines = answer.out.lines();
+        let mut rows = lines.filter(|line| line.trim_start().starts_with(name));
+        rows.next().expect("a row").to_string()
+    };
+    assert!(row("mass asymmetry").contains("DIFFERS"), "{}", answer.out);
+    assert!(row("operating point").contains("agrees"), "{}", answer.out);
+    assert!(row("amplifier").contains("not compared"), "{}", answer.out);
+    assert!(
+        row("rest").contains("after the check of the stage"),
+        "{}",
+        answer.out
+    );
+    let json = bench.json(&control);
+    let conditions = json["evidence"]["conditions"].as_array().expect("a list");
+    let asymmetry = conditions.iter().find(|c| c["subject"] == "mass_asymmetry");
+    let asymmetry = asymmetry.expect("a condition");
+    assert_eq!(asymmetry["agreement"], "differs");
+    assert_eq!(
+        (
+            asymmetry["certificate"].as_str(),
+            asymmetry["today"].as_str()
+        ),
+        (Some("0.1"), Some("0.09"))
+    );
+}

@@ -2,6 +2,7 @@
 
 mod chirp;
 mod command;
+mod lower_margin;
 mod refused;
 #[path = "../calibration/skewed_rig.rs"]
 #[allow(dead_code, reason = "only some errors of the devices are needed here")]

@@ -2,7 +2,7 @@
 use std::time::{Duration, SystemTime};
 
 use bench::experiment::certificate::{
-    CertificateError, Evidence, OpenRig, require_evidence, sha256,
+    Agreement, CertificateError, Evidence, OpenRig, Subject, require_evidence, sha256,
 };
 use bench::experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
 use bench::rig::calibration::Calibration;
@@ -48,8 +48,20 @@ fn defect(plan: &Plan) -> CertificateError {
         text.contains("; ") && text.contains("--override") && text.ends_with("nothing was moved"),
         "{text}"
     );
+    only_defect(&error)
+}
+
+/// The defect of a refusal that has one.
+fn only_defect(error: &ExperimentError) -> CertificateError {
+    match defects(error) {
+        [defect] => defect.clone(),
+        several => panic!("{several:?}"),
+    }
+}
+
+fn defects(error: &ExperimentError) -> &[CertificateError] {
     match error {
-        ExperimentError::Certificate(defect) => defect,
+        ExperimentError::Certificate(defects) => defects.as_slice(),
         other => panic!("{other}"),
     }
 }
@@ -205,8 +217,7 @@ fn rejects_other_devices() {
         (swapped("simulated", "capancdt /dev/ttyUSB0"), "probe"),
     ] {
         let error = required(&plan(&[]), &devices).expect_err("refused");
-        let ExperimentError::Certificate(CertificateError::OtherDevice { kind: found, .. }) = error
-        else {
+        let CertificateError::OtherDevice { kind: found, .. } = only_defect(&error) else {
             panic!("{error}");
         };
         assert_eq!(found, kind);
@@ -229,13 +240,7 @@ fn rejects_other_calibration() {
         calibration: Some(&calibration),
     };
     let error = require_evidence(&plan(&[]), Stage::Devices, Some(rig)).expect_err("refused");
-    assert!(
-        matches!(
-            error,
-            ExperimentError::Certificate(CertificateError::OtherCalibration)
-        ),
-        "{error}"
-    );
+    assert_eq!(only_defect(&error), CertificateError::OtherCalibration);
     // The same calibration in both is accepted.
     let digest = sha256(&calibration.to_toml().expect("TOML"));
     let same = edited(plan(&[]), |json| {
@@ -312,8 +317,13 @@ fn rejects_a_loop_that_encircles_minus_one_by_the_measured_response() {
     let mut config = config(&[]);
     config.control.certificate = Some(reversed_chirp().file("certificate").display().to_string());
     let plan = Plan::control(config).expect("a plan");
-    let CertificateError::Signs { measured, .. } = defect(&plan) else {
-        panic!("another defect");
+    let error = required(&plan, &simulated()).expect_err("refused");
+    let [
+        CertificateError::Signs { measured, .. },
+        CertificateError::Unstable,
+    ] = defects(&error)
+    else {
+        panic!("{error}");
     };
     assert_eq!(measured, "++-");
     // If the signs were not known, the response alone would be refused.
@@ -379,4 +389,168 @@ fn rejects_changed_damaged_and_missing_files() {
         refused("newer.json", Some(&newer)),
         CertificateError::Damaged { .. }
     ));
+}
+
+#[test]
+fn all_defects_are_refused_in_one_list() {
+    let several = edited(
+        plan(&[
+            "motor.force_constant_n_per_a=11.0",
+            "plant.operating_point_m=0.003",
+        ]),
+        |json| {
+            json["made"] = date(-31 * 86_400);
+            json["loop"]["rate_hz"] = json!(2000.0);
+            json["devices"]["probe"] = json!("another probe");
+        },
+    );
+    let error = required(&several, &simulated()).expect_err("refused");
+    assert_eq!(defects(&error).len(), 5, "{error}");
+    let text = error.to_string();
+    for part in [
+        "refused: the certificate has 5 defects; correct each of them, or add --override",
+        "\n  1. the certificate is stale",
+        "\n  2. the certificate was made at 2000 Hz",
+        "\n  3. the settings in [motor] differ",
+        "\n  4. the certificate was made with the probe \"another probe\"",
+        "\n  5. the certificate was made at plant.operating_point_m = 0.0038, but it is 0.003 now",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // On the simulated stage the same list is only reported.
+    let rig = OpenRig {
+        devices: &simulated(),
+        calibration: None,
+    };
+    let reported = require_evidence(&several, Stage::Simulated, Some(rig)).expect("reported");
+    assert_eq!(reported.defects.len(), 5);
+}
+
+/// The table of conditions contains both values, and which of them agree.
+#[test]
+fn conditions_are_listed_with_both_values() {
+    let evidence = required(&plan(&[]), &simulated()).expect("accepted");
+    let found: Vec<Subject> = evidence.conditions.iter().map(|c| c.subject).collect();
+    for subject in [
+        Subject::Age,
+        Subject::Loop,
+        Subject::MotorSettings,
+        Subject::AmplifierSettings,
+        Subject::ProbeSettings,
+        Subject::Amplifier,
+        Subject::Probe,
+        Subject::Calibration,
+        Subject::OperatingPoint,
+        Subject::MassAsymmetry,
+        Subject::Signs,
+        Subject::Band,
+        Subject::ModulusMargin,
+        Subject::Plant,
+        Subject::Controller,
+    ] {
+        assert_eq!(found.iter().filter(|s| **s == subject).count(), 1);
+    }
+    for condition in &evidence.conditions {
+        // Model and controller may change after the chirp.
+        let is_free = matches!(condition.subject, Subject::Plant | Subject::Controller);
+        let expected = match is_free {
+            true => Agreement::NotCompared,
+            false => Agreement::Agrees,
+        };
+        assert_eq!(condition.agreement, expected, "{condition:?}");
+    }
+    let mut conditions = evidence.conditions.iter();
+    let load = conditions.find(|c| c.subject == Subject::OperatingPoint);
+    let load = load.expect("the operating point");
+    assert_eq!(
+        (load.certificate.as_str(), load.today.as_str()),
+        ("0.0038", "0.0038")
+    );
+    // The devices are not known before they are open.
+    let closed = require_evidence(&plan(&[]), Stage::Devices, None).expect("accepted");
+    let not_open = closed.conditions.iter().filter(|c| c.today == "not open");
+    assert_eq!(not_open.count(), 3);
+}
+
+#[test]
+fn each_defect_has_its_own_remedy() {
+    let remedy = |defect: CertificateError| {
+        let text = defect.to_string();
+        let (_, remedy) = text.split_once("; ").expect("a remedy");
+        remedy.to_string()
+    };
+    let stale = edited(plan(&[]), |json| json["made"] = date(-31 * 86_400));
+    let load = plan(&["plant.mass_asymmetry=0.05"]);
+    let band = with_response(plan(&[]), |row| {
+        (column(row, 0) > 30.0).then(|| row.to_string())
+    });
+    let foreign = DeviceNames {
+        amplifier: "canopen 0x1-0x2".into(),
+        probe: "simulated".into(),
+    };
+    let foreign = only_defect(&required(&plan(&[]), &foreign).expect_err("refused"));
+    for (defect, words) in [
+        (defect(&stale), "repeat `bench chirp`"),
+        (
+            defect(&load),
+            "load the stage as in the chirp and set plant.mass_asymmetry to 0.1",
+        ),
+        (defect(&band), "with --start below 22."),
+        (foreign, "connect that device"),
+        (
+            defect(&plan(&["control.min_modulus_margin=0.9"])),
+            "--controller FILE",
+        ),
+    ] {
+        let remedy = remedy(defect);
+        assert!(remedy.contains(words), "{words}: {remedy}");
+    }
+}
+
+#[test]
+fn rejects_a_margin_that_is_not_above_zero_or_not_a_number() {
+    let unlimited = plan(&["control.min_modulus_margin=0"]);
+    assert!(required(&unlimited, &simulated()).is_ok());
+    // A standard deviation as large as the response leaves no margin.
+    let noisy = with_response(unlimited.clone(), |row| {
+        Some(with_column(row, 4, column(row, 1)))
+    });
+    assert!(matches!(
+        defect(&noisy),
+        CertificateError::LowMargin { margin, least: 0.0, .. } if margin <= 0.0
+    ));
+    let undefined = with_response(unlimited, |row| Some(with_column(row, 4, f64::NAN)));
+    assert!(required(&undefined, &simulated()).is_err());
+}
+
+#[test]
+fn rejects_a_response_without_frequencies() {
+    let empty = with_response(plan(&[]), |_| None);
+    let error = required(&empty, &simulated()).expect_err("refused");
+    assert!(error.to_string().contains("no frequencies"), "{error}");
+}
+
+/// With growing noise the loop is first undecided, below 4 standard deviations from -1, and then too close to it, below 1.96.
+#[test]
+fn rejects_a_loop_whose_stability_is_hidden_by_noise() {
+    let unlimited = plan(&["control.min_modulus_margin=0"]);
+    let with_noise = |relative: f64| {
+        let noisy = with_response(unlimited.clone(), |row| {
+            Some(with_column(row, 4, relative * column(row, 1)))
+        });
+        required(&noisy, &simulated()).map_err(|error| only_defect(&error))
+    };
+    assert!(with_noise(0.01).is_ok());
+    let found: Vec<_> = (0..30)
+        .map(|k| with_noise(0.05 * 1.12f64.powi(k)))
+        .collect();
+    let is_undecided = |found: &Result<Evidence, CertificateError>| matches!(found, Err(CertificateError::Undecided { sigmas }) if *sigmas < 4.0);
+    let is_low = |found: &Result<Evidence, CertificateError>| {
+        matches!(found, Err(CertificateError::LowMargin { .. }))
+    };
+    let first = found.iter().position(is_undecided).expect("undecided");
+    let low = found.iter().position(is_low).expect("too low");
+    assert!(found[..first].iter().all(Result::is_ok), "{found:?}");
+    assert!(found[first..low].iter().all(is_undecided), "{found:?}");
+    assert!(found[low..].iter().all(is_low), "{found:?}");
 }

@@ -1,6 +1,7 @@
 //! Requirements for shaping, prefilter and feedforward of `bench control`: plans against an independent simulation in Python, and runs
 //! of the simulated stage.
 
+mod inversion;
 mod minimum_time;
 mod plans;
 mod refused;

@@ -140,3 +140,23 @@ fn plan_without_noise_predicts_the_measured_step() {
     // Six standard deviations of 0.05 um over 50 um.
     assert!(difference.abs() < 0.6, "{predicted} {measured}");
 }
+
+/// Without its limit of the travel, the plan of this step would overshoot the soft limit of 900 um, and be refused.
+#[test]
+fn step_near_the_soft_limit_is_planned_within_it() {
+    let planned = Bench::new()
+        .json("control --fast --shaper minimum-time --amplitude 890um --duration 0.3 --plan");
+    let travel_m = number(&planned["expected"]["travel_m"]);
+    assert!((880e-6..900e-6).contains(&travel_m), "{travel_m}");
+}
+
+/// Without the limit the same step overshoots by more than 1 %.
+#[test]
+fn planned_overshoot_is_below_its_limit() {
+    let planned = |options: &str| {
+        let arguments = format!("control --fast --shaper minimum-time {options} --plan");
+        number(&Bench::new().json(&arguments)["command"]["overshoot_percent"])
+    };
+    assert!(planned("--max-overshoot 1%") < 1.0);
+    assert!(planned("") > 1.0);
+}

@@ -181,3 +181,57 @@ fn json_output_is_a_single_object() {
         (1, &json!("tripped"))
     );
 }
+
+/// `--reference KIND` states default values, which `--set` changes; an option for a single value is over `--set`.
+#[test]
+fn set_changes_the_table_of_an_option() {
+    let bench = Bench::new();
+    for (arguments, expected) in [
+        (
+            "--reference sine --set control.reference.amplitude_m=2e-5",
+            "sine of 20 um at 1 Hz",
+        ),
+        (
+            "--reference sine --set control.reference.amplitude_m=20um --set control.reference.frequency_hz=5",
+            "sine of 20 um at 5 Hz",
+        ),
+        (
+            "--reference sine --amplitude 30um --set control.reference.amplitude_m=2e-5",
+            "sine of 30 um at 1 Hz",
+        ),
+        (
+            "--reference sine --amplitude 30um --set control.reference.amplitude_m=20um",
+            "sine of 30 um at 1 Hz",
+        ),
+        (
+            "--reference sine --set control.reference.kind=sine",
+            "sine of 50 um at 1 Hz",
+        ),
+    ] {
+        let planned = bench.json(&format!("control --fast {arguments} --plan"));
+        let reference = planned["reference"].as_str().expect("a text");
+        assert!(reference.starts_with(expected), "{arguments}: {reference}");
+    }
+}
+
+#[test]
+fn set_that_contradicts_an_option_is_refused() {
+    let bench = Bench::new();
+    for (arguments, words) in [
+        (
+            "--reference sine --set control.reference.kind=step",
+            ["--reference sine", "contradicts", "control.reference.kind"],
+        ),
+        // A sine has no beginning.
+        (
+            "--reference sine --set control.reference.at_s=1",
+            ["--set", "at_s", "control.reference"],
+        ),
+    ] {
+        let answer = bench.run(&format!("control --fast {arguments} --plan"));
+        assert_eq!(answer.code, 2, "{arguments}: {}", answer.out);
+        for word in words {
+            assert!(answer.err.contains(word), "{arguments}: {}", answer.err);
+        }
+    }
+}

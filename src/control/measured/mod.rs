@@ -25,6 +25,7 @@
 mod band;
 mod count;
 mod error;
+mod lower;
 mod margins;
 mod measured_loop;
 mod point;
@@ -34,6 +35,7 @@ mod smoothing;
 pub use band::{OutsideBand, RangeBound, check_gaps};
 pub use count::{NyquistCount, Stability};
 pub use error::MeasuredLoopError;
+pub use lower::LowerMargin;
 pub use margins::{LoopPeaks, MeasuredCrossing, MeasuredMargins};
 pub use measured_loop::MeasuredLoop;
 pub use point::ResponsePoint;

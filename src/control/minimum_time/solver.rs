@@ -1,9 +1,9 @@
 //! The linear programme as matrices for the interior-point solver.
 
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT,
-};
+use clarabel::solver::{DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT};
+
+use crate::control::solver_settings::solver_settings;
 
 /// Weight of sum (x - 1)^2 beside t: of several solutions the one with the smoothest reference.
 const SMOOTHNESS: f64 = 1e-6;
@@ -26,10 +26,7 @@ pub(super) fn minimise(count: usize, rows: &[Row], bound: f64) -> Option<Solutio
     let (matrix, limits) = constraints(count, rows, bound);
     let (weights, costs) = objective(count);
     let cones: [SupportedConeT<f64>; 1] = [NonnegativeConeT(limits.len())];
-    let settings = DefaultSettings {
-        verbose: false,
-        ..DefaultSettings::default()
-    };
+    let settings = solver_settings();
     let mut solver =
         DefaultSolver::new(&weights, &costs, &matrix, &limits, &cones, settings).ok()?;
     solver.solve();

@@ -6,10 +6,11 @@
 
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{
-    DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus,
-    SupportedConeT,
+    DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus, SupportedConeT,
 };
 use nalgebra::Complex;
+
+use crate::control::solver_settings::solver_settings;
 
 /// weight |constant + sum of factors_n x_n|.
 #[derive(Clone, Debug)]
@@ -111,10 +112,6 @@ impl ConeProgramme {
         );
         let mut objective = vec![0.0; columns];
         objective[self.unknowns] = 1.0;
-        let settings = DefaultSettings {
-            verbose: false,
-            ..DefaultSettings::default()
-        };
         let quadratic = CscMatrix::zeros((columns, columns));
         let solver = DefaultSolver::new(
             &quadratic,
@@ -122,7 +119,7 @@ impl ConeProgramme {
             &matrix,
             &self.limits,
             &self.cones,
-            settings,
+            solver_settings(),
         );
         let mut solver = solver.ok()?;
         solver.solve();

@@ -8,7 +8,9 @@
 //! violates. Slacks of neighbouring frequencies follow each other: of each valley the lowest one is enough.
 
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
+use clarabel::solver::{DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
+
+use crate::control::solver_settings::solver_settings;
 
 /// A slack c and its derivatives g.
 #[derive(Clone, Debug)]
@@ -127,10 +129,7 @@ fn minimise(objective: &[f64], matrix: &CscMatrix<f64>, limits: &[f64]) -> Optio
     let n = objective.len();
     let quadratic = CscMatrix::zeros((n, n));
     let cones = [NonnegativeConeT(limits.len())];
-    let settings = DefaultSettings {
-        verbose: false,
-        ..DefaultSettings::default()
-    };
+    let settings = solver_settings();
     let solver = DefaultSolver::new(&quadratic, objective, matrix, limits, &cones, settings);
     let mut solver = solver.ok()?;
     solver.solve();

@@ -13,6 +13,7 @@ mod square;
 mod step;
 mod swept;
 mod triangle;
+mod wave;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -7,9 +7,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::design::{
-    ReferenceContext, ReferenceDesign, ReferenceError, check_amplitude, check_frequency, um,
-};
+use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, um};
+use super::wave::check_wave;
 use crate::excitation::waveform::Reference;
 use crate::util::finding::Finding;
 
@@ -53,9 +52,7 @@ impl ReferenceDesign for SquareReference {
     }
 
     fn check(&self, soft_limit_m: f64, rate_hz: f64) -> Vec<Finding> {
-        let mut findings = check_amplitude(self.amplitude_m, soft_limit_m);
-        findings.extend(check_frequency(self.frequency_hz, rate_hz));
-        findings
+        check_wave(self.amplitude_m, self.frequency_hz, soft_limit_m, rate_hz)
     }
 }
 

@@ -9,9 +9,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::design::{
-    ReferenceContext, ReferenceDesign, ReferenceError, check_amplitude, check_frequency, um,
-};
+use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, um};
+use super::wave::{Wave, check_wave};
 use crate::excitation::waveform::Reference;
 use crate::util::finding::Finding;
 
@@ -46,35 +45,22 @@ impl ReferenceDesign for TriangleReference {
     }
 
     fn build(&self, context: &ReferenceContext<'_>) -> Result<Box<dyn Reference>, ReferenceError> {
-        Ok(Box::new(Triangle {
-            amplitude_m: self.amplitude_m,
-            cycles_per_tick: self.frequency_hz * context.period_s,
-        }))
+        let period_s = context.period_s;
+        let wave = Wave::new(self.amplitude_m, self.frequency_hz, period_s, shape);
+        Ok(Box::new(wave))
     }
 
     fn check(&self, soft_limit_m: f64, rate_hz: f64) -> Vec<Finding> {
-        let mut findings = check_amplitude(self.amplitude_m, soft_limit_m);
-        findings.extend(check_frequency(self.frequency_hz, rate_hz));
-        findings
+        check_wave(self.amplitude_m, self.frequency_hz, soft_limit_m, rate_hz)
     }
 }
 
-struct Triangle {
-    amplitude_m: f64,
-    cycles_per_tick: f64,
-}
-
-impl Reference for Triangle {
-    fn at_m(&self, tick: u64) -> f64 {
-        let cycles = tick as f64 * self.cycles_per_tick;
-        let x = cycles - libm::floor(cycles);
-        let shape = if x < 0.25 {
-            4.0 * x
-        } else if x < 0.75 {
-            2.0 - 4.0 * x
-        } else {
-            4.0 * x - 4.0
-        };
-        self.amplitude_m * shape
+fn shape(x: f64) -> f64 {
+    if x < 0.25 {
+        4.0 * x
+    } else if x < 0.75 {
+        2.0 - 4.0 * x
+    } else {
+        4.0 * x - 4.0
     }
 }

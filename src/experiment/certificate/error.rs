@@ -1,5 +1,7 @@
 //! Why a loop is not closed with a certificate.
 
+use std::fmt;
+
 /// A certificate that is missing, or with which a loop is not closed on devices. Each text is `what is wrong; remedy`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CertificateError {
@@ -97,7 +99,7 @@ pub enum CertificateError {
     OtherCalibration,
     /// The stage is loaded differently.
     #[error(
-        "the certificate was made at {quantity} = {certified}, but it is {configured} now; load the stage as in the chirp, or {REPEAT}"
+        "the certificate was made at {quantity} = {certified}, but it is {configured} now; load the stage as in the chirp and set {quantity} to {certified}, or {REPEAT} with this load"
     )]
     OtherLoad {
         /// The setting.
@@ -119,7 +121,7 @@ pub enum CertificateError {
     },
     /// The measured band does not contain the crossings of the loop.
     #[error(
-        "the certificate has no response between {from_hz:.3} Hz and {to_hz:.3} Hz, and the loop needs one from {needed_from_hz:.3} Hz to {needed_to_hz:.3} Hz, around its crossings; repeat `bench chirp` with --start and --stop outside of this band"
+        "the certificate has no response between {from_hz:.3} Hz and {to_hz:.3} Hz, and the loop needs one from {needed_from_hz:.3} Hz to {needed_to_hz:.3} Hz, around its crossings; repeat `bench chirp` with --start below {needed_from_hz:.3} Hz and --stop above {needed_to_hz:.3} Hz"
     )]
     Band {
         /// Lower end of the missing part in hertz.
@@ -143,11 +145,54 @@ pub enum CertificateError {
         /// The limit.
         least: f64,
     },
+    /// The measured curve passes -1 so closely that noise may hide an instability.
+    #[error(
+        "the measured response of the loop passes -1 at {sigmas:.1} standard deviations, so that its stability is not decided; repeat `bench chirp` with a larger amplitude, or choose another controller (--controller FILE)"
+    )]
+    Undecided {
+        /// The distance in standard deviations.
+        sigmas: f64,
+    },
     /// The loop is unstable by the measured response.
     #[error(
         "by the measured response the loop encircles -1 in another way than by the model, so it is unstable; correct the model, or choose another controller (--controller FILE)"
     )]
     Unstable,
+}
+
+/// Everything for which a loop is not closed with a certificate; at least one defect.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CertificateDefects(Vec<CertificateError>);
+
+impl std::error::Error for CertificateDefects {}
+
+impl CertificateDefects {
+    /// These defects; `None` if there are none.
+    pub(super) fn of(defects: Vec<CertificateError>) -> Option<CertificateDefects> {
+        (!defects.is_empty()).then_some(CertificateDefects(defects))
+    }
+
+    /// The defects.
+    pub fn as_slice(&self) -> &[CertificateError] {
+        &self.0
+    }
+}
+
+/// One defect with its remedy, or the numbered list of all.
+impl fmt::Display for CertificateDefects {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const OVERRIDE: &str = "or add --override \"REASON\"; nothing was moved";
+        if let [defect] = self.as_slice() {
+            return write!(f, "refused: {defect}, {OVERRIDE}");
+        }
+        let count = self.0.len();
+        write!(
+            f,
+            "refused: the certificate has {count} defects; correct each of them, {OVERRIDE}"
+        )?;
+        let mut numbered = (1..).zip(&self.0);
+        numbered.try_for_each(|(number, defect)| write!(f, "\n  {number}. {defect}"))
+    }
 }
 
 const REPEAT: &str = "repeat `bench chirp`";

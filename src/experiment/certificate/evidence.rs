@@ -5,16 +5,24 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use super::check::{Connected, defects};
-use super::error::CertificateError;
+use super::band::Band;
+use super::check::{Connected, Today, conditions};
+use super::condition::{Checked, Condition, Subject};
+use super::error::{CertificateDefects, CertificateError};
 use super::file::LoadedCertificate;
-use super::margin::{LowerMargin, MeasuredLoop};
+use crate::control::measured::{LowerMargin, MeasuredLoop, Stability};
+use crate::control::{ClosedLoop, ControllerText};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::loop_check::{Stage, closed_loop_of};
+use crate::experiment::measured_frf::FrfError;
 use crate::experiment::open_bench::DeviceNames;
 use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
+use crate::experiment::response_points::points;
+use crate::experiment::stage_check::RestAfterCheck;
+use crate::model::plant::SignalPath;
 use crate::rig::calibration::Calibration;
+use crate::util::decimal::Decimal;
 
 /// The evidence with which a loop closes. The names in JSON must not change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -27,8 +35,12 @@ pub struct Evidence {
     pub modulus_margin_lower: Option<f64>,
     /// Its frequency in hertz.
     pub modulus_margin_at_hz: Option<f64>,
+    /// What must agree with the certificate, and whether it does.
+    pub conditions: Vec<Condition>,
     /// What is wrong with the certificate, or that none is given on devices: accepted on the simulated stage, or by an override.
     pub defects: Vec<String>,
+    /// The time with zero current between the check of the stage and the closing of the loop.
+    pub rest_after_check: Option<RestAfterCheck>,
     /// The reason of the operator for closing the loop without a valid certificate.
     #[serde(rename = "override")]
     pub override_reason: Option<String>,
@@ -48,7 +60,7 @@ pub struct OpenRig<'a> {
 /// A plan without a controller needs no evidence.
 ///
 /// # Errors
-/// With the first defect; when certificate, controller or model cannot be used.
+/// With all defects; when certificate, controller or model cannot be used.
 pub fn require_evidence(
     plan: &Plan,
     stage: Stage,
@@ -56,8 +68,8 @@ pub fn require_evidence(
 ) -> Result<Evidence, ExperimentError> {
     let (evidence, defects) = examined(plan, stage, rig)?;
     let is_accepted = stage == Stage::Simulated || plan.override_reason.is_some();
-    match defects.into_iter().next().filter(|_| !is_accepted) {
-        Some(defect) => Err(defect.into()),
+    match CertificateDefects::of(defects).filter(|_| !is_accepted) {
+        Some(defects) => Err(defects.into()),
         None => Ok(evidence),
     }
 }
@@ -83,16 +95,19 @@ fn examined(
     stage: Stage,
     rig: Option<OpenRig<'_>>,
 ) -> Result<(Evidence, Vec<CertificateError>), ExperimentError> {
-    if plan.controller.is_none() {
+    let Some(controller) = &plan.controller else {
         return Ok((Evidence::default(), Vec::new()));
-    }
+    };
     let (mut evidence, defects) = match (&plan.certificate, stage) {
-        (Some(text), _) => of_certificate(
-            plan,
-            &text.name,
-            &text.load().map_err(PlanError::from)?,
-            rig,
-        )?,
+        (Some(text), _) => {
+            let examined = Examined {
+                plan,
+                controller,
+                name: &text.name,
+                loaded: &text.load().map_err(PlanError::from)?,
+            };
+            examined.evidence(rig)?
+        }
         (None, Stage::Devices) => (Evidence::default(), vec![CertificateError::Missing]),
         (None, Stage::Simulated) => (Evidence::default(), Vec::new()),
     };
@@ -101,29 +116,106 @@ fn examined(
     Ok((evidence, defects))
 }
 
-fn of_certificate(
-    plan: &Plan,
-    name: &str,
-    loaded: &LoadedCertificate,
-    rig: Option<OpenRig<'_>>,
-) -> Result<(Evidence, Vec<CertificateError>), ExperimentError> {
-    let connected = rig.map(connected).transpose()?;
-    let certificate = &loaded.certificate;
-    let mut defects = defects(
-        certificate,
-        &plan.config,
-        connected.as_ref(),
-        SystemTime::now(),
-    )?;
-    let margin = measured_margin(plan, loaded, &mut defects)?;
-    let evidence = Evidence {
-        certificate: Some(name.into()),
-        made: Some(certificate.made.clone()),
-        modulus_margin_lower: margin.map(|margin| margin.margin),
-        modulus_margin_at_hz: margin.map(|margin| margin.at_hz),
-        ..Evidence::default()
-    };
-    Ok((evidence, defects))
+/// A plan with its certificate.
+struct Examined<'a> {
+    plan: &'a Plan,
+    controller: &'a ControllerText,
+    /// Path of the certificate.
+    name: &'a str,
+    loaded: &'a LoadedCertificate,
+}
+
+impl Examined<'_> {
+    /// The evidence and all defects of the certificate.
+    fn evidence(
+        &self,
+        rig: Option<OpenRig<'_>>,
+    ) -> Result<(Evidence, Vec<CertificateError>), ExperimentError> {
+        let connected = rig.map(connected).transpose()?;
+        let certificate = &self.loaded.certificate;
+        let today = Today {
+            config: &self.plan.config,
+            controller: self.controller,
+            connected: connected.as_ref(),
+            now: SystemTime::now(),
+        };
+        let mut checked = conditions(certificate, &today)?;
+        let margin = self.measured_margin(&mut checked)?;
+        let (conditions, defects): (Vec<_>, Vec<_>) = checked
+            .into_iter()
+            .map(|checked| (checked.condition, checked.defect))
+            .unzip();
+        let evidence = Evidence {
+            certificate: Some(self.name.into()),
+            made: Some(certificate.made.clone()),
+            modulus_margin_lower: margin.map(|margin| margin.margin),
+            modulus_margin_at_hz: margin.map(|margin| margin.at_hz),
+            conditions,
+            rest_after_check: self.plan.rest_after_check,
+            ..Evidence::default()
+        };
+        Ok((evidence, defects.into_iter().flatten().collect()))
+    }
+
+    /// The lower bound of the modulus margin by the measured response; adds the conditions on band and margin. There is no bound if
+    /// the loop is unstable by the model: other checks decide about it.
+    fn measured_margin(
+        &self,
+        checked: &mut Vec<Checked>,
+    ) -> Result<Option<LowerMargin>, ExperimentError> {
+        let config = &self.plan.config;
+        let model = closed_loop_of(self.controller, config)?;
+        let margins = model.margins();
+        if !margins.stable {
+            return Ok(None);
+        }
+        let frf = &self.loaded.frf;
+        let probe_period_s = config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz);
+        if let Some(needed) = Band::needed(&model, &margins, probe_period_s) {
+            let missing = needed.missing_in(&frf.frequency_hz);
+            let is_missing = missing.is_some();
+            let certified = &self.loaded.certificate.frf;
+            checked.push(Checked::new(
+                Subject::Band,
+                band_text(certified.from_hz, certified.to_hz),
+                band_text(needed.from_hz, needed.to_hz),
+                missing,
+            ));
+            if is_missing {
+                return Ok(None);
+            }
+        }
+        let lower = self.lower_margin(&model)?;
+        let least = config.control.min_modulus_margin;
+        let margin = Decimal(lower.margin);
+        checked.push(Checked::new(
+            Subject::ModulusMargin,
+            format!("at least {margin:.3} (95 %)"),
+            format!("limit {least}"),
+            margin_defect(&lower, least),
+        ));
+        Ok(Some(lower))
+    }
+
+    fn lower_margin(&self, model: &ClosedLoop) -> Result<LowerMargin, ExperimentError> {
+        let points = points(&self.loaded.frf, &SignalPath::from(&self.plan.config));
+        let law = |w: f64| model.law_response(w);
+        let measured_band = points.first().zip(points.last());
+        let further = measured_band.map_or(Vec::new(), |(first, last)| {
+            model.frequencies(first.omega_rad_s, last.omega_rad_s)
+        });
+        let measured = MeasuredLoop::new(&points, &law, &further).map_err(|error| {
+            PlanError::from(CertificateError::Damaged {
+                file: self.name.into(),
+                why: error.to_string().replace(';', ","),
+            })
+        })?;
+        LowerMargin::of(&measured, model).ok_or(ExperimentError::Frf(FrfError::Poles))
+    }
+}
+
+fn band_text(from_hz: f64, to_hz: f64) -> String {
+    format!("{from_hz:.1} to {to_hz:.1} Hz")
 }
 
 fn connected(rig: OpenRig<'_>) -> Result<Connected<'_>, PlanError> {
@@ -135,48 +227,21 @@ fn connected(rig: OpenRig<'_>) -> Result<Connected<'_>, PlanError> {
     })
 }
 
-/// The lower bound of the modulus margin by the measured response, and its defects. There is no bound if the loop is unstable by the
-/// model: other checks decide about it.
-fn measured_margin(
-    plan: &Plan,
-    loaded: &LoadedCertificate,
-    defects: &mut Vec<CertificateError>,
-) -> Result<Option<LowerMargin>, PlanError> {
-    let config = &plan.config;
-    let controller = plan.controller.as_ref();
-    let model = closed_loop_of(controller.ok_or(PlanError::Missing("controller"))?, config)?;
-    let margins = model.margins();
-    if !margins.stable {
-        return Ok(None);
-    }
-    let measured = MeasuredLoop {
-        frf: &loaded.frf,
-        model: &model,
-        probe_period_s: config.probe.rate_hz.map(|rate_hz| 1.0 / rate_hz),
-    };
-    if let Err(missing) = measured.require_band(&margins) {
-        defects.push(missing);
-        return Ok(None);
-    }
-    let lower = measured.lower_margin();
-    defects.extend(margin_defect(&lower, config.control.min_modulus_margin));
-    Ok(Some(lower))
-}
-
+/// Why the measured loop may not close.
 fn margin_defect(lower: &LowerMargin, least: f64) -> Option<CertificateError> {
-    let LowerMargin {
-        margin,
-        at_hz,
-        is_stable,
-    } = *lower;
-    if !is_stable {
-        return Some(CertificateError::Unstable);
-    }
+    let LowerMargin { margin, at_hz, .. } = *lower;
     // Written this way, a margin that is not a number is too low.
     let is_enough = margin >= least && margin > 0.0;
-    (!is_enough).then_some(CertificateError::LowMargin {
-        margin,
-        at_hz,
-        least,
-    })
+    match lower.stability {
+        Stability::Unstable => Some(CertificateError::Unstable),
+        _ if !is_enough => Some(CertificateError::LowMargin {
+            margin,
+            at_hz,
+            least,
+        }),
+        Stability::Undecided => Some(CertificateError::Undecided {
+            sigmas: lower.distance_sigmas,
+        }),
+        Stability::Stable => None,
+    }
 }

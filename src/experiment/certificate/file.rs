@@ -93,6 +93,10 @@ pub struct Digests {
     pub plant: String,
     /// The calibration in use; `None` if there was none.
     pub calibration: Option<String>,
+    /// The configured controller when the certificate was written; `None` if there was none. Another one may close the loop: its
+    /// margins are computed from the response.
+    #[serde(default)]
+    pub controller: Option<String>,
 }
 
 /// The file of a frequency response.

@@ -7,6 +7,7 @@ use super::file::{
     CertifiedVerdict, Digests, FORMAT, sha256,
 };
 use crate::config::Config;
+use crate::control::ControllerText;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::plan::{CALIBRATION, KIND, RunKind};
@@ -120,12 +121,14 @@ impl CertifiedLoad {
 impl Digests {
     /// The digests of a configuration and of the text of a calibration.
     pub(super) fn of(config: &Config, calibration: Option<&str>) -> Result<Digests, PlanError> {
+        let controller = ControllerText::find(&config.control.controller);
         Ok(Digests {
             motor: table_digest(&config.motor)?,
             amplifier: table_digest(&config.amplifier)?,
             probe: table_digest(&config.probe)?,
             plant: table_digest(&config.plant)?,
             calibration: calibration.map(sha256),
+            controller: controller.ok().map(|found| sha256(&found.text)),
         })
     }
 }

@@ -13,16 +13,18 @@
 //! On the simulated stage a defect is a warning. An operator may override a refusal with a typed reason, which is recorded. A loop
 //! that is unstable by the model is never run on devices (see `loop_check`).
 
+mod band;
 mod check;
+mod condition;
 mod error;
 mod evidence;
 mod file;
 mod issue;
-mod margin;
 mod override_reason;
 mod signs;
 
-pub use error::CertificateError;
+pub use condition::{Agreement, Condition, Subject};
+pub use error::{CertificateDefects, CertificateError};
 pub(super) use evidence::require_evidence_or_warn;
 pub use evidence::{Evidence, OpenRig, require_evidence};
 pub use file::{
@@ -30,6 +32,5 @@ pub use file::{
     CertifiedResponse, CertifiedVerdict, Digests, LoadedCertificate, sha256,
 };
 pub use issue::{ResponseFile, certify};
-pub use margin::LowerMargin;
 pub use override_reason::{OverrideReason, ReasonError};
 pub use signs::{SIGNS_DIFFER, SignAgreement, SignCheck};

@@ -14,9 +14,11 @@ mod error;
 mod estimate;
 mod figures;
 mod planned;
+mod rest;
 mod shot;
 
 pub use comparison::StageCheck;
 pub use error::StageCheckError;
 pub use figures::{PhaseComparison, StaticComparison};
 pub use planned::PlannedStageCheck;
+pub use rest::RestAfterCheck;

@@ -101,6 +101,20 @@ impl Shot {
     }
 }
 
+impl Shot {
+    /// Bound of the free vibration in metres when the current of the shot ends: see [`rest`](super::rest).
+    pub(super) fn vibration_m(&self) -> f64 {
+        let step_m = self.compliance.value.abs() * self.settings.step_a;
+        let first_rad_s = self.decays.first().map_or(f64::INFINITY, |mode| mode.0);
+        let pairs = self.settings.tones.iter().zip(&self.responses);
+        let tones_m = pairs.map(|(tone, response)| {
+            let speed_ratio = (TAU * tone.frequency_hz / first_rad_s).max(1.0);
+            response.value.norm() * tone.amplitude_a * speed_ratio
+        });
+        step_m + tones_m.sum::<f64>()
+    }
+}
+
 fn times_s(first_hz: f64) -> [f64; 3] {
     let stretch = (USUAL_HZ / first_hz).clamp(1.0, MAX_STRETCH);
     TIMES_S.map(|time_s| stretch * time_s)

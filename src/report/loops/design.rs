@@ -2,11 +2,11 @@
 
 use nalgebra::Complex;
 
-use super::ReportError;
-use super::chart::colours::{BLUE, GREY, INK, SKY, VERMILION};
-use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use super::ellipse;
+use super::plane::{CRITICAL, circle, plane, with_critical_point, with_unit_circle};
 use crate::control::tuning::{Goal, LoopCurve, Requirements};
+use crate::report::ReportError;
+use crate::report::chart::colours::{BLUE, INK, SKY, VERMILION};
+use crate::report::chart::{Chart, Pen, Row, Scale, sheet_svg};
 use crate::util::units::{UM_PER_M, hz};
 
 /// Heights of the charts of L, S and K S in pixels.
@@ -157,19 +157,14 @@ pub fn design_nyquist_svg(
     if curves.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    let (low, high) = NYQUIST_RANGE;
-    let x = Scale::linear("Real part of L").within(low, high);
-    let y = Scale::linear("Imaginary part of L").within(low, high);
-    let disc = ellipse::circle((-1.0, 0.0), limits.modulus_margin);
-    let chart = Chart::new("", x, y)
-        .equal()
-        .area("modulus margin", VERMILION, OPACITY, disc)
-        .line("", Pen::dotted(GREY), ellipse::circle((0.0, 0.0), 1.0));
+    let disc = circle(CRITICAL, limits.modulus_margin);
+    let chart = plane("", NYQUIST_RANGE, NYQUIST_RANGE);
+    let chart = with_unit_circle(chart.area("modulus margin", VERMILION, OPACITY, disc), "");
     let chart = curves.iter().enumerate().fold(chart, |chart, (k, curve)| {
         let points = curve.open_loop.iter().map(|l| visible((l.re, l.im)));
         chart.line(once("loop", k), pen(k), points.collect())
     });
-    let chart = chart.points("-1", INK, Symbol::Cross, vec![(-1.0, 0.0)]);
+    let chart = with_critical_point(chart);
     let subtitle =
         "each line is the loop with one plant, from low frequency to half the sampling rate";
     sheet_svg(title, subtitle, &[Row::new(NYQUIST_HEIGHT, vec![chart])])

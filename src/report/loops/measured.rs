@@ -2,13 +2,14 @@
 
 use nalgebra::Complex;
 
-use super::ReportError;
-use super::bode::{magnitude, phase, stacked};
-use super::chart::colours::{Colour, GREY, INK, PURPLE};
-use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use super::ellipse::{self, SIGMAS_95_PLANE};
-use super::trace::{self, Line, Trace};
+use super::plane::{self, CRITICAL, plane, with_critical_point, with_unit_circle};
 use crate::identify::{Frf, Unit};
+use crate::report::ReportError;
+use crate::report::bode::{magnitude, phase, stacked};
+use crate::report::chart::colours::{Colour, GREY, PURPLE};
+use crate::report::chart::{Chart, Pen, Row, Symbol, sheet_svg};
+use crate::report::ellipse::{self, SIGMAS_95_PLANE};
+use crate::report::trace::{self, Line, Trace};
 
 /// Ends of the axes of the Nyquist plot: the surroundings of -1 and of the unit circle.
 const REAL_PART: (f64, f64) = (-2.6, 1.4);
@@ -95,9 +96,7 @@ fn phase_deg(line: &Line, mark: &MeasuredMark) -> f64 {
 
 /// A horizontal line over all frequencies.
 fn level(chart: Chart, lines: &[Line], value: f64) -> Chart {
-    let frequency_hz = lines[0].frequency_hz;
-    let (first, last) = (frequency_hz[0], frequency_hz[frequency_hz.len() - 1]);
-    let points = vec![(first, value), (last, value)];
+    let points = plane::level(lines[0].frequency_hz, value);
     chart.line("", Pen::dotted(GREY), points)
 }
 
@@ -108,13 +107,11 @@ fn level(chart: Chart, lines: &[Line], value: f64) -> Chart {
 /// When a response is invalid, or drawing fails.
 pub fn measured_nyquist_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
-    let x = Scale::linear("Real part of L").within(REAL_PART.0, REAL_PART.1);
-    let y = Scale::linear("Imaginary part of L").within(IMAGINARY_PART.0, IMAGINARY_PART.1);
-    let mut chart = Chart::new("", x, y).equal();
+    let mut chart = plane("", REAL_PART, IMAGINARY_PART);
     chart = confidence_circles(chart, &lines[0], plot.loop_gain);
-    chart = chart.line("|L| = 1", Pen::dotted(GREY), round_outline(0.0, 1.0));
+    chart = with_unit_circle(chart, "|L| = 1");
     if let Some(radius) = plot.modulus_margin {
-        let outline = round_outline(-1.0, radius);
+        let outline = plane::circle(CRITICAL, radius);
         chart = chart.line("modulus margin", Pen::dashed(MARK).thin(), outline);
     }
     for line in &lines {
@@ -126,18 +123,9 @@ pub fn measured_nyquist_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, Repor
             .points("", lines[0].pen.colour, Symbol::Dot, vec![(l.re, l.im)])
             .text((l.re, l.im), (26.0, -9.0), &frequency_text(frequency_hz));
     }
-    chart = chart.points("-1", INK, Symbol::Cross, vec![(-1.0, 0.0)]);
+    chart = with_critical_point(chart);
     let row = Row::new(NYQUIST_HEIGHT, vec![chart]);
     sheet_svg(plot.title, plot.subtitle, &[row])
-}
-
-/// A circle about a point of the real axis, fine enough for a large plot.
-fn round_outline(centre: f64, radius: f64) -> Vec<(f64, f64)> {
-    let ellipse = ellipse::Ellipse {
-        half_axes: [radius, radius],
-        angle_rad: 0.0,
-    };
-    ellipse.outline((centre, 0.0))
 }
 
 fn is_inside(l: &Complex<f64>) -> bool {

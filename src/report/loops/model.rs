@@ -1,14 +1,13 @@
 //! A control loop by its model: Bode plot and Nyquist plot of L with its margins, and S and T with their limits.
 
-use std::f64::consts::TAU;
-
 use nalgebra::Complex;
 
-use super::ReportError;
-use super::chart::colours::{BLUE, GREEN, GREY, INK, ORANGE, VERMILION};
-use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use super::trace::{self, Line, Trace};
+use super::plane::{CRITICAL, circle, level, plane, with_critical_point, with_unit_circle};
 use crate::control::{Crossing, Margins};
+use crate::report::ReportError;
+use crate::report::chart::colours::{BLUE, GREEN, GREY, ORANGE, VERMILION};
+use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::report::trace::{self, Line, Trace};
 use crate::util::units::hz;
 
 /// Heights of the frames in pixels.
@@ -20,8 +19,6 @@ const SENSITIVITY_HEIGHT: f64 = 360.0;
 const LEAST_MAGNITUDE: f64 = 1e-3;
 /// Part of an axis left free above and below the curves.
 const MARGIN: f64 = 0.06;
-/// Corners of a circle.
-const CIRCLE_CORNERS: usize = 120;
 /// Half the width of the Nyquist plot around -1, and its middle.
 const NEAR: f64 = 2.0;
 const NEAR_MIDDLE: f64 = -0.5;
@@ -94,12 +91,7 @@ impl LoopPlot<'_> {
 
     /// A horizontal line over all frequencies.
     fn level(&self, value: f64) -> Vec<(f64, f64)> {
-        let ends = self
-            .frequency_hz
-            .first()
-            .into_iter()
-            .chain(self.frequency_hz.last());
-        ends.map(|frequency_hz| (*frequency_hz, value)).collect()
+        level(self.frequency_hz, value)
     }
 }
 
@@ -256,14 +248,9 @@ fn far_half_width(plot: &LoopPlot<'_>) -> f64 {
 }
 
 fn nyquist(plot: &LoopPlot<'_>, heading: &str, middle: f64, half: f64) -> Chart {
-    let x = Scale::linear("Real part of L").within(middle - half, middle + half);
-    let y = Scale::linear("Imaginary part of L").within(-half, half);
+    let real = (middle - half, middle + half);
     let curve = plot.loop_gain.iter().map(|l| (l.re, l.im)).collect();
-    let mut chart = Chart::new(heading, x, y).equal().line(
-        "|L| = 1",
-        Pen::dotted(GREY),
-        circle((0.0, 0.0), 1.0),
-    );
+    let mut chart = with_unit_circle(plane(heading, real, (-half, half)), "|L| = 1");
     if plot.min_modulus_margin > 0.0 {
         let circle = circle(CRITICAL, plot.min_modulus_margin);
         let name = format!("least modulus margin {}", plot.min_modulus_margin);
@@ -285,19 +272,7 @@ fn nyquist(plot: &LoopPlot<'_>, heading: &str, middle: f64, half: f64) -> Chart 
             chart = chart.points(&place.text, colour, Symbol::Dot, vec![at]);
         }
     }
-    chart.points("-1", INK, Symbol::Cross, vec![CRITICAL])
-}
-
-/// The critical point.
-const CRITICAL: (f64, f64) = (-1.0, 0.0);
-
-/// A closed circle.
-fn circle((x, y): (f64, f64), radius: f64) -> Vec<(f64, f64)> {
-    let corner = |k: usize| {
-        let (sine, cosine) = libm::sincos(TAU * k as f64 / CIRCLE_CORNERS as f64);
-        (x + radius * cosine, y + radius * sine)
-    };
-    (0..=CIRCLE_CORNERS).map(corner).collect()
+    with_critical_point(chart)
 }
 
 /// |S| and |T| with the limit of |S|, as an SVG document.
