@@ -75,6 +75,23 @@ impl OpenBench {
         })
     }
 
+    /// The simulated stage in place of the devices of a configuration, for tests of what happens on devices.
+    #[cfg(test)]
+    pub(super) fn emulated(config: &Config, opening: Opening) -> OpenBench {
+        let opened = devices::simulate(config).expect("a simulated stage");
+        let hooks = RunHooks::default();
+        OpenBench {
+            rig: LiveRig::with_hooks(opened.rig, config, opening.pace, hooks).expect("a thread"),
+            names: DeviceNames {
+                amplifier: opened.amplifier,
+                probe: opened.probe,
+            },
+            serial: opened.watch,
+            config: config.clone(),
+            opening,
+        }
+    }
+
     /// Whether it is the rig of `config`, opened in the same way. Excitation, controller, calibration and analysis do not belong to
     /// the rig, and the model of the plant belongs to a simulated one only.
     pub(super) fn is_of(&self, config: &Config, opening: &Opening) -> bool {
