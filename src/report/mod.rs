@@ -14,6 +14,7 @@ mod campaign;
 mod chart;
 mod coherence;
 mod design;
+mod design_page;
 mod distortion;
 pub mod ellipse;
 mod error;
@@ -39,6 +40,7 @@ pub use chart::{
 };
 pub use coherence::coherence_svg;
 pub use design::{DesignLimits, design_loop_svg, design_nyquist_svg};
+pub use design_page::DesignPage;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;

@@ -7,6 +7,7 @@ mod fit_intervals;
 mod frf_bias_and_coverage;
 mod frf_noise;
 mod joint_estimate;
+mod measured_designs;
 mod measured_margins;
 mod modes;
 mod residual_monitor;

@@ -31,7 +31,8 @@ pub struct PlantFigures {
     pub sensitivity_at_10_rad_s: f64,
     /// Largest |K S| in A/um.
     pub control_sensitivity_a_per_um: f64,
-    /// Standard deviation of the error in metres under the disturbance and the noise of the configuration.
+    /// Standard deviation of the error in metres under the disturbance and the noise of the configuration; not a number, `null` in
+    /// JSON, for a measured plant, whose disturbance is not known.
     pub error_rms_m: f64,
 }
 
@@ -107,7 +108,10 @@ impl PlantFigures {
             ),
             sensitivity_at_10_rad_s: 1.0 / distances[at_10],
             control_sensitivity_a_per_um: control.fold(0.0, f64::max),
-            error_rms_m: sigma_m(fine, cascade),
+            error_rms_m: match plant.uncertainty.is_none() {
+                true => sigma_m(fine, cascade),
+                false => f64::NAN,
+            },
         }
     }
 }

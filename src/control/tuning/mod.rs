@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!  operating points, tolerances -> plant ---------------+
+//!  measured responses -> measured_plant, uncertainty ----+
 //!  modes that the model lacks ---> unmodelled (bound U) -+-> sampled -> requirement, variance (slacks and their derivatives)
 //!  lines of the floor, noise ----> disturbance ----------+          |
 //!                                                                    v
@@ -23,6 +24,7 @@ mod design;
 mod disturbance;
 mod error;
 mod figures;
+mod measured_plant;
 mod nyquist;
 mod plant;
 mod requirement;
@@ -30,6 +32,7 @@ mod sampled;
 mod search;
 mod subproblem;
 mod task;
+mod uncertainty;
 mod unmodelled;
 mod variance;
 
@@ -41,8 +44,10 @@ pub use design::{Design, DesignTask, bound_of, design, evaluate};
 pub use disturbance::Disturbance;
 pub use error::{Conflict, TuneError};
 pub use figures::PlantFigures;
+pub use measured_plant::MeasuredPlant;
 pub use plant::{DesignPlant, Tolerances};
 pub use requirement::{Goal, Kind, Requirements, SensitivityLimit};
 pub use search::Effort;
 pub use task::{DesignOptions, NamedPlant};
+pub use uncertainty::{DISC_SIGMAS_95, IdentifiedResponse, loop_plant};
 pub use unmodelled::UnmodelledBound;
