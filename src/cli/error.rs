@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::outcome::Outcome;
 use crate::control::tuning::TuneError;
 use crate::experiment::campaign::CampaignError;
+use crate::experiment::tuning::TuneSourceError;
 use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
@@ -33,6 +34,9 @@ pub enum CliError {
     /// The campaign is refused, or its files cannot be used.
     #[error(transparent)]
     Campaign(CampaignError),
+    /// A measured response cannot be used for a design.
+    #[error(transparent)]
+    TuneSource(#[from] TuneSourceError),
     /// No controller was designed.
     #[error(transparent)]
     Tune(#[from] TuneError),
@@ -75,6 +79,7 @@ impl CliError {
                 error,
                 CampaignError::File { .. } | CampaignError::RestPosition { .. }
             ),
+            CliError::TuneSource(error) => error.is_failure(),
             CliError::Study(error) => {
                 matches!(error, StudyError::File { .. } | StudyError::Shards(_))
             }
@@ -87,7 +92,7 @@ impl CliError {
         match self {
             CliError::Experiment(error) => error.kind(),
             CliError::Usage(_) => ErrorKind::Usage,
-            CliError::Identify(_) | CliError::Table(_) => ErrorKind::Data,
+            CliError::Identify(_) | CliError::Table(_) | CliError::TuneSource(_) => ErrorKind::Data,
             CliError::Study(_) => ErrorKind::Study,
             CliError::Campaign(_) => ErrorKind::Campaign,
             CliError::Tune(_) => ErrorKind::Controller,

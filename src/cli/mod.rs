@@ -43,6 +43,7 @@ mod run_options;
 mod serve;
 mod table;
 mod tune;
+mod tune_measured;
 mod tune_output;
 mod value_range;
 

@@ -11,6 +11,7 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
+use super::tune_measured::{self, SourceOptions};
 use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
@@ -18,6 +19,7 @@ use crate::control::tuning::{
     PlantFigures, Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate,
     loop_curves,
 };
+use crate::experiment::tuning::{IdentifiedFrf, evidence};
 use crate::model::plant::SignalPath;
 use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
 use crate::util::atomic_file::write_atomic;
@@ -32,6 +34,8 @@ use crate::util::units::UM_PER_M;
 pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
+    #[command(flatten)]
+    sources: SourceOptions,
     /// What is best: `disturbance` is the largest slope bandwidth w_s, |S(jw)| <= 0.707 w/w_s for all w <= w_s; `bandwidth`
     /// is the largest frequency up to which |S| <= 0.707; `rms` is the smallest standard deviation of the error
     #[arg(long, value_enum, default_value_t = GoalName::Disturbance)]
@@ -58,8 +62,9 @@ pub(super) struct Args {
     /// Upper limit of |K S|, the response from noise to current, in A/um
     #[arg(long, value_name = "A_PER_UM", value_parser = positive)]
     max_control_sensitivity: Option<f64>,
-    /// Upper limit of the standard deviation of the current in A, under the disturbance and noise of the configuration
-    #[arg(long, value_name = "A", value_parser = positive)]
+    /// Upper limit of the standard deviation of the current in A, under the disturbance and noise of the configuration; needs the
+    /// model
+    #[arg(long, value_name = "A", value_parser = positive, conflicts_with_all = ["frf", "campaign"])]
     max_current_rms: Option<f64>,
     /// Relative tolerance of the mode frequencies, of the first mode and of all others together
     #[arg(long, value_name = "RATIO", default_value = "1%", value_parser = si::<OfRatio>)]
@@ -83,7 +88,7 @@ pub(super) struct Args {
     /// Leave out the convex bound, the largest value of the goal that a linear controller of any order attains
     #[arg(long)]
     without_bound: bool,
-    /// Folder for controller.toml, certificate.json, loop.svg and nyquist.svg
+    /// Folder for controller.toml, certificate.json, report.html, loop.svg and nyquist.svg
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -183,31 +188,72 @@ fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.bench.load(Purpose::Model, &[])?;
-    let plants = plants(args, &config, &[])?;
-    let task = DesignTask::new(&config, &plants, options(args)?)?;
+    let config = args.configuration()?;
     let progress = Progress::new("tune");
     let line = ProgressLine::show(&progress);
-    let design = design(&task, &progress)?;
+    let goal = args.goal.into();
+    let sources = &args.sources;
+    let frfs = sources.identified(&args.bench, goal, &config, &progress)?;
+    let remarks = tune_measured::remarks(&frfs);
+    let task = task(args, &frfs, &config)?;
+    let design = design(&task, &progress).inspect_err(|_| warn(&remarks))?;
+    let evidence = evidence(&frfs, &design.cascade.sections(), &config)?;
     progress.begin("convex bound", 0);
     let bound = match args.without_bound {
         true => None,
         false => bound_of(&task, design.attained),
     };
     drop(line);
-    let opposite = opposite_asymmetry(args, &config, &task, &design)?;
-    let extras = Extras { bound, opposite };
+    let opposite = match frfs.is_empty() {
+        true => opposite_asymmetry(args, &config, &task, &design)?,
+        false => None,
+    };
+    let extras = Extras {
+        bound,
+        opposite,
+        frfs: evidence,
+        remarks,
+    };
     let certificate = Certificate::new(args.bench.profile(), &config, &task, &design, extras);
     write(args, &task, &design, &certificate)?;
     print_result(args.bench.json, &certificate, |certificate| {
         text(certificate, args.explain, &args.out)
     })?;
-    Ok(match design.misses_margin(args.modulus_margin) {
-        None => Outcome::Done,
-        Some(figures) => {
-            warn(&[missed_margin(figures, args.modulus_margin)]);
-            Outcome::Failed
-        }
+    let missed = design.misses_margin(args.modulus_margin);
+    let missed = missed.map(|figures| missed_margin(figures, args.modulus_margin));
+    let mut failures: Vec<String> = missed.into_iter().collect();
+    failures.extend(tune_measured::failures(
+        certificate.frfs(),
+        args.modulus_margin,
+    ));
+    warn(&failures);
+    Ok(match failures.is_empty() {
+        true => Outcome::Done,
+        false => Outcome::Failed,
+    })
+}
+
+impl Args {
+    /// The configuration. With a campaign, --asymmetry chooses its points and is no setting.
+    fn configuration(&self) -> Result<Config, CliError> {
+        let bench = match self.sources.is_measured() {
+            true => BenchOptions {
+                asymmetry: None,
+                operating_point: None,
+                ..self.bench.clone()
+            },
+            false => self.bench.clone(),
+        };
+        bench.load(Purpose::Model, &[])
+    }
+}
+
+/// The task for the measured plants, or for those of the model.
+fn task(args: &Args, frfs: &[IdentifiedFrf], config: &Config) -> Result<DesignTask, CliError> {
+    let options = options(args)?;
+    Ok(match frfs.is_empty() {
+        true => DesignTask::new(config, &plants(args, config, &[])?, options)?,
+        false => DesignTask::measured(&tune_measured::plants(frfs), options)?,
     })
 }
 
@@ -354,17 +400,15 @@ fn write(
     let limits = DesignLimits::of(&task.requirements, design.attained);
     let title = certificate.title();
     let picture = |svg: Result<String, ReportError>| svg.map_err(|e| failed(e.to_string()));
+    let loop_svg = picture(design_loop_svg(&curves, limits, &title))?;
+    let nyquist_svg = picture(design_nyquist_svg(&curves, limits, &title))?;
+    let page = certificate.page(&loop_svg, &nyquist_svg);
     let files = [
         ("controller.toml", certificate.controller_file()),
         ("certificate.json", json + "\n"),
-        (
-            "loop.svg",
-            picture(design_loop_svg(&curves, limits, &title))?,
-        ),
-        (
-            "nyquist.svg",
-            picture(design_nyquist_svg(&curves, limits, &title))?,
-        ),
+        ("report.html", page),
+        ("loop.svg", loop_svg),
+        ("nyquist.svg", nyquist_svg),
     ];
     for (name, text) in files {
         let path = args.out.join(name);

@@ -5,11 +5,15 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::table::{table, wrap};
+use super::tune_measured;
 use crate::config::Config;
 use crate::control::tuning::{
     Binding, ConvexBound, Design, DesignTask, Goal, PlantFigures, Requirements,
 };
 use crate::control::{ControllerFile, SectionSettings};
+use crate::experiment::tuning::FrfEvidence;
+use crate::report::DesignPage;
+use crate::util::units::UM_PER_M;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
@@ -40,6 +44,12 @@ pub(super) struct Extras {
     pub bound: Option<ConvexBound>,
     /// With `--explain`: the controller with the opposite mass asymmetry.
     pub opposite: Option<OppositeAsymmetry>,
+    /// The measured responses, with the margins of the controller around them.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub frfs: Vec<FrfEvidence>,
+    /// What is not certain in the measured responses.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// The figures of a controller with the opposite mass asymmetry.
@@ -81,7 +91,9 @@ impl Certificate {
         let file = ControllerFile {
             title: format!(
                 "{} at {} Hz, order {}",
-                self.profile, self.rate_hz, self.order
+                self.stage_text(),
+                self.rate_hz,
+                self.order
             ),
             section: self.section.clone(),
         };
@@ -94,12 +106,80 @@ impl Certificate {
         )
     }
 
+    /// The measured responses.
+    pub(super) fn frfs(&self) -> &[FrfEvidence] {
+        &self.extras.frfs
+    }
+
+    /// The page of the design.
+    pub(super) fn page(&self, loop_svg: &str, nyquist_svg: &str) -> String {
+        let bound = self.extras.bound.as_ref();
+        let bound = bound.map(|bound| bound_sentence(bound, self.attained));
+        let page = DesignPage {
+            title: &self.title(),
+            facts: &self.facts(),
+            bound: bound.as_deref(),
+            plants: &self.plants,
+            binding: &self.binding,
+            frfs: &self.extras.frfs,
+            remarks: &self.extras.remarks,
+            loop_svg,
+            nyquist_svg,
+            controller: &self.controller_file(),
+        };
+        page.html()
+    }
+
+    /// Goal, limits and settings of the search.
+    fn facts(&self) -> Vec<(String, String)> {
+        let requirements = &self.requirements;
+        let mut facts = vec![
+            ("Goal".into(), self.goal_text()),
+            (
+                "Modulus margin".into(),
+                format!(
+                    "at least {}, attained {:.4}",
+                    requirements.modulus_margin, self.modulus_margin
+                ),
+            ),
+        ];
+        facts.extend(requirements.max_sensitivity.iter().map(|limit| {
+            let (magnitude, omega_rad_s) = (limit.magnitude, limit.omega_rad_s);
+            (
+                "|S|".into(),
+                format!("at most {magnitude} at {omega_rad_s} rad/s"),
+            )
+        }));
+        let control = requirements.max_control_sensitivity_a_per_m;
+        facts.extend(control.map(|limit| {
+            let limit = limit / UM_PER_M;
+            ("|KS|".into(), format!("at most {limit} A/µm"))
+        }));
+        facts.extend([
+            ("Order".into(), self.order.to_string()),
+            ("Loop rate".into(), format!("{} Hz", self.rate_hz)),
+            ("Configuration".into(), self.profile.clone()),
+            ("Seed of the search".into(), self.seed.to_string()),
+            ("Program".into(), format!("bench {}", self.version)),
+        ]);
+        facts
+    }
+
+    /// What the controller is for.
+    fn stage_text(&self) -> String {
+        match self.extras.frfs.len() {
+            0 => self.profile.clone(),
+            1 => "1 measured plant".into(),
+            count => format!("{count} measured plants"),
+        }
+    }
+
     /// Controller, goal and margin in a line.
     pub(super) fn title(&self) -> String {
         format!(
             "controller of order {} for {} at {} Hz: {}, modulus margin {:.4}",
             self.order,
-            self.profile,
+            self.stage_text(),
             self.rate_hz,
             self.goal_text(),
             self.modulus_margin
@@ -134,7 +214,7 @@ pub(super) fn text(certificate: &Certificate, explain: bool, folder: &Path) -> S
     let legend = "margin: modulus margin; slope, bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; rms: error and current under the disturbance and noise of the configuration; gain margin, phase: gain margin and phase margin";
     let folder = folder.display();
     let files = format!(
-        "files: {folder}/controller.toml, certificate.json, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
+        "files: {folder}/controller.toml, certificate.json, report.html, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
     );
     let binding = match explain {
         true => binding_text(&certificate.binding),
@@ -145,12 +225,14 @@ pub(super) fn text(certificate: &Certificate, explain: bool, folder: &Path) -> S
     let bound = bound.map_or(String::new(), |bound| {
         bound_text(bound, certificate.attained)
     });
+    let measured = tune_measured::text(&extras.frfs, &extras.remarks);
     let opposite = extras.opposite.as_ref();
     let opposite = opposite.map_or(String::new(), opposite_text);
     let parts = [
         wrap(&title, 0),
         table(&header, &rows),
         wrap(legend, 0),
+        measured,
         bound,
         binding,
         opposite,
@@ -160,6 +242,10 @@ pub(super) fn text(certificate: &Certificate, explain: bool, folder: &Path) -> S
 }
 
 fn bound_text(bound: &ConvexBound, attained: f64) -> String {
+    wrap(&bound_sentence(bound, attained), 0)
+}
+
+fn bound_sentence(bound: &ConvexBound, attained: f64) -> String {
     let (limit, half) = (bound.limit_rad_s, bound.with_half_rad_s);
     let (plant, functions) = (&bound.plant, bound.functions);
     let percent = 100.0 * attained / limit;
@@ -168,10 +254,9 @@ fn bound_text(bound: &ConvexBound, attained: f64) -> String {
         true => "no linear controller of any order attains more".to_string(),
         false => format!("not converged ({half:.0} rad/s with half of them), the bound is larger"),
     };
-    let text = format!(
+    format!(
         "convex bound: {limit:.0} rad/s at {plant} with {functions} functions, {state}; this design attains {percent:.0} % of it"
-    );
-    wrap(&text, 0)
+    )
 }
 
 /// Ratio of the values with all and with half of the functions below which the bound does not depend on their number.
@@ -202,11 +287,19 @@ fn plant_row(figures: &PlantFigures) -> Vec<String> {
         format!("{:.1}", figures.sensitivity_bandwidth_rad_s),
         format!("{:.4}", figures.sensitivity_at_10_rad_s),
         format!("{:.4}", figures.control_sensitivity_a_per_um),
-        format!("{:.4}", figures.error_rms_m * 1e6),
-        format!("{:.4}", figures.current_rms_a),
+        known(figures.error_rms_m * UM_PER_M),
+        known(figures.current_rms_a),
         optional(figures.gain_margin, 2),
         optional(figures.phase_margin_deg, 1),
     ]
+}
+
+/// A standard deviation, which is not a number if the disturbance is not known.
+fn known(value: f64) -> String {
+    match value.is_finite() {
+        true => format!("{value:.4}"),
+        false => "-".into(),
+    }
 }
 
 fn optional(value: Option<f64>, digits: usize) -> String {

@@ -115,13 +115,14 @@ pub fn analyse_with_progress(
     })
 }
 
-/// The frequency response of a recording, from the commanded current to the measured position: [`Analysis::frf`] alone.
-pub(super) fn measured_response(
+/// The frequency response of a recording, from the commanded current to the measured position, [`Analysis::frf`], and the data for a
+/// fit.
+pub(super) fn measured_data(
     recording: &Recording,
     config: &Config,
-) -> Result<Frf, AnalysisError> {
+) -> Result<(Frf, Vec<FrfDatum>), AnalysisError> {
     let (estimate, _) = estimated(recording, config, &mut |_, _| ControlFlow::Continue(()))?;
-    Ok(estimate.frf)
+    Ok((estimate.frf, estimate.frf_data))
 }
 
 /// Defects of a run that affect its results.

@@ -7,7 +7,7 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use super::analysis::{cautions, measured_response};
+use super::analysis::{cautions, measured_data};
 use super::analysis_error::AnalysisError;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
@@ -16,7 +16,7 @@ use crate::control::ClosedLoop;
 use crate::control::measured::MeasuredLoopError;
 use crate::identify::delay::excess_delay;
 use crate::identify::frf_csv::{self, FrfCsvError};
-use crate::identify::{Estimate, Frf};
+use crate::identify::{Estimate, Frf, FrfDatum};
 use crate::model::plant::LoopPlant;
 use crate::recording::{Recording, RecordingError};
 use crate::util::units::{hz, rad_s};
@@ -144,8 +144,18 @@ impl MeasuredFrf {
     /// When the file cannot be read, or has no response from current to displacement.
     pub fn read(path: &Path) -> Result<MeasuredFrf, FrfError> {
         match path.extension() == Some(OsStr::new("mcap")) {
-            true => MeasuredFrf::of_recording(path),
+            true => MeasuredFrf::of_recording(path).map(|(measured, _)| measured),
             false => MeasuredFrf::of_csv(path),
+        }
+    }
+
+    /// As [`MeasuredFrf::read`], and of a recording the data for a fit.
+    pub(super) fn read_with_data(
+        path: &Path,
+    ) -> Result<(MeasuredFrf, Option<Vec<FrfDatum>>), FrfError> {
+        match path.extension() == Some(OsStr::new("mcap")) {
+            true => MeasuredFrf::of_recording(path).map(|(frf, data)| (frf, Some(data))),
+            false => MeasuredFrf::of_csv(path).map(|frf| (frf, None)),
         }
     }
 
@@ -161,17 +171,19 @@ impl MeasuredFrf {
         })
     }
 
-    fn of_recording(path: &Path) -> Result<MeasuredFrf, FrfError> {
+    fn of_recording(path: &Path) -> Result<(MeasuredFrf, Vec<FrfDatum>), FrfError> {
         let recording = Recording::open(path)?;
         let plan = Plan::of(&recording)?;
         if !matches!(plan.kind, RunKind::Chirp | RunKind::Control) {
             return Err(FrfError::Kind(path.display().to_string()));
         }
-        Ok(MeasuredFrf {
-            frf: measured_response(&recording, &plan.config)?,
+        let (frf, data) = measured_data(&recording, &plan.config)?;
+        let measured = MeasuredFrf {
+            frf,
             recorded: Some(Box::new(plan.config)),
             cautions: cautions(&recording),
-        })
+        };
+        Ok((measured, data))
     }
 
     /// Settings of the recorded run that differ from a configuration and affect the plant, as warnings.
@@ -199,17 +211,24 @@ pub(super) fn check_frf(
     model: &ClosedLoop,
     config: &Config,
 ) -> Result<(), FrfError> {
-    let (_, last_hz) = measured.band_hz();
-    let rate_hz = config.servo.rate_hz;
-    if last_hz >= 0.5 * rate_hz {
-        return Err(FrfError::AboveNyquist { last_hz, rate_hz });
-    }
+    check_rate(measured, config)?;
     let mean_age = LoopPlant::with_mean_age(config, model.modes());
     check_gain(&measured.frf, &mean_age)?;
     match &measured.recorded {
-        Some(recorded) => check_path(recorded, config),
+        Some(_) => Ok(()),
         None => check_delay(&measured.frf, model, &mean_age),
     }
+}
+
+/// Refuses an FRF beyond half the loop rate, and a recording with another signal path than that of `config`.
+pub(super) fn check_rate(measured: &MeasuredFrf, config: &Config) -> Result<(), FrfError> {
+    let (_, last_hz) = measured.band_hz();
+    let rate_hz = config.servo.rate_hz;
+    let recorded = measured.recorded.as_deref();
+    if last_hz >= 0.5 * rate_hz {
+        return Err(FrfError::AboveNyquist { last_hz, rate_hz });
+    }
+    recorded.map_or(Ok(()), |recorded| check_path(recorded, config))
 }
 
 /// A setting and its value in a configuration.
@@ -269,7 +288,7 @@ fn check_delay(frf: &Frf, model: &ClosedLoop, plant: &LoopPlant) -> Result<(), F
 }
 
 /// An excess delay that is minus the delay of the model shows that the delay was removed from the phases.
-fn judge_excess(excess: Estimate, plant: &LoopPlant) -> Result<(), FrfError> {
+pub(super) fn judge_excess(excess: Estimate, plant: &LoopPlant) -> Result<(), FrfError> {
     let (delay_s, period_s) = (plant.delay_s(), plant.period_s());
     let within = |limit_s: f64, difference_s: f64| {
         difference_s.abs() <= limit_s + CERTAIN_SIGMAS * excess.sigma

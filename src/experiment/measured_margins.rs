@@ -11,6 +11,7 @@ use crate::config::Config;
 use crate::control::ClosedLoop;
 use crate::control::measured::{
     LoopPeaks, MeasuredLoop, MeasuredMargins, NyquistCount, OutsideBand, Stability, check_gaps,
+    least_damping_ratio,
 };
 use crate::identify::{Frf, FrfPoint};
 use crate::model::plant::SignalPath;
@@ -65,13 +66,26 @@ pub fn measured_margins(
     config: &Config,
 ) -> Result<MeasuredLoopMargins, FrfError> {
     check_frf(measured, model, config)?;
+    let points = points(&measured.frf, &SignalPath::from(config));
+    check_gaps(&points, least_damping_ratio(model))?;
+    margins_around(measured, model, config)
+}
+
+/// The margins around a response that belongs to `config` and has no gaps; `model` is used outside of the measured band.
+///
+/// # Errors
+/// When the response does not contain the crossover or the peak of |S|.
+pub(super) fn margins_around(
+    measured: &MeasuredFrf,
+    model: &ClosedLoop,
+    config: &Config,
+) -> Result<MeasuredLoopMargins, FrfError> {
     let frf = &measured.frf;
     let law = |w: f64| model.law_response(w);
     let (first_hz, last_hz) = measured.band_hz();
     let further = model.frequencies(rad_s(first_hz), rad_s(last_hz));
     let points = points(frf, &SignalPath::from(config));
     let measured_loop = MeasuredLoop::new(&points, &law, &further)?;
-    check_gaps(&points, model)?;
     let margins = MeasuredMargins::of(&measured_loop);
     let outside_band = OutsideBand::of(&measured_loop, model);
     outside_band.check(&measured_loop, &margins)?;

@@ -66,6 +66,7 @@ mod step_response;
 mod swept_reference;
 mod tracking;
 mod tune_check;
+pub mod tuning;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 pub use analysis::{Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress};

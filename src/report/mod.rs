@@ -13,6 +13,7 @@ pub mod bode;
 mod campaign;
 mod chart;
 mod coherence;
+mod design_page;
 mod distortion;
 pub mod ellipse;
 mod error;
@@ -36,6 +37,7 @@ pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };
 pub use coherence::coherence_svg;
+pub use design_page::DesignPage;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;

@@ -8,6 +8,7 @@ mod frf_bias_and_coverage;
 mod frf_noise;
 mod held_out_designs;
 mod joint_estimate;
+mod measured_designs;
 mod measured_margins;
 mod modes;
 mod residual_monitor;

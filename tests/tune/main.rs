@@ -3,4 +3,7 @@
 mod closed_form;
 mod command;
 mod delivered;
+mod measured;
+mod measured_command;
+mod measured_refused;
 mod stage;

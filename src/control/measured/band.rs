@@ -41,18 +41,25 @@ pub struct OutsideBand {
     pub above: RangeBound,
 }
 
-/// Refuses gaps that may hide a resonance: wider than the resonance with the smallest damping ratio of the model, and wider than the
+/// The smallest damping ratio of the modes of a model.
+pub fn least_damping_ratio(model: &ClosedLoop) -> f64 {
+    let modes = model.modes().iter().filter(|mode| mode.omega_rad_s > 0.0);
+    modes.map(|mode| mode.damping_ratio).fold(0.5, f64::min)
+}
+
+/// Refuses gaps that may hide a resonance: wider than the resonance with the smallest damping ratio of the stage, and wider than the
 /// resolution of the measurement.
 ///
 /// # Errors
 /// [`MeasuredLoopError::Gap`].
-pub fn check_gaps(points: &[ResponsePoint], model: &ClosedLoop) -> Result<(), MeasuredLoopError> {
-    let modes = model.modes().iter().filter(|mode| mode.omega_rad_s > 0.0);
-    let damping = modes.map(|mode| mode.damping_ratio).fold(0.5, f64::min);
+pub fn check_gaps(
+    points: &[ResponsePoint],
+    least_damping_ratio: f64,
+) -> Result<(), MeasuredLoopError> {
     for pair in points.windows(2) {
         let [from, to] = [pair[0].omega_rad_s, pair[1].omega_rad_s];
         let resolution = pair[0].resolution_rad_s.max(pair[1].resolution_rad_s);
-        let width = 2.0 * damping * from;
+        let width = 2.0 * least_damping_ratio * from;
         if to - from > (GAP_RESOLUTIONS * resolution).max(width) {
             return Err(MeasuredLoopError::Gap {
                 from_hz: hz(from),

@@ -60,6 +60,28 @@ impl<'a> MeasuredLoop<'a> {
         self.plant.at(omega_rad_s)
     }
 
+    /// Standard deviation of the real and of the imaginary part of P.
+    pub fn plant_sigma(&self, omega_rad_s: f64) -> f64 {
+        (0.5 * self.plant.variance(omega_rad_s)).sqrt()
+    }
+
+    /// The smallest |1 + L| - `sigmas` sigma |C| over the grid, with sigma the standard deviation of one component of P, and its
+    /// frequency in rad/s. An error that is not a number makes the distance minus infinity.
+    pub fn least_distance(&self, sigmas: f64) -> (f64, f64) {
+        let mut least = (f64::INFINITY, self.band_rad_s().0);
+        for w in self.grid_rad_s.iter().copied() {
+            let radius = sigmas * self.plant_sigma(w) * self.law(w).norm();
+            let distance = (self.loop_gain(w) + 1.0).norm() - radius;
+            if distance.is_nan() {
+                return (f64::NEG_INFINITY, w);
+            }
+            if distance < least.0 {
+                least = (distance, w);
+            }
+        }
+        least
+    }
+
     /// C.
     pub(super) fn law(&self, omega_rad_s: f64) -> Complex<f64> {
         (self.law)(omega_rad_s)

@@ -32,7 +32,7 @@ mod point;
 mod quadratic;
 mod smoothing;
 
-pub use band::{OutsideBand, RangeBound, check_gaps};
+pub use band::{OutsideBand, RangeBound, check_gaps, least_damping_ratio};
 pub use count::{NyquistCount, Stability};
 pub use error::MeasuredLoopError;
 pub use lower::LowerMargin;

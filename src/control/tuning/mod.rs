@@ -2,6 +2,7 @@
 //!
 //! ```text
 //!  operating points, tolerances -> plant ---------------+
+//!  measured responses -> measured_plant, uncertainty ----+
 //!  modes that the model lacks ---> unmodelled (bound U) -+-> sampled -> requirement, variance (slacks and their derivatives)
 //!  lines of the floor, noise ----> disturbance ----------+          |
 //!                                                                    v
@@ -25,6 +26,7 @@ mod disturbance;
 mod error;
 mod figures;
 mod margin_disc;
+mod measured_plant;
 mod nyquist;
 mod plant;
 mod requirement;
@@ -32,6 +34,7 @@ mod sampled;
 mod search;
 mod subproblem;
 mod task;
+mod uncertainty;
 mod unmodelled;
 mod variance;
 
@@ -44,8 +47,10 @@ pub use disturbance::Disturbance;
 pub use error::{Conflict, DiscError, TuneError};
 pub use figures::PlantFigures;
 pub use margin_disc::MarginDisc;
+pub use measured_plant::MeasuredPlant;
 pub use plant::{DesignPlant, Tolerances};
 pub use requirement::{Goal, Kind, Requirements, SensitivityLimit};
 pub use search::Effort;
 pub use task::{DesignOptions, NamedPlant};
+pub use uncertainty::{DISC_SIGMAS_95, IdentifiedResponse, loop_plant};
 pub use unmodelled::UnmodelledBound;

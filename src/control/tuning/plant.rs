@@ -1,5 +1,6 @@
 //! The plants for which one controller is designed: operating points, each with tolerances of its modes.
 
+use super::uncertainty::Uncertainty;
 use crate::model::plant::{LoopPlant, Mode, SignalPath};
 
 /// A mode whose residue is below this part of the largest one is neither varied nor resolved.
@@ -27,6 +28,8 @@ pub struct DesignPlant {
     pub modes: Vec<Mode>,
     /// Whether the plant is an operating point itself, and not a variation.
     pub is_nominal: bool,
+    /// Largest distance of the true response from that of `plant`, of a plant that was measured.
+    pub uncertainty: Uncertainty,
 }
 
 impl DesignPlant {
@@ -37,6 +40,7 @@ impl DesignPlant {
             plant: LoopPlant::of(path, &modes),
             modes,
             is_nominal: true,
+            uncertainty: Uncertainty::default(),
         }
     }
 
@@ -69,7 +73,8 @@ impl DesignPlant {
     }
 }
 
-fn variations(modes: &[Mode], tolerances: &Tolerances) -> Vec<(String, Vec<Mode>)> {
+/// The modes and their variations, each with a text that names the change; the first one is empty.
+pub(super) fn variations(modes: &[Mode], tolerances: &Tolerances) -> Vec<(String, Vec<Mode>)> {
     let (ratio, factor) = (tolerances.frequency_ratio, tolerances.damping_factor);
     let percent = 100.0 * ratio;
     let mut variations = Vec::new();

@@ -20,7 +20,7 @@ pub struct SampledPlant {
     pub warped: Vec<Complex<f64>>,
     /// P(exp(j w T)) in m/A.
     pub response: Vec<Complex<f64>>,
-    /// Largest magnitude in m/A of what the plant lacks.
+    /// Largest magnitude in m/A of what the plant lacks: modes of unknown phase, and its uncertainty.
     pub unmodelled: Vec<f64>,
     /// Variance in m^2 of the disturbance and of the noise around each frequency; empty if the goal does not need them.
     pub variances: Vec<Variances>,
@@ -66,7 +66,9 @@ impl SampledPlant {
             is_nominal: plant.is_nominal,
             warped: at.clone().map(|w| warped(*w, period_s)).collect(),
             response: at.clone().map(|w| plant.plant.response(*w)).collect(),
-            unmodelled: at.map(|w| bound.at(*w)).collect(),
+            unmodelled: at
+                .map(|w| bound.at(*w) + plant.uncertainty.at(*w))
+                .collect(),
             variances: Vec::new(),
             omega_rad_s,
         }

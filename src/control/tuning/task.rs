@@ -4,6 +4,7 @@ use super::cascade::ParameterLimits;
 use super::design::DesignTask;
 use super::disturbance::Disturbance;
 use super::error::TuneError;
+use super::measured_plant::MeasuredPlant;
 use super::plant::{DesignPlant, Tolerances};
 use super::requirement::Requirements;
 use super::search::Effort;
@@ -79,6 +80,37 @@ impl DesignTask {
             bound: UnmodelledBound::of(&path, unmodelled, options.unmodelled_ratio),
             disturbance: disturbance(config),
             limits: limits(&path, &first.modes),
+            requirements: options.requirements,
+            order: options.order,
+            effort: options.effort,
+            seed: options.seed,
+        })
+    }
+}
+
+impl DesignTask {
+    /// The task for plants that were measured: without a model. What the fitted modes lack is in the uncertainty of each plant, and
+    /// the modes that count with any phase are in the bound. The disturbance of the position is not known.
+    ///
+    /// # Errors
+    /// There is no plant.
+    pub fn measured(
+        plants: &[MeasuredPlant],
+        options: DesignOptions,
+    ) -> Result<DesignTask, TuneError> {
+        let first = plants.first().ok_or(TuneError::NoPlant)?;
+        let varied = plants
+            .iter()
+            .flat_map(|plant| plant.with_tolerances(&options.tolerances));
+        let bounds: Vec<UnmodelledBound> = plants
+            .iter()
+            .map(|plant| plant.minor_bound(options.unmodelled_ratio))
+            .collect();
+        Ok(DesignTask {
+            plants: varied.collect(),
+            bound: UnmodelledBound::largest(&bounds),
+            disturbance: Disturbance::default(),
+            limits: limits(&first.response.path, &first.modes),
             requirements: options.requirements,
             order: options.order,
             effort: options.effort,

@@ -36,6 +36,14 @@ pub enum CampaignError {
         /// What was found.
         why: String,
     },
+    /// The folder gives no plants for a design.
+    #[error("{folder} {why}")]
+    Unusable {
+        /// The folder.
+        folder: String,
+        /// What is wrong with it, with the remedy.
+        why: String,
+    },
     /// A zero-current run without a rest position.
     #[error(
         "{recording} does not contain a rest position: {why}; check the probe with `bench doctor`"

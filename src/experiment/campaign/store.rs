@@ -188,7 +188,8 @@ impl Store {
     }
 }
 
-fn name(point: GridPoint) -> String {
+/// The name of the files of a point.
+pub(super) fn name(point: GridPoint) -> String {
     format!("{:04}-{:04}", point.row, point.column)
 }
 
@@ -230,7 +231,8 @@ fn shortened(mut differences: Vec<String>) -> Vec<String> {
     differences
 }
 
-fn check_format(stored: &str) -> Result<(), String> {
+/// Refuses a text that is not the settings of a campaign.
+pub(super) fn check_format(stored: &str) -> Result<(), String> {
     let value: Value = serde_json::from_str(stored).map_err(|e| format!("it is not JSON: {e}"))?;
     match value.get("format").and_then(Value::as_str) {
         Some(FORMAT) => Ok(()),
