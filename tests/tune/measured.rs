@@ -24,6 +24,7 @@ pub fn options(order: usize) -> DesignOptions {
         tolerances: Tolerances {
             frequency_ratio: 0.01,
             damping_factor: 0.7,
+            gain_ratio: 0.0,
         },
         unmodelled_ratio: 0.03,
         order,
