@@ -36,7 +36,7 @@ pub use search::ModelOrder;
 use crate::identify::FrfDatum;
 use crate::identify::mean::mean_around;
 pub use crate::identify::{Estimate, SIGMAS_95};
-use merge::merged;
+pub(crate) use merge::merged;
 use prune::pruned;
 use refine::refine;
 use solution::{Problem, Solution};
