@@ -18,6 +18,7 @@ mod merge;
 mod modal_fit;
 mod normal_equations;
 mod parameters;
+mod peaks;
 mod prune;
 mod refine;
 mod search;

@@ -1,5 +1,8 @@
 //! The number of modes: modes are added one at a time, each where the residual exceeds the noise most, as long as the decrease
 //! of chi^2 is significant.
+//!
+//! The first pass is made from two starts: from no mode, and from one mode at each peak of the response. With the first, a delay of
+//! the wrong half turn can take the place of a mode, and modes added later do not lead back. The better result is used.
 
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
@@ -7,6 +10,7 @@ use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
 use super::error::{FitError, Progress, report};
 use super::merge::merged;
 use super::parameters::ModalParameters;
+use super::peaks::peak_starts;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
 use crate::identify::FrfDatum;
@@ -91,7 +95,9 @@ pub(super) fn orders(
         done: 0.0,
         progress,
     };
-    for pass in &PASSES {
+    let [coarse, finer @ ..] = &PASSES;
+    search.run_from_best_start(coarse, problem)?;
+    for pass in finer {
         search.run(pass, problem)?;
     }
     Ok(search.orders)
@@ -109,12 +115,45 @@ struct Search<'a, 'p> {
 }
 
 impl Search<'_, '_> {
+    /// A pass from each start: the result with the fewest and most significant modes.
+    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &pass.data(problem.data, &self.parameters);
+        let starts = peak_starts(Problem { data, ..problem });
+        let by_one = self.cost_of_run(pass, problem)?;
+        let first = (by_one, self.parameters.clone(), self.orders.clone());
+        let mut best = first;
+        for start in starts {
+            self.parameters = start;
+            self.orders.clear();
+            self.done = 0.0;
+            let cost = self.cost_of_run(pass, problem)?;
+            if cost + problem.significant_decrease() < best.0 {
+                best = (cost, self.parameters.clone(), self.orders.clone());
+            }
+        }
+        (_, self.parameters, self.orders) = best;
+        Ok(())
+    }
+
+    /// Runs a pass: chi^2 of its result, and the smallest significant decrease for each mode.
+    fn cost_of_run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
+        let data = &pass.data(problem.data, &ModalParameters::default());
+        self.run(pass, problem)?;
+        let problem = Problem { data, ..problem };
+        let chi2 = Solution::new(problem, self.parameters.clone()).chi2;
+        let modes = self.parameters.modes.len() as f64;
+        Ok(chi2 + modes * problem.significant_decrease())
+    }
+
     /// Adds modes, with the errors of a pass, as long as they are significant.
     fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let problem = Problem { data, ..problem };
         let start = std::mem::take(&mut self.parameters);
         let mut solution = refine(problem, start, pass.tolerance);
+        if !solution.parameters.modes.is_empty() {
+            self.orders.push(order(problem, &solution, f64::INFINITY));
+        }
         let first_misfit = problem.misfit(solution.chi2);
         while solution.parameters.modes.len() < MAX_MODES {
             self.report(
