@@ -58,7 +58,7 @@ pub(super) struct ExternalOptions {
     /// Number of periods to skip at the beginning, while the plant settles
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
-    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: all frequencies up to half of the sampling rate]
+    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: the band that the input excites]
     #[arg(
         long,
         value_name = "LOW:HIGH",
@@ -131,15 +131,15 @@ impl ExternalOptions {
         }
     }
 
-    fn band_hz(&self, rate_hz: f64) -> Result<(f64, f64), CliError> {
+    fn band_hz(&self) -> Result<Option<(f64, f64)>, CliError> {
         let Some(text) = &self.band else {
-            return Ok((0.0, rate_hz / 2.0));
+            return Ok(None);
         };
         let limits = text.split_once(':').and_then(|(low, high)| {
             let [low, high]: [Frequency; 2] = [low.parse().ok()?, high.parse().ok()?];
             Some((low.si(), high.si()))
         });
-        limits.ok_or_else(|| {
+        limits.map(Some).ok_or_else(|| {
             CliError::Usage(format!(
                 "--band {text} is not a band; give two frequencies, as in 11Hz:250Hz"
             ))
@@ -215,7 +215,7 @@ pub(super) fn run(
     let columns = options.columns(path)?;
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
-    let band_hz = options.band_hz(signals.rate_hz)?;
+    let band_hz = options.band_hz()?;
     let repetition = options.repetition(signals.rate_hz)?;
     let analysis = analyse_external(&signals, band_hz, repetition);
     let analysis = analysis.map_err(|error| options.refused(error))?;
@@ -232,7 +232,7 @@ pub(super) fn run(
         beside: &in_folder(out, path)?,
         existing: ExistingFile::Keep,
     };
-    let report = Report::write(&record, path, results, band_hz)?;
+    let report = Report::write(&record, path, results)?;
     print_result(json, &report, Report::text)?;
     Ok(Outcome::Done)
 }
@@ -243,7 +243,6 @@ impl Report {
         record: &ExternalRecord,
         path: &Path,
         results: ResultFiles<'_>,
-        band_hz: (f64, f64),
     ) -> Result<Report, CliError> {
         let (analysis, input, output) = (record.analysis, record.input, record.output);
         let magnitude = frf_csv::external_magnitude(input, output);
@@ -258,7 +257,7 @@ impl Report {
             lost_records: 0,
             truncated: false,
             rate_hz: record.rate_hz,
-            band_hz,
+            band_hz: analysis.band_hz,
             periods: analysis.periods,
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
             pages: PageFiles::write(&record.report(), results)?,

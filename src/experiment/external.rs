@@ -6,7 +6,7 @@ use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
-    EstimatorSettings, Frf, FrfDatum, Signals, frf_data, local, with_distortion,
+    EstimatorSettings, Frf, FrfDatum, Signals, excited_band_hz, frf_data, local, with_distortion,
 };
 
 /// Half of the frequencies must have at least this coherence.
@@ -33,22 +33,26 @@ pub struct ExternalAnalysis {
     pub fit: Result<ModalFit, FitError>,
     /// The verdict on CNMP zeros.
     pub verdict: Verdict,
+    /// The analysed band in hertz.
+    pub band_hz: (f64, f64),
     /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
     pub judged_up_to_rad_s: f64,
     /// Number of averaged periods of a periodic record.
     pub periods: Option<usize>,
 }
 
-/// Analyses input and output between two frequencies. With a repetition, periods are averaged; without one, the record must
-/// begin and end at rest.
+/// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
+/// without one, the record must begin and end at rest.
 ///
 /// # Errors
 /// When the signals allow no estimate, or the zeros cannot be computed.
 pub fn analyse_external(
     signals: &Signals,
-    band_hz: (f64, f64),
+    band_hz: Option<(f64, f64)>,
     repetition: Option<Repetition>,
 ) -> Result<ExternalAnalysis, AnalysisError> {
+    signals.check()?;
+    let band_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, data, periods) = response(signals, band_hz, repetition)?;
     let fit = match repetition {
         Some(_) => fit_of_periods(&data),
@@ -63,9 +67,19 @@ pub fn analyse_external(
         frf,
         fit,
         verdict,
+        band_hz,
         judged_up_to_rad_s,
         periods,
     })
+}
+
+/// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
+fn default_band_hz(signals: &Signals, repetition: Option<Repetition>) -> (f64, f64) {
+    let all = (0.0, signals.rate_hz / 2.0);
+    match repetition {
+        Some(_) => all,
+        None => excited_band_hz(signals).unwrap_or(all),
+    }
 }
 
 fn response(
@@ -120,7 +134,7 @@ fn implausible(
     fit: &Result<ModalFit, FitError>,
 ) -> Option<String> {
     incoherent(frf)
-        .or_else(|| growing(frf))
+        .or_else(|| growing(frf, fit))
         .or_else(|| inverse_fits(data, fit))
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
@@ -156,20 +170,35 @@ fn incoherent(frf: &Frf) -> Option<String> {
     })
 }
 
-/// A displacement falls with frequency above its modes; a force as output would grow.
-fn growing(frf: &Frf) -> Option<String> {
+/// A displacement falls with frequency above its modes; a force as output would grow. Frequencies at which the output is noise do not
+/// count. Below a mode at the end of the band a displacement grows as well.
+fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
     let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
     let from_hz = last_hz * (first_hz / last_hz).powf(SLOPE_PART);
-    let points = frf.frequency_hz.iter().zip(&frf.response);
-    let end = points
-        .filter(|(f, _)| **f >= from_hz)
-        .map(|(f, h)| (f.ln(), h.norm().ln()));
+    if ends_with_a_mode(fit, from_hz, *last_hz) {
+        return None;
+    }
+    let significant = (0..frf.len()).filter(|k| frf.coherence[*k] >= MIN_COHERENCE);
+    let end = significant
+        .filter(|k| frf.frequency_hz[*k] >= from_hz)
+        .map(|k| (frf.frequency_hz[k].ln(), frf.response[k].norm().ln()));
     let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
     (slope > MAX_SLOPE).then(|| {
         format!(
             "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
         )
     })
+}
+
+/// Whether the highest mode of a fit that describes the data lies between two frequencies. (The inverse of a response needs a mode
+/// beyond the band.)
+fn ends_with_a_mode(fit: &Result<ModalFit, FitError>, from_hz: f64, to_hz: f64) -> bool {
+    let Some(fit) = fit.as_ref().ok().filter(|fit| describes(fit)) else {
+        return false;
+    };
+    let modes = fit.modes();
+    let last_hz = modes.last().map_or(0.0, |mode| mode.frequency_hz().value);
+    (from_hz..=to_hz).contains(&last_hz)
 }
 
 /// The slope of the least-squares line.
