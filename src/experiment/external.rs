@@ -6,7 +6,8 @@ use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
-    EstimatorSettings, Frf, FrfDatum, Signals, excited_band_hz, frf_data, local, with_distortion,
+    EstimatorSettings, Frf, FrfDatum, Signals, excited_band_hz, frf_data, local, record_check,
+    with_distortion,
 };
 
 /// Half of the frequencies must have at least this coherence.
@@ -59,7 +60,9 @@ pub fn analyse_external(
         None => modal::fit(&data, &CHAIN),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let verdict = match implausible(signals.rate_hz, &frf, &data, &fit) {
+    let why = defective(signals, repetition.is_some())
+        .or_else(|| implausible(signals.rate_hz, &frf, &data, &fit));
+    let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => judge(&fit, &data, &CHAIN, judged_up_to_rad_s, None)?,
     };
@@ -94,6 +97,13 @@ fn response(
     let settings = EstimatorSettings::default();
     let frf = local::estimate(signals, band_hz, &settings)?;
     Ok((frf, frf_data(signals, band_hz, &settings)?, None))
+}
+
+/// The defects of the record, which modes would be fitted to.
+fn defective(signals: &Signals, is_periodic: bool) -> Option<String> {
+    let defects = record_check::defects(signals, is_periodic);
+    let texts: Vec<String> = defects.iter().map(ToString::to_string).collect();
+    (!texts.is_empty()).then(|| texts.join("; "))
 }
 
 /// Whether the fit describes the data.

@@ -12,6 +12,7 @@
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
 //! | the estimator that the configuration selects | [`response`] |
 //! | the response while a run goes on | [`GrowingResponse`] |
+//! | defects of an external record | [`record_check`] |
 //! | the band that an input excites | [`excited_band_hz`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
 //! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
@@ -37,6 +38,7 @@ mod local_model;
 mod mean;
 pub mod modal;
 mod multisine_lines;
+pub mod record_check;
 pub mod repeated;
 mod signals;
 mod timing;
