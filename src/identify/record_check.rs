@@ -61,17 +61,43 @@ const MOVING_SIGMAS: f64 = 8.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Defect {
     /// A few samples are far off.
-    Spike { time_s: f64, height: f64 },
+    Spike {
+        /// Time of the first one.
+        time_s: f64,
+        /// By how much.
+        height: f64,
+    },
     /// The output jumps.
-    Step { time_s: f64, height: f64 },
+    Step {
+        /// Time of the first sample after the jump.
+        time_s: f64,
+        /// By how much.
+        height: f64,
+    },
     /// The output keeps its value for some samples.
-    Repeated { time_s: f64, samples: usize },
+    Repeated {
+        /// Time of the first one.
+        time_s: f64,
+        /// Number of samples.
+        samples: usize,
+    },
     /// The output stays at its largest or smallest value.
-    Clipped { time_s: f64, value: f64 },
+    Clipped {
+        /// Time of the first sample at that value.
+        time_s: f64,
+        /// The value.
+        value: f64,
+    },
     /// The output moves at the beginning.
-    MovingAtStart { ratio: f64 },
+    MovingAtStart {
+        /// Its velocity over the RMS velocity of the record.
+        ratio: f64,
+    },
     /// The output moves at the end.
-    MovingAtEnd { ratio: f64 },
+    MovingAtEnd {
+        /// Its velocity over the RMS velocity of the record.
+        ratio: f64,
+    },
 }
 
 impl fmt::Display for Defect {

@@ -59,6 +59,34 @@ fn verdict_without_a_band_is_right_or_undecided() {
     assert!(undecided <= 1, "{undecided} of {COUNT} are undecided");
 }
 
+/// The residues of the modes with their standard deviations.
+fn residues(answer: &Value) -> Vec<(f64, f64)> {
+    let modes = answer["modes"].as_array().expect("modes").iter();
+    modes
+        .map(|mode| (number(&mode["residue"]), number(&mode["residue_sigma"])))
+        .collect()
+}
+
+#[test]
+fn residues_are_those_of_the_stage_if_hold_and_lag_of_the_input_are_given() {
+    let bench = Bench::new();
+    if stages(&bench).is_none() {
+        return;
+    }
+    // The current loop of the records has 1 kHz.
+    let path = format!("--hold zoh --input-lag {}s", 1.0 / (TAU * 1000.0));
+    let with = bench.json(&format!("identify {} {COLUMNS} {path} --out with", file(2)));
+    let without = identify(&bench, &file(2));
+    assert_eq!(number(&with["input_lag_s"]), 1.0 / (TAU * 1000.0));
+    assert_eq!(number(&with["hold_s"]), 1.0 / number(&with["rate_hz"]));
+    assert_eq!(number(&without["hold_s"]), 0.0);
+    // The delay that remains is one period; without the options half a period and the lag are added.
+    let delay = |answer: &Value| number(&answer["fit_delay_s"]) * number(&answer["rate_hz"]);
+    assert!((delay(&with) - 1.0).abs() < 0.02, "{}", delay(&with));
+    assert!(delay(&without) > 1.5, "{}", delay(&without));
+    assert_eq!(residues(&with).len(), residues(&without).len());
+}
+
 /// A record as lines of cells.
 fn rows(text: &str) -> Vec<Vec<String>> {
     let cells = |line: &str| line.split(',').map(String::from).collect();

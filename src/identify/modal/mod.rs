@@ -28,7 +28,7 @@ use core::ops::ControlFlow;
 
 use error::report;
 pub use error::{FitError, Progress};
-pub use measurement_chain::MeasurementChain;
+pub use measurement_chain::{InputPath, MeasurementChain};
 pub use modal_fit::{FittedMode, ModalFit, UncertainPole};
 pub use parameters::ModalParameters;
 pub(crate) use parameters::Parameter;

@@ -18,11 +18,14 @@ use crate::identify::FrfDatum;
 /// Largest number of modes.
 const MAX_MODES: usize = 24;
 
+/// No data are left out below this number of data, as of the lines of a multisine.
+const MIN_DATA: usize = 400;
+
 /// One pass of the search.
 struct Pass {
     /// Error as a ratio of H that is added to the noise.
     relative_error: f64,
-    /// Every n-th datum is used. A mode of 0.2 % damping spans eight data of 0.05 % width.
+    /// Every n-th datum is used, if there are many. A mode of 0.2 % damping spans eight data of 0.05 % width.
     every: usize,
     /// See [`refine`].
     tolerance: f64,
@@ -196,8 +199,9 @@ impl Pass {
         } else {
             merged(data, known)
         };
+        let every = self.every.min(data.len() / MIN_DATA).max(1);
         data.iter()
-            .step_by(self.every)
+            .step_by(every)
             .map(|datum| self.with_error(datum))
             .collect()
     }
