@@ -10,7 +10,7 @@
 //!
 //! If the number of CNMP pairs stays the same, the sign has no effect on the verdict.
 
-use super::{VerdictInput, has_certain_sign};
+use super::input::{VerdictInput, has_certain_sign};
 use crate::identify::modal::{FittedMode, ModalParameters, Parameter};
 use crate::model::plant::PlantError;
 use crate::model::zeros::{ModalSum, ZeroKind};

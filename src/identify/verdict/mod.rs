@@ -17,11 +17,13 @@
 //! without response) makes the verdict undecided.
 
 mod decisive;
+mod input;
 mod phase_check;
 mod phase_drop;
 mod sign_groups;
 mod zeros;
 
+pub use input::VerdictInput;
 pub use phase_drop::PhaseDrop;
 pub use zeros::{UncertainZero, zeros};
 
@@ -31,7 +33,7 @@ use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::identify::FrfDatum;
-use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit};
+use crate::identify::modal::FittedMode;
 use crate::model::plant::{PlantError, Sign};
 use crate::model::zeros::ZeroKind;
 
@@ -48,8 +50,6 @@ const FIT_ACCURACY: f64 = 1e-4;
 pub(crate) const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
-/// A residue with a larger probability of the opposite sign has no certain sign.
-const WRONG_SIGN_PROBABILITY: f64 = 1e-3;
 
 const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
@@ -108,29 +108,6 @@ impl Verdict {
             self.why = format!("{}; {caution}", self.why);
         }
         self
-    }
-}
-
-/// Input of a verdict.
-#[derive(Clone, Copy, Debug)]
-pub struct VerdictInput<'a> {
-    /// The fitted modes.
-    pub fit: &'a ModalFit,
-    /// The chain through which the mechanics were observed.
-    pub chain: &'a MeasurementChain,
-    /// The fitted data, frequencies rising.
-    pub frf_data: &'a [FrfDatum],
-    /// The verdict covers zeros and modes up to here, in rad/s.
-    pub up_to_rad_s: f64,
-    /// Number of modes of the model in that band with a residue between its actuator and its probe.
-    pub expected_modes: Option<usize>,
-}
-
-impl VerdictInput<'_> {
-    /// Whether the verdict covers an angular frequency: from the first datum to the upper limit.
-    fn covers(&self, omega_rad_s: f64) -> bool {
-        let low_rad_s = self.frf_data.first().map_or(0.0, FrfDatum::omega_rad_s);
-        omega_rad_s <= self.up_to_rad_s && omega_rad_s >= low_rad_s
     }
 }
 
@@ -202,14 +179,6 @@ fn uncertain_sign_reason(mode: &FittedMode) -> String {
         "the sign of the residue at {:.2} Hz is uncertain, and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
         mode.frequency_hz().value
     )
-}
-
-fn has_certain_sign(mode: &FittedMode) -> bool {
-    is_certain_sign(mode.sign_error_probability())
-}
-
-fn is_certain_sign(error_probability: f64) -> bool {
-    error_probability <= WRONG_SIGN_PROBABILITY
 }
 
 /// A complex zero that may lie on either side of the imaginary axis. (A real zero is no CNMP zero on either side.)

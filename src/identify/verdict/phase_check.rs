@@ -3,9 +3,9 @@
 
 use nalgebra::Complex;
 
+use super::input::{VerdictInput, has_certain_sign};
 use super::phase_drop::{PhaseCurve, PhaseDrop, Roots, phase_drop};
 use super::zeros::UncertainZero;
-use super::{VerdictInput, has_certain_sign};
 use crate::identify::FrfDatum;
 use crate::identify::modal::{FittedMode, merged};
 use crate::model::plant::PlantError;

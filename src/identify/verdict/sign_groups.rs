@@ -3,7 +3,7 @@
 //! Of modes closer than their widths only the sum of the residues is determined: neighbours whose signs are all uncertain are one
 //! group, with the sum of their residues and the variance of that sum.
 
-use super::{VerdictInput, has_certain_sign, is_certain_sign};
+use super::input::{VerdictInput, has_certain_sign, is_certain_sign};
 use crate::identify::Estimate;
 use crate::identify::modal::{ModalFit, Parameter};
 
