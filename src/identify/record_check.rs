@@ -9,8 +9,8 @@
 //! step of height h      e = h (1, 1 - a_1, 1 - a_1 - a_2, ...)
 //! ```
 //!
-//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins a defect, if its square exceeds 2 % of
-//! the energy of the noise over the record: smaller ones have no effect. Samples after a jump of the input, which excites more than the
+//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins a defect. A spike counts if its square exceeds 2 % of the
+//! energy of the noise over the record: smaller ones have no effect. Samples after a jump of the input, which excites more than the
 //! prediction describes, do not count. In a periodic record such defects differ from period to period and count as noise.
 //!
 //! A run of L equal samples in a record of n is a defect if n p^L is below 1e-6, with p the ratio of equal neighbours, and the input
@@ -38,7 +38,7 @@ const DEFECT_SIGMAS: f64 = 20.0;
 const NORMAL_MEDIAN: f64 = 0.6745;
 /// The input jumps if it changes by more than this multiple of its median change.
 const JUMP_RATIO: f64 = 30.0;
-/// The square of a defect is at least this ratio of the energy of the noise.
+/// The square of a spike is at least this ratio of the energy of the noise.
 const MIN_ENERGY_RATIO: f64 = 0.02;
 /// A spike is at most this many samples long.
 const MAX_SPIKE: usize = 4;
@@ -201,9 +201,10 @@ impl<'a> Prediction<'a> {
                 continue;
             }
             let defect = self.classify(k);
+            let has_effect = self.has_effect(defect, k);
             let is_new =
                 |known: &Defect| std::mem::discriminant(known) != std::mem::discriminant(&defect);
-            if found.iter().all(is_new) {
+            if has_effect && found.iter().all(is_new) {
                 found.push(defect);
             }
             k += ORDER + 1;
@@ -212,9 +213,16 @@ impl<'a> Prediction<'a> {
     }
 
     fn is_outlier(&self, k: usize) -> bool {
-        let (error, sigma) = (self.error[k].abs(), self.sigma[k / BLOCK]);
-        let noise_energy = sigma * sigma * self.error.len() as f64;
-        error > DEFECT_SIGMAS * sigma && error * error > MIN_ENERGY_RATIO * noise_energy
+        self.error[k].abs() > DEFECT_SIGMAS * self.sigma[k / BLOCK]
+    }
+
+    /// Whether a defect matters beside the noise: a short spike must have some of the noise's energy, a step always matters.
+    fn has_effect(&self, defect: Defect, k: usize) -> bool {
+        let Defect::Spike { height, .. } = defect else {
+            return true;
+        };
+        let sigma = self.sigma[k / BLOCK];
+        height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
     }
 
     fn classify(&self, k: usize) -> Defect {
