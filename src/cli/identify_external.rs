@@ -14,17 +14,21 @@ use crate::experiment::{AnalysisError, analyse_external};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::frf_csv;
+use crate::identify::modal::InputPath;
 use crate::identify::periodic::Repetition;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, PageFiles, ResultFiles,
 };
-use crate::util::quantity::{Dimension, Frequency, OfFrequency, Time, si};
+use crate::util::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
 /// a thousand times larger.
 const WHOLE_SAMPLES: f64 = 1e-3;
 /// Allowed sampling rates.
 const RATE_HZ: RangeInclusive<f64> = 1e-6..=1e9;
+
+/// Allowed lags of the input in seconds.
+const LAG_S: RangeInclusive<f64> = 0.0..=10.0;
 
 /// What the columns of a CSV mean.
 #[derive(Clone, Debug, clap::Args)]
@@ -58,7 +62,17 @@ pub(super) struct ExternalOptions {
     /// Number of periods to skip at the beginning, while the plant settles
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
-    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: all frequencies up to half of the sampling rate]
+    /// How the input is held between its samples: `zoh` if a command is constant over each sampling period, `none` for a measured input
+    #[arg(long, value_name = "HOLD", requires = "input", value_enum, default_value_t = Hold::None)]
+    hold: Hold,
+    /// Time constant of a first-order lag between the recorded input and the force, as of a current loop (0.16ms)
+    #[arg(
+        long,
+        value_name = "S",
+        requires = "input",
+        allow_hyphen_values = true, value_parser = si::<OfTime>)]
+    input_lag: Option<f64>,
+    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: the band that the input excites]
     #[arg(
         long,
         value_name = "LOW:HIGH",
@@ -66,6 +80,16 @@ pub(super) struct ExternalOptions {
         allow_hyphen_values = true
     )]
     band: Option<String>,
+}
+
+/// How an input is held between its samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+enum Hold {
+    /// Zero-order hold over each sampling period.
+    Zoh,
+    /// No hold.
+    None,
 }
 
 /// The JSON object of the command: as for a recording, with fields of a CSV.
@@ -83,6 +107,9 @@ struct Report {
     truncated: bool,
     rate_hz: f64,
     band_hz: (f64, f64),
+    /// Hold and lag of the input that were assumed; 0 without them.
+    hold_s: f64,
+    input_lag_s: f64,
     /// Number of averaged periods; `null` if the record is not periodic.
     periods: Option<usize>,
     frf_csv: String,
@@ -131,15 +158,15 @@ impl ExternalOptions {
         }
     }
 
-    fn band_hz(&self, rate_hz: f64) -> Result<(f64, f64), CliError> {
+    fn band_hz(&self) -> Result<Option<(f64, f64)>, CliError> {
         let Some(text) = &self.band else {
-            return Ok((0.0, rate_hz / 2.0));
+            return Ok(None);
         };
         let limits = text.split_once(':').and_then(|(low, high)| {
             let [low, high]: [Frequency; 2] = [low.parse().ok()?, high.parse().ok()?];
             Some((low.si(), high.si()))
         });
-        limits.ok_or_else(|| {
+        limits.map(Some).ok_or_else(|| {
             CliError::Usage(format!(
                 "--band {text} is not a band; give two frequencies, as in 11Hz:250Hz"
             ))
@@ -161,6 +188,22 @@ impl ExternalOptions {
             Some(option) => CliError::Usage(format!("{option}: {why}")),
             None => error.into(),
         }
+    }
+
+    fn input_path(&self, rate_hz: f64) -> Result<InputPath, CliError> {
+        let lag_s = self.input_lag.unwrap_or(0.0);
+        if !LAG_S.contains(&lag_s) {
+            let lag = Dimension::Time.display(lag_s);
+            let (min, max) = (LAG_S.start(), LAG_S.end());
+            return Err(CliError::Usage(format!(
+                "--input-lag is {lag}; give a time from {min} to {max} s"
+            )));
+        }
+        let hold_s = match self.hold {
+            Hold::Zoh => 1.0 / rate_hz,
+            Hold::None => 0.0,
+        };
+        Ok(InputPath { hold_s, lag_s })
     }
 
     fn repetition(&self, rate_hz: f64) -> Result<Option<Repetition>, CliError> {
@@ -215,9 +258,10 @@ pub(super) fn run(
     let columns = options.columns(path)?;
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
-    let band_hz = options.band_hz(signals.rate_hz)?;
+    let band_hz = options.band_hz()?;
     let repetition = options.repetition(signals.rate_hz)?;
-    let analysis = analyse_external(&signals, band_hz, repetition);
+    let input_path = options.input_path(signals.rate_hz)?;
+    let analysis = analyse_external(&signals, band_hz, repetition, input_path);
     let analysis = analysis.map_err(|error| options.refused(error))?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {
@@ -232,7 +276,7 @@ pub(super) fn run(
         beside: &in_folder(out, path)?,
         existing: ExistingFile::Keep,
     };
-    let report = Report::write(&record, path, results, band_hz)?;
+    let report = Report::write(&record, path, results)?;
     print_result(json, &report, Report::text)?;
     Ok(Outcome::Done)
 }
@@ -243,7 +287,6 @@ impl Report {
         record: &ExternalRecord,
         path: &Path,
         results: ResultFiles<'_>,
-        band_hz: (f64, f64),
     ) -> Result<Report, CliError> {
         let (analysis, input, output) = (record.analysis, record.input, record.output);
         let magnitude = frf_csv::external_magnitude(input, output);
@@ -258,7 +301,9 @@ impl Report {
             lost_records: 0,
             truncated: false,
             rate_hz: record.rate_hz,
-            band_hz,
+            band_hz: analysis.band_hz,
+            hold_s: analysis.input_path.hold_s,
+            input_lag_s: analysis.input_path.lag_s,
             periods: analysis.periods,
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
             pages: PageFiles::write(&record.report(), results)?,
@@ -287,13 +332,23 @@ impl Report {
             None => String::new(),
         };
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{periods}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
-            self.output
+            self.output,
+            self.input_path_text()
         )
+    }
+
+    /// The assumed hold and lag, if there are any.
+    fn input_path_text(&self) -> String {
+        if self.hold_s == 0.0 && self.input_lag_s == 0.0 {
+            return String::new();
+        }
+        let (hold_ms, lag_ms) = (1e3 * self.hold_s, 1e3 * self.input_lag_s);
+        format!("             input held for {hold_ms:.4} ms, lag {lag_ms:.4} ms\n")
     }
 }
 

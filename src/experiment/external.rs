@@ -2,11 +2,12 @@
 
 use super::analysis::judge;
 use super::analysis_error::AnalysisError;
-use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
+use crate::identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Repetition};
 use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
-    EstimatorSettings, Frf, FrfDatum, Signals, frf_data, local, with_distortion,
+    EstimatorSettings, Frf, FrfDatum, Signals, excited_band_hz, frf_data, local, record_check,
+    with_distortion,
 };
 
 /// Half of the frequencies must have at least this coherence.
@@ -18,11 +19,12 @@ const MAX_SLOPE: f64 = 1.0;
 const SLOPE_PART: f64 = 0.25;
 /// An output is early if it precedes its input by more than this fraction of a sample and by more than [`CERTAIN_SIGMAS`].
 const EARLY_SAMPLES: f64 = 0.5;
+/// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
+const RELATIVE_ERROR: f64 = 0.01;
+/// A fit is far better if its chi-square is smaller by this factor.
+const FAR_BETTER: f64 = 10.0;
 /// A deviation of more standard deviations is not noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
-
-/// External signals have no measurement chain.
-const CHAIN: MeasurementChain = MeasurementChain::Direct;
 
 /// The analysis of external signals.
 #[derive(Clone, Debug)]
@@ -33,39 +35,60 @@ pub struct ExternalAnalysis {
     pub fit: Result<ModalFit, FitError>,
     /// The verdict on CNMP zeros.
     pub verdict: Verdict,
+    /// The hold and the lag of the input that were assumed.
+    pub input_path: InputPath,
+    /// The analysed band in hertz.
+    pub band_hz: (f64, f64),
     /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
     pub judged_up_to_rad_s: f64,
     /// Number of averaged periods of a periodic record.
     pub periods: Option<usize>,
 }
 
-/// Analyses input and output between two frequencies. With a repetition, periods are averaged; without one, the record must
-/// begin and end at rest.
+/// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
+/// without one, the record must begin and end at rest. `input_path` lies between the recorded input and the force.
 ///
 /// # Errors
 /// When the signals allow no estimate, or the zeros cannot be computed.
 pub fn analyse_external(
     signals: &Signals,
-    band_hz: (f64, f64),
+    band_hz: Option<(f64, f64)>,
     repetition: Option<Repetition>,
+    input_path: InputPath,
 ) -> Result<ExternalAnalysis, AnalysisError> {
+    let chain = MeasurementChain::Input(input_path);
+    signals.check()?;
+    let band_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, data, periods) = response(signals, band_hz, repetition)?;
     let fit = match repetition {
-        Some(_) => fit_of_periods(&data),
-        None => modal::fit(&data, &CHAIN),
+        Some(_) => fit_of_periods(&data, &chain),
+        None => modal::fit(&data, &chain),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let verdict = match implausible(signals.rate_hz, &frf, &data, &fit) {
+    let why = defective(signals, repetition.is_some())
+        .or_else(|| implausible(signals.rate_hz, &frf, &data, &fit, &chain));
+    let verdict = match why {
         Some(why) => Verdict::undecided(why),
-        None => judge(&fit, &data, &CHAIN, judged_up_to_rad_s, None)?,
+        None => judge(&fit, &data, &chain, judged_up_to_rad_s, None)?,
     };
     Ok(ExternalAnalysis {
         frf,
         fit,
         verdict,
+        input_path,
+        band_hz,
         judged_up_to_rad_s,
         periods,
     })
+}
+
+/// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
+fn default_band_hz(signals: &Signals, repetition: Option<Repetition>) -> (f64, f64) {
+    let all = (0.0, signals.rate_hz / 2.0);
+    match repetition {
+        Some(_) => all,
+        None => excited_band_hz(signals).unwrap_or(all),
+    }
 }
 
 fn response(
@@ -82,6 +105,13 @@ fn response(
     Ok((frf, frf_data(signals, band_hz, &settings)?, None))
 }
 
+/// The defects of the record, which modes would be fitted to.
+fn defective(signals: &Signals, is_periodic: bool) -> Option<String> {
+    let defects = record_check::defects(signals, is_periodic);
+    let texts: Vec<String> = defects.iter().map(ToString::to_string).collect();
+    (!texts.is_empty()).then(|| texts.join("; "))
+}
+
 /// Whether the fit describes the data.
 fn describes(fit: &ModalFit) -> bool {
     fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
@@ -89,20 +119,50 @@ fn describes(fit: &ModalFit) -> bool {
 
 /// The modes of averaged periods. If they do not describe the data, they are fitted again with distortion added to the noise.
 /// (Without periods, the noise is estimated from neighbouring frequencies and already includes distortion.)
-fn fit_of_periods(data: &[FrfDatum]) -> Result<ModalFit, FitError> {
-    let fit = modal::fit(data, &CHAIN);
+fn fit_of_periods(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
+    let fit = modal::fit(data, chain);
     if fit.as_ref().is_ok_and(describes) {
         return fit;
     }
-    let mut fit = modal::fit(&with_distortion(data), &CHAIN)?;
-    fit.chi2_per_freedom = chi2_per_freedom(&fit, data);
+    let smooth = fit_with_errors(&with_distortion(data), data, chain);
+    // Of lines farther apart than the modes, the response is not smooth and the distortion is overestimated.
+    let proportional = with_relative_error(data);
+    let relative = fit_with_errors(&proportional, data, chain);
+    match (smooth, relative) {
+        (Ok(smooth), Ok(relative))
+            if relative.chi2_per_freedom * FAR_BETTER < smooth.chi2_per_freedom =>
+        {
+            Ok(relative)
+        }
+        (Err(_), Ok(relative)) => Ok(relative),
+        (smooth, _) => smooth,
+    }
+}
+
+/// The modes of data with increased errors; the reduced chi-square is that with the noise alone.
+fn fit_with_errors(
+    increased: &[FrfDatum],
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+) -> Result<ModalFit, FitError> {
+    let mut fit = modal::fit(increased, chain)?;
+    fit.chi2_per_freedom = chi2_per_freedom(&fit, data, chain);
     Ok(fit)
 }
 
+/// The data with an error that is a ratio of the response.
+fn with_relative_error(data: &[FrfDatum]) -> Vec<FrfDatum> {
+    let increased = data.iter().map(|datum| FrfDatum {
+        variance: datum.variance + (RELATIVE_ERROR * datum.response.norm()).powi(2),
+        ..*datum
+    });
+    increased.collect()
+}
+
 /// Reduced chi-square with the noise alone.
-fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum]) -> f64 {
+fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
     let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
-    let fitted = fit.response(&CHAIN, &frequency_hz);
+    let fitted = fit.response(chain, &frequency_hz);
     let squares = data
         .iter()
         .zip(&fitted)
@@ -118,21 +178,26 @@ fn implausible(
     frf: &Frf,
     data: &[FrfDatum],
     fit: &Result<ModalFit, FitError>,
+    chain: &MeasurementChain,
 ) -> Option<String> {
     incoherent(frf)
-        .or_else(|| growing(frf))
-        .or_else(|| inverse_fits(data, fit))
+        .or_else(|| growing(frf, fit))
+        .or_else(|| inverse_fits(data, fit, chain))
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 
 /// Whether modes describe the inverse of the response, but not the response.
-fn inverse_fits(data: &[FrfDatum], fit: &Result<ModalFit, FitError>) -> Option<String> {
+fn inverse_fits(
+    data: &[FrfDatum],
+    fit: &Result<ModalFit, FitError>,
+    chain: &MeasurementChain,
+) -> Option<String> {
     if fit.as_ref().is_ok_and(describes) {
         return None;
     }
     let mut inverse: Vec<FrfDatum> = data.iter().map(inverse_datum).collect();
     inverse.retain(|datum| datum.variance.is_normal());
-    let inverse_fit = modal::fit(&inverse, &CHAIN).ok()?;
+    let inverse_fit = modal::fit(&inverse, chain).ok()?;
     describes(&inverse_fit).then(|| SWAPPED.into())
 }
 
@@ -156,20 +221,35 @@ fn incoherent(frf: &Frf) -> Option<String> {
     })
 }
 
-/// A displacement falls with frequency above its modes; a force as output would grow.
-fn growing(frf: &Frf) -> Option<String> {
+/// A displacement falls with frequency above its modes; a force as output would grow. Frequencies at which the output is noise do not
+/// count. Below a mode at the end of the band a displacement grows as well.
+fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
     let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
     let from_hz = last_hz * (first_hz / last_hz).powf(SLOPE_PART);
-    let points = frf.frequency_hz.iter().zip(&frf.response);
-    let end = points
-        .filter(|(f, _)| **f >= from_hz)
-        .map(|(f, h)| (f.ln(), h.norm().ln()));
+    if ends_with_a_mode(fit, from_hz, *last_hz) {
+        return None;
+    }
+    let significant = (0..frf.len()).filter(|k| frf.coherence[*k] >= MIN_COHERENCE);
+    let end = significant
+        .filter(|k| frf.frequency_hz[*k] >= from_hz)
+        .map(|k| (frf.frequency_hz[k].ln(), frf.response[k].norm().ln()));
     let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
     (slope > MAX_SLOPE).then(|| {
         format!(
             "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
         )
     })
+}
+
+/// Whether the highest mode of a fit that describes the data lies between two frequencies. (The inverse of a response needs a mode
+/// beyond the band.)
+fn ends_with_a_mode(fit: &Result<ModalFit, FitError>, from_hz: f64, to_hz: f64) -> bool {
+    let Some(fit) = fit.as_ref().ok().filter(|fit| describes(fit)) else {
+        return false;
+    };
+    let modes = fit.modes();
+    let last_hz = modes.last().map_or(0.0, |mode| mode.frequency_hz().value);
+    (from_hz..=to_hz).contains(&last_hz)
 }
 
 /// The slope of the least-squares line.

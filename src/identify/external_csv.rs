@@ -91,6 +91,21 @@ fn separator(text: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
+/// The text in UTF-8, without a byte order mark. Other text is taken for Latin-1, in which every byte is a character.
+fn utf8(text: Vec<u8>) -> Vec<u8> {
+    if let Some(rest) = text.strip_prefix(b"\xef\xbb\xbf") {
+        return rest.to_vec();
+    }
+    match std::str::from_utf8(&text) {
+        Ok(_) => text,
+        Err(_) => text
+            .iter()
+            .map(|byte| char::from(*byte))
+            .collect::<String>()
+            .into_bytes(),
+    }
+}
+
 struct Table<'a> {
     path: &'a Path,
     text: Vec<u8>,
@@ -113,6 +128,7 @@ impl Table<'_> {
     fn open(path: &Path) -> Result<Table<'_>, ExternalCsvError> {
         let text = input_file::read(path, MAX_RECORD_BYTES);
         let text = text.map_err(|source| ExternalCsvError::File(path.to_owned(), source))?;
+        let text = utf8(text);
         Ok(Table { path, text })
     }
 

@@ -12,6 +12,8 @@
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
 //! | the estimator that the configuration selects | [`response`] |
 //! | the response while a run goes on | [`GrowingResponse`] |
+//! | defects of an external record | [`record_check`] |
+//! | the band that an input excites | [`excited_band_hz`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
 //! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
 //! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
@@ -26,6 +28,7 @@ mod band;
 pub mod delay;
 mod error;
 mod estimator;
+mod excited_band;
 pub mod external_csv;
 mod fft;
 mod frf;
@@ -35,6 +38,7 @@ mod local_model;
 mod mean;
 pub mod modal;
 mod multisine_lines;
+pub mod record_check;
 pub mod repeated;
 mod signals;
 mod timing;
@@ -45,6 +49,7 @@ use crate::config::IdentifySettings;
 pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoint};
 pub use crate::util::estimate::{Estimate, SIGMAS_95};
 pub use error::IdentifyError;
+pub use excited_band::excited_band_hz;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};
 pub use local_model::frf_data::frf_data;

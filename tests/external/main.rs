@@ -3,6 +3,7 @@
 mod existing_results;
 mod motor_bench;
 mod periodic;
+mod random_stages;
 mod refused;
 mod signals;
 mod single_record;

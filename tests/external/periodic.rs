@@ -51,6 +51,37 @@ fn reports_excited_lines_only() {
 }
 
 #[test]
+fn distortion_of_a_measured_input_is_no_excitation() {
+    // Odd lines, and between them lines of the input of 2 %, to which the output does not respond.
+    let odd: Vec<usize> = (5..=199).step_by(2).collect();
+    let even: Vec<usize> = (6..=198).step_by(2).collect();
+    let mut signals = multisine(&odd, 6, 0.0, 1e-7, 2);
+    let distortion = multisine(&even, 6, 0.0, 0.0, 3).input_a;
+    for (input, distortion) in signals.input_a.iter_mut().zip(distortion) {
+        *input += 0.02 * distortion;
+    }
+    let periods = estimate(&signals, BAND_HZ, repetition(0)).unwrap();
+    let hz: Vec<f64> = odd.iter().map(|f| *f as f64).collect();
+    assert_eq!(periods.frf.frequency_hz, hz);
+}
+
+#[test]
+fn weak_lines_of_the_same_pattern_are_excited() {
+    let lines: Vec<usize> = (5..=199).step_by(2).collect();
+    let (weak, strong) = lines.split_at(20);
+    let mut signals = multisine(strong, 6, 0.0, 1e-7, 2);
+    let more = multisine(weak, 6, 0.0, 0.0, 3);
+    for (input, more) in signals.input_a.iter_mut().zip(&more.input_a) {
+        *input += 0.1 * more;
+    }
+    for (output, more) in signals.output_m.iter_mut().zip(&more.output_m) {
+        *output += 0.1 * more;
+    }
+    let periods = estimate(&signals, BAND_HZ, repetition(0)).unwrap();
+    assert_eq!(periods.frf.len(), lines.len());
+}
+
+#[test]
 fn errors_match_their_standard_deviations() {
     let (mut ratio, mut count) = (0.0, 0.0);
     for seed in 0..20 {

@@ -73,6 +73,11 @@ fn rejects_options_that_do_not_match_the_file() {
             &["--period 0.99995s", "1000 Hz"],
         ),
         ("--rate 1000 --band 5-200", &["--band 5-200", "11Hz:250Hz"]),
+        (
+            "--rate 1000 --input-lag -1ms",
+            &["--input-lag is", "0 to 10 s"],
+        ),
+        ("--rate 1000 --hold foh", &["--hold", "zoh"]),
         ("--rate 0", &["--rate is 0 Hz", "0.000001 to 1000000000 Hz"]),
         ("--rate -5", &["--rate is -5 Hz", "0.000001"]),
         ("--rate 1e308", &["--rate is 1e308 Hz", "1000000000 Hz"]),
@@ -180,6 +185,28 @@ fn rejects_invalid_data_with_line_and_column() {
             [1, 2].contains(&answer.code) && answer.err.contains("data.csv"),
             "{answer:?}"
         );
+    }
+}
+
+#[test]
+fn accepts_a_latin_1_header_and_a_byte_order_mark() {
+    let latin_1 = valid().replacen("time_s", "temperatur_\u{b0}C,time_s", 1);
+    let rows = latin_1.lines().enumerate();
+    let with_unused: String = rows
+        .map(|(k, row)| {
+            if k == 0 {
+                format!("{row}\n")
+            } else {
+                format!("20,{row}\n")
+            }
+        })
+        .collect();
+    // Every character up to U+00FF is one byte in Latin-1.
+    let latin_1: Vec<u8> = with_unused.chars().map(|c| c as u8).collect();
+    let marked = [&b"\xef\xbb\xbf"[..], valid().as_bytes()].concat();
+    for text in [latin_1, marked] {
+        let answer = identify(text, "--time time_s --period 1000 --band 5:200");
+        assert_eq!(answer.code, 0, "{answer:?}");
     }
 }
 

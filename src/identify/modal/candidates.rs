@@ -108,7 +108,7 @@ pub(super) fn first_mode_starts(
 }
 
 /// Delays in seconds from minus a quarter to plus half a period of a mode.
-fn delays_s(data: &[FrfDatum], term: ModalTerm) -> impl Iterator<Item = f64> {
+pub(super) fn delays_s(data: &[FrfDatum], term: ModalTerm) -> impl Iterator<Item = f64> {
     let step_s = data
         .last()
         .map_or(0.0, |last| 1.0 / (DELAYS_PER_PERIOD * last.frequency_hz));

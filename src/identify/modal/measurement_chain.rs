@@ -17,6 +17,33 @@ pub enum MeasurementChain {
     Bench(SignalPath),
     /// No chain: the input is a force in newtons, or another input unit.
     Direct,
+    /// Hold and lag between the recorded input and the force.
+    Input(InputPath),
+}
+
+/// What lies between the samples of an input and the force, apart from a delay.
+///
+/// ```text
+/// (1 - exp(-s T))/(s T) 1/(1 + s tau)             T the hold, tau the lag
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InputPath {
+    /// Time in seconds for which each sample is held; 0 without a hold.
+    pub hold_s: f64,
+    /// Time constant in seconds of a first-order lag, for example of a current loop; 0 without one.
+    pub lag_s: f64,
+}
+
+impl InputPath {
+    fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        let held = s * self.hold_s;
+        let hold = if held.norm() > 0.0 {
+            (-(-held).exp() + 1.0) / held
+        } else {
+            Complex::new(1.0, 0.0)
+        };
+        hold / (s * self.lag_s + 1.0)
+    }
 }
 
 /// The frequencies at which the model of each datum is evaluated.
@@ -110,7 +137,7 @@ impl MeasurementChain {
     fn period_s(&self) -> f64 {
         match self {
             MeasurementChain::Bench(settings) => settings.period_s,
-            MeasurementChain::Direct => 0.0,
+            MeasurementChain::Direct | MeasurementChain::Input(_) => 0.0,
         }
     }
 
@@ -135,6 +162,9 @@ impl MeasurementChain {
                 nodes.mean(|node| plant.response_at(node.z))
             }
             MeasurementChain::Direct => nodes.mean(|node| mode.resonance(node.s)),
+            MeasurementChain::Input(path) => {
+                nodes.mean(|node| mode.resonance(node.s) * path.response(node.s))
+            }
         }
     }
 

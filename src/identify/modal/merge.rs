@@ -13,7 +13,7 @@ const POLE_DISTANCE_RATIO: f64 = 0.04;
 const FREQUENCY_RATIO: f64 = 0.004;
 
 /// `data`, merged where the poles of `model` leave the response smooth.
-pub(super) fn merged(data: &[FrfDatum], model: &ModalParameters) -> Vec<FrfDatum> {
+pub(crate) fn merged(data: &[FrfDatum], model: &ModalParameters) -> Vec<FrfDatum> {
     let mut merged = Vec::new();
     let mut rest = data;
     while let Some(first) = rest.first() {

@@ -99,6 +99,28 @@ impl ModalParameters {
         next
     }
 
+    /// The parameters with a difference added to each free one, in its own unit; dampings keep their bounds.
+    pub(crate) fn shifted(&self, difference: &[f64]) -> ModalParameters {
+        let mut next = self.clone();
+        for (parameter, difference) in self.free().into_iter().zip(difference) {
+            next.add(parameter, *difference);
+        }
+        next
+    }
+
+    fn add(&mut self, parameter: Parameter, difference: f64) {
+        match parameter {
+            Parameter::Frequency(k) => self.modes[k].omega_rad_s += difference,
+            Parameter::Damping(k) => {
+                let ratio = self.modes[k].damping_ratio + difference;
+                self.modes[k].damping_ratio = ratio.clamp(DAMPING_RATIO.0, DAMPING_RATIO.1);
+            }
+            Parameter::Residue(k) => self.modes[k].residue_per_kg += difference,
+            Parameter::Remainder => self.remainder_m_per_n += difference,
+            Parameter::Delay => self.delay_s += difference,
+        }
+    }
+
     fn change(&mut self, parameter: Parameter, step: f64) {
         match parameter {
             Parameter::Frequency(k) => {

@@ -1,5 +1,8 @@
 //! The number of modes: modes are added one at a time, each where the residual exceeds the noise most, as long as the decrease
 //! of chi^2 is significant.
+//!
+//! The first pass is made from two starts: from no mode, and from one mode at each peak of the response. With the first, a delay of
+//! the wrong half turn can take the place of a mode, and modes added later do not lead back. The better result is used.
 
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
@@ -7,6 +10,7 @@ use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
 use super::error::{FitError, Progress, report};
 use super::merge::merged;
 use super::parameters::ModalParameters;
+use super::peaks::peak_starts;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
 use crate::identify::FrfDatum;
@@ -14,11 +18,14 @@ use crate::identify::FrfDatum;
 /// Largest number of modes.
 const MAX_MODES: usize = 24;
 
+/// No data are left out below this number of data, as of the lines of a multisine.
+const MIN_DATA: usize = 400;
+
 /// One pass of the search.
 struct Pass {
     /// Error as a ratio of H that is added to the noise.
     relative_error: f64,
-    /// Every n-th datum is used. A mode of 0.2 % damping spans eight data of 0.05 % width.
+    /// Every n-th datum is used, if there are many. A mode of 0.2 % damping spans eight data of 0.05 % width.
     every: usize,
     /// See [`refine`].
     tolerance: f64,
@@ -91,7 +98,9 @@ pub(super) fn orders(
         done: 0.0,
         progress,
     };
-    for pass in &PASSES {
+    let [coarse, finer @ ..] = &PASSES;
+    search.run_from_best_start(coarse, problem)?;
+    for pass in finer {
         search.run(pass, problem)?;
     }
     Ok(search.orders)
@@ -109,12 +118,45 @@ struct Search<'a, 'p> {
 }
 
 impl Search<'_, '_> {
+    /// A pass from each start: the result with the fewest and most significant modes.
+    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &pass.data(problem.data, &self.parameters);
+        let starts = peak_starts(Problem { data, ..problem });
+        let by_one = self.cost_of_run(pass, problem)?;
+        let first = (by_one, self.parameters.clone(), self.orders.clone());
+        let mut best = first;
+        for start in starts {
+            self.parameters = start;
+            self.orders.clear();
+            self.done = 0.0;
+            let cost = self.cost_of_run(pass, problem)?;
+            if cost + problem.significant_decrease() < best.0 {
+                best = (cost, self.parameters.clone(), self.orders.clone());
+            }
+        }
+        (_, self.parameters, self.orders) = best;
+        Ok(())
+    }
+
+    /// Runs a pass: chi^2 of its result, and the smallest significant decrease for each mode.
+    fn cost_of_run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
+        let data = &pass.data(problem.data, &ModalParameters::default());
+        self.run(pass, problem)?;
+        let problem = Problem { data, ..problem };
+        let chi2 = Solution::new(problem, self.parameters.clone()).chi2;
+        let modes = self.parameters.modes.len() as f64;
+        Ok(chi2 + modes * problem.significant_decrease())
+    }
+
     /// Adds modes, with the errors of a pass, as long as they are significant.
     fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let problem = Problem { data, ..problem };
         let start = std::mem::take(&mut self.parameters);
         let mut solution = refine(problem, start, pass.tolerance);
+        if !solution.parameters.modes.is_empty() {
+            self.orders.push(order(problem, &solution, f64::INFINITY));
+        }
         let first_misfit = problem.misfit(solution.chi2);
         while solution.parameters.modes.len() < MAX_MODES {
             self.report(
@@ -157,8 +199,9 @@ impl Pass {
         } else {
             merged(data, known)
         };
+        let every = self.every.min(data.len() / MIN_DATA).max(1);
         data.iter()
-            .step_by(self.every)
+            .step_by(every)
             .map(|datum| self.with_error(datum))
             .collect()
     }

@@ -30,6 +30,10 @@ const DRIFT_PART: usize = 100;
 const EXCITED_RATIO: f64 = 0.01;
 /// The amplitude of an excited line exceeds this multiple of its standard deviation.
 const EXCITED_SIGMAS: f64 = 5.0;
+/// Ratio of amplitudes of the weakest excited line and of the strongest distortion: 10 dB.
+const DISTORTION_GAP: f64 = 3.0;
+/// A pattern has at least this many lines.
+const MIN_PATTERN: usize = 8;
 /// Relative error of a response by rounding: 10^4 sums of doubles.
 pub(super) const ROUNDING: f64 = 1e-12;
 
@@ -233,17 +237,62 @@ pub(super) fn variance_of_mean(values: &[Complex<f64>]) -> f64 {
     values.iter().map(|x| (x - mean).norm_sqr()).sum::<f64>() / ((count - 1.0) * count)
 }
 
-/// The lines whose input exceeds its own noise and [`EXCITED_RATIO`] of the largest.
+/// The lines whose input exceeds its own noise, [`EXCITED_RATIO`] of the largest, and the distortion between the excited lines.
 pub(super) fn excited(lines: &[Line]) -> impl Iterator<Item = &Line> {
-    let largest = lines
+    let amplitude = |line: &Line| mean(&line.input).norm();
+    let largest = lines.iter().map(amplitude).fold(0.0, f64::max);
+    let significant: Vec<&Line> = lines
         .iter()
-        .map(|line| mean(&line.input).norm())
-        .fold(0.0, f64::max);
-    lines.iter().filter(move |line| {
-        let amplitude = mean(&line.input).norm();
-        let sigma = variance_of_mean(&line.input).sqrt();
-        amplitude > 0.0
-            && amplitude >= EXCITED_RATIO * largest
-            && amplitude > EXCITED_SIGMAS * sigma
-    })
+        .filter(|line| {
+            let sigma = variance_of_mean(&line.input).sqrt();
+            let amplitude = amplitude(line);
+            amplitude > 0.0
+                && amplitude >= EXCITED_RATIO * largest
+                && amplitude > EXCITED_SIGMAS * sigma
+        })
+        .collect();
+    let limit = distortion_limit(&significant);
+    significant
+        .into_iter()
+        .filter(move |line| amplitude(line) > limit)
+}
+
+/// The largest amplitude that is distortion of a measured input; 0 without any.
+///
+/// Sorted by amplitude, the excited lines precede the others by [`DISTORTION_GAP`]. They have a pattern, such as only odd lines, that
+/// the others do not have.
+fn distortion_limit(lines: &[&Line]) -> f64 {
+    let mut sorted: Vec<(f64, usize)> = lines
+        .iter()
+        .map(|line| (mean(&line.input).norm(), line.number))
+        .collect();
+    sorted.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let gap = |k: &usize| sorted[k - 1].0 / sorted[*k].0;
+    let widest = (MIN_PATTERN..sorted.len()).max_by(|a, b| gap(a).total_cmp(&gap(b)));
+    let Some(first) = widest.filter(|k| gap(k) >= DISTORTION_GAP) else {
+        return 0.0;
+    };
+    let (excited, others) = sorted.split_at(first);
+    let origin = excited[0].1;
+    let distance = |line: &(f64, usize)| line.1.abs_diff(origin);
+    let step = excited
+        .iter()
+        .map(distance)
+        .fold(0, greatest_common_divisor);
+    let outside = others
+        .iter()
+        .filter(|line| distance(line) % step.max(1) != 0);
+    if step > 1 && 4 * outside.count() >= others.len() {
+        others[0].0
+    } else {
+        0.0
+    }
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 {
+        a
+    } else {
+        greatest_common_divisor(b, a % b)
+    }
 }

@@ -37,7 +37,7 @@ impl<'a> ExternalRecord<'a> {
             residue_unit: format!("{output} per {input} and s^2"),
             frf: &analysis.frf,
             model: None,
-            chain: MeasurementChain::Direct,
+            chain: MeasurementChain::Input(analysis.input_path),
             fit,
             signs: None,
             verdict: &analysis.verdict,
@@ -56,10 +56,23 @@ impl<'a> ExternalRecord<'a> {
             ("Samples", Some(self.samples.to_string())),
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
             (
+                "Hold of the input",
+                milliseconds(self.analysis.input_path.hold_s),
+            ),
+            (
+                "Lag of the input",
+                milliseconds(self.analysis.input_path.lag_s),
+            ),
+            (
                 "Periods averaged",
                 self.analysis.periods.map(|count| count.to_string()),
             ),
         ]);
         section("The record", &facts(&pairs))
     }
+}
+
+/// A time in milliseconds; `None` if it is 0.
+fn milliseconds(time_s: f64) -> Option<String> {
+    (time_s > 0.0).then(|| format!("{:.4} ms", 1e3 * time_s))
 }
