@@ -19,7 +19,7 @@ fn uniform(random: &mut Pcg64, low: f64, high: f64) -> f64 {
 
 /// A stage of Chapter 5 with other masses, springs, beams, asymmetry, damping and operating point.
 fn random_stage(seed: u64) -> Config {
-    let mut random = Pcg64::new(u128::from(seed), 0x68_656c_64);
+    let mut random = Pcg64::new(u128::from(seed), 0x6865_6c64);
     let mut between = |low, high| uniform(&mut random, low, high);
     let sets = [
         format!("plant.mass_asymmetry={}", between(-0.2, 0.2)),
