@@ -15,12 +15,13 @@ use super::tune_measured::{self, SourceOptions};
 use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, NamedPlant,
-    PlantFigures, Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate,
-    loop_curves,
+    Design, DesignOptions, DesignPlant, DesignTask, DisturbanceSpectrum, Effort, Goal, MarginDisc,
+    NamedPlant, PlantFigures, Requirements, SensitivityLimit, Tolerances, bound_of, design,
+    evaluate, loop_curves,
 };
-use crate::experiment::tuning::{IdentifiedFrf, evidence};
+use crate::experiment::tuning::{IdentifiedFrf, TuneSourceError, evidence, recorded_disturbance};
 use crate::model::plant::SignalPath;
+use crate::recording::Recording;
 use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
@@ -66,6 +67,10 @@ pub(super) struct Args {
     /// model
     #[arg(long, value_name = "A", value_parser = positive, conflicts_with_all = ["frf", "campaign"])]
     max_current_rms: Option<f64>,
+    /// Recording of a closed loop that held its position (`bench control --reference hold`): its error, without the effect of its
+    /// loop, is the disturbance for `--goal rms` and `--max-current-rms` in place of `sim.floor`
+    #[arg(long, value_name = "RECORDING", conflicts_with_all = ["frf", "campaign"])]
+    disturbance: Option<PathBuf>,
     /// Relative tolerance of the mode frequencies, of the first mode and of all others together
     #[arg(long, value_name = "RATIO", default_value = "1%", value_parser = si::<OfRatio>)]
     frequency_tolerance: f64,
@@ -252,9 +257,24 @@ impl Args {
 fn task(args: &Args, frfs: &[IdentifiedFrf], config: &Config) -> Result<DesignTask, CliError> {
     let options = options(args)?;
     Ok(match frfs.is_empty() {
-        true => DesignTask::new(config, &plants(args, config, &[])?, options)?,
+        true => {
+            let task = DesignTask::new(config, &plants(args, config, &[])?, options)?;
+            let noise_rms_m = task.disturbance.noise_rms_m;
+            task.with_disturbance(disturbance(args, noise_rms_m)?)
+        }
         false => DesignTask::measured(&tune_measured::plants(frfs), options)?,
     })
+}
+
+/// The spectrum in the recording of --disturbance.
+fn disturbance(args: &Args, noise_rms_m: f64) -> Result<Option<DisturbanceSpectrum>, CliError> {
+    let Some(file) = &args.disturbance else {
+        return Ok(None);
+    };
+    let recording = Recording::open(file)?;
+    let name = file.display().to_string();
+    let spectrum = recorded_disturbance(&recording, &name, noise_rms_m);
+    Ok(Some(spectrum.map_err(TuneSourceError::from)?))
 }
 
 fn missed_margin(figures: &PlantFigures, least: f64) -> String {

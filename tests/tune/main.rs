@@ -5,5 +5,6 @@ mod command;
 mod delivered;
 mod measured;
 mod measured_command;
+mod measured_disturbance;
 mod measured_refused;
 mod stage;

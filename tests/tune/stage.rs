@@ -37,7 +37,7 @@ pub fn task(config: &Config, requirements: Requirements) -> DesignTask {
     DesignTask::new(config, &[plant], options(requirements)).unwrap()
 }
 
-fn options(requirements: Requirements) -> DesignOptions {
+pub fn options(requirements: Requirements) -> DesignOptions {
     DesignOptions {
         requirements,
         tolerances: Tolerances {

@@ -10,6 +10,7 @@
 
 use nalgebra::Complex;
 
+use super::disturbance_spectrum::DisturbanceSpectrum;
 use crate::config::FloorLine;
 use crate::model::plant::Mode;
 use crate::util::units::rad_s;
@@ -30,13 +31,19 @@ pub struct Disturbance {
     pub floor: Vec<FloorLine>,
     /// RMS of the noise of a reading in metres.
     pub noise_rms_m: f64,
+    /// A measured spectrum, in place of the lines of the floor.
+    pub measured: Option<DisturbanceSpectrum>,
 }
 
 impl Disturbance {
     /// Frequency in rad/s and damping ratio of each line.
     pub fn features(&self) -> Vec<(f64, f64)> {
-        let lines = self.floor.iter();
+        let lines = match self.measured {
+            Some(_) => &[],
+            None => self.floor.as_slice(),
+        };
         lines
+            .iter()
             .map(|line| (rad_s(line.frequency_hz), line.damping_ratio))
             .collect()
     }
@@ -44,12 +51,15 @@ impl Disturbance {
     /// The variances at each frequency of a rising grid, for a loop of `period_s`.
     pub fn variances(&self, modes: &[Mode], omega_rad_s: &[f64], period_s: f64) -> Vec<Variances> {
         let noise_density = self.noise_rms_m * self.noise_rms_m * period_s / std::f64::consts::PI;
-        let widths = widths(omega_rad_s);
-        let points = omega_rad_s.iter().zip(widths);
+        let cells = cells(omega_rad_s);
+        let points = omega_rad_s.iter().zip(cells);
         points
-            .map(|(w, width)| Variances {
-                disturbance_m2: self.density_m2(modes, *w) * width,
-                noise_m2: noise_density * width,
+            .map(|(w, (from, to))| Variances {
+                disturbance_m2: match &self.measured {
+                    Some(spectrum) => spectrum.variance_m2(from, to),
+                    None => self.density_m2(modes, *w) * (to - from),
+                },
+                noise_m2: noise_density * (to - from),
             })
             .collect()
     }
@@ -75,9 +85,12 @@ fn line_density(line: &FloorLine, s: Complex<f64>) -> f64 {
     rms * rms / (std::f64::consts::PI * zeta * w) * band_pass.norm_sqr()
 }
 
-/// The widths of the trapezoidal rule.
-fn widths(grid: &[f64]) -> Vec<f64> {
+/// The range of frequencies that belongs to each point by the trapezoidal rule: up to the middle between neighbours.
+fn cells(grid: &[f64]) -> Vec<(f64, f64)> {
     let last = grid.len().saturating_sub(1);
-    let width = |i: usize| 0.5 * (grid[(i + 1).min(last)] - grid[i.saturating_sub(1)]);
-    (0..grid.len()).map(width).collect()
+    let cell = |i: usize| {
+        let (before, after) = (grid[i.saturating_sub(1)], grid[(i + 1).min(last)]);
+        (0.5 * (before + grid[i]), 0.5 * (grid[i] + after))
+    };
+    (0..grid.len()).map(cell).collect()
 }

@@ -3,6 +3,7 @@
 use super::cascade::ParameterLimits;
 use super::design::DesignTask;
 use super::disturbance::Disturbance;
+use super::disturbance_spectrum::DisturbanceSpectrum;
 use super::error::TuneError;
 use super::measured_plant::MeasuredPlant;
 use super::plant::{DesignPlant, Tolerances};
@@ -89,6 +90,12 @@ impl DesignTask {
 }
 
 impl DesignTask {
+    /// The same task with a measured disturbance in place of the lines of the floor.
+    pub fn with_disturbance(mut self, measured: Option<DisturbanceSpectrum>) -> DesignTask {
+        self.disturbance.measured = measured;
+        self
+    }
+
     /// The task for plants that were measured: without a model. What the fitted modes lack is in the uncertainty of each plant, and
     /// the modes that count with any phase are in the bound. The disturbance of the position is not known.
     ///
@@ -128,6 +135,7 @@ fn disturbance(config: &Config) -> Disturbance {
     Disturbance {
         floor: config.sim.floor.clone(),
         noise_rms_m: (noise_m * noise_m + step_m * step_m / 12.0).sqrt(),
+        measured: None,
     }
 }
 

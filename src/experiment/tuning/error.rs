@@ -1,5 +1,6 @@
 //! Why measured responses cannot be used for a design.
 
+use super::disturbance::DisturbanceError;
 use crate::control::ControllerError;
 use crate::experiment::measured_frf::FrfError;
 use crate::identify::modal::FitError;
@@ -88,6 +89,9 @@ pub enum TuneSourceError {
         /// How that is seen.
         why: String,
     },
+    /// A recording gives no disturbance.
+    #[error(transparent)]
+    Disturbance(#[from] DisturbanceError),
     /// The zeros of the fit cannot be computed.
     #[error(transparent)]
     Zeros(#[from] PlantError),
@@ -101,6 +105,7 @@ impl TuneSourceError {
     pub fn is_failure(&self) -> bool {
         match self {
             TuneSourceError::File { why, .. } => why.is_failure(),
+            TuneSourceError::Disturbance(error) => error.is_failure(),
             TuneSourceError::Fit { .. }
             | TuneSourceError::Zeros(_)
             | TuneSourceError::Controller(_) => true,

@@ -9,6 +9,7 @@
 //! Of the configuration only the loop rate, the delays, the amplifier, the probe and the limits of the interlocks are used.
 
 mod distinct;
+mod disturbance;
 mod error;
 mod evidence;
 mod identified;
@@ -16,6 +17,7 @@ mod mode_fit;
 mod source;
 
 pub use distinct::check_distinct;
+pub use disturbance::{DisturbanceError, recorded_disturbance};
 pub use error::TuneSourceError;
 pub use evidence::{FrfEvidence, evidence};
 pub use identified::{IdentifiedFrf, ModeRole};
