@@ -41,21 +41,6 @@ pub enum TuneError {
     },
 }
 
-/// A gain margin and a phase margin that no disc contains.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "a phase margin of {:.1} deg needs a gain margin above {least_gain_margin:.2}, not {gain_margin:.2}; raise --gain-margin or lower --phase-margin",
-    phase_margin_rad.to_degrees()
-)]
-pub struct DiscError {
-    /// The gain margin, given or that of the modulus margin.
-    pub gain_margin: f64,
-    /// The phase margin in rad, given or that of the modulus margin.
-    pub phase_margin_rad: f64,
-    /// The smallest gain margin that goes with the phase margin.
-    pub least_gain_margin: f64,
-}
-
 /// Two requirements that exclude each other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Conflict {

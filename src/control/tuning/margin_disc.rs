@@ -2,8 +2,6 @@
 
 use serde::Serialize;
 
-use super::error::DiscError;
-
 /// The disc |L + x| < r.
 ///
 /// It contains -1/GM and the points of the unit circle at the angles 180 deg +- PM from the positive real axis:
@@ -53,6 +51,21 @@ impl MarginDisc {
             radius: centre - end,
         }))
     }
+}
+
+/// A gain margin and a phase margin that no disc contains.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "a phase margin of {:.1} deg needs a gain margin above {least_gain_margin:.2}, not {gain_margin:.2}; raise --gain-margin or lower --phase-margin",
+    phase_margin_rad.to_degrees()
+)]
+pub struct DiscError {
+    /// The gain margin, given or that of the modulus margin.
+    pub gain_margin: f64,
+    /// The phase margin in rad, given or that of the modulus margin.
+    pub phase_margin_rad: f64,
+    /// The smallest gain margin that goes with the phase margin.
+    pub least_gain_margin: f64,
 }
 
 /// Smallest cos PM - 1/GM: the disc reaches at most to about -1/0.05.
