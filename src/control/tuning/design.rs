@@ -1,14 +1,14 @@
-//! A complete design: search, verification on a fine grid, and improvement with the frequencies that the search missed.
+//! A complete design: the search, and the verification of its best results.
 
-use super::binding::{Binding, tightest, valleys};
-use super::bound::{ConvexBound, convex_bound, excluded_plant};
+use super::binding::Binding;
+use super::bound::{ConvexBound, convex_bound};
 use super::cascade::{Cascade, ParameterLimits};
-use super::descent::{Candidate, Problem};
+use super::descent::Problem;
 use super::disturbance::Disturbance;
-use super::error::{Conflict, TuneError};
+use super::error::TuneError;
 use super::figures::{PlantFigures, figures, fine_samples, with_variances};
 use super::plant::DesignPlant;
-use super::requirement::{Goal, Kind, Requirements};
+use super::requirement::Requirements;
 use super::sampled::{SampledPlant, Spacing};
 use super::search::{Effort, search};
 use super::unmodelled::UnmodelledBound;
@@ -70,14 +70,8 @@ const RESERVE: f64 = 1e-3;
 /// Factor of the reserve after a round of verification that finds a missed limit: the valleys between the frequencies of the grid
 /// become flatter with each round, and the reserve deeper.
 const RESERVE_GROWTH: f64 = 1.5;
-/// Rounds of verification and improvement of each candidate.
-const ROUNDS: usize = 10;
 /// Candidates of the search that are verified.
 const VERIFIED: usize = 2;
-/// A goal that is missed by less between the frequencies of the grid is not mended: what is attained counts.
-const GOAL_TOLERANCE: f64 = 2e-3;
-/// Slack up to which a requirement binds.
-const BINDING: f64 = 0.01;
 
 /// Designs a controller.
 ///
@@ -111,14 +105,6 @@ pub fn bound_of(task: &DesignTask, attained: f64) -> Option<ConvexBound> {
     let sampled = task.sampled_operating_points();
     let pairs: Vec<_> = sampled.iter().map(|(plant, at)| (*plant, at)).collect();
     convex_bound(&pairs, &task.bends_rad_s(), &task.requirements, attained)
-}
-
-/// Where a design misses its requirements.
-struct Missed {
-    /// Frequencies in rad/s for each plant.
-    frequencies_rad_s: Vec<Vec<f64>>,
-    /// Whether a limit is missed, and not only the goal.
-    limits: bool,
 }
 
 impl DesignTask {
@@ -160,7 +146,7 @@ impl DesignTask {
     }
 
     /// The modulus margin for which the search designs, after some growths of the reserve.
-    fn margin_with_reserve(&self, growths: i32) -> f64 {
+    pub(super) fn margin_with_reserve(&self, growths: i32) -> f64 {
         let reserve = RESERVE * libm::pow(RESERVE_GROWTH, f64::from(growths));
         self.requirements.modulus_margin * (1.0 + reserve)
     }
@@ -196,59 +182,15 @@ impl DesignTask {
     }
 
     /// The sampled plant with what the requirements need.
-    fn completed(&self, sampled: SampledPlant, plant: &DesignPlant) -> SampledPlant {
+    pub(super) fn completed(&self, sampled: SampledPlant, plant: &DesignPlant) -> SampledPlant {
         match self.requirements.needs_variances() {
             true => with_variances(sampled, plant, &self.disturbance),
             false => sampled,
         }
     }
 
-    /// Where a limit is missed on the fine grid, or the goal by more than [`GOAL_TOLERANCE`].
-    fn missed(&self, cascade: &Cascade, target: f64) -> Missed {
-        let fine = fine_samples(&self.plants, &self.bound, &self.disturbance, cascade);
-        let slacks = self.requirements.slacks(&fine, cascade, target);
-        let mut missed = Missed {
-            frequencies_rad_s: vec![Vec::new(); fine.len()],
-            limits: false,
-        };
-        for slack in valleys(&slacks) {
-            let tolerance = match slack.kind {
-                Kind::Goal => GOAL_TOLERANCE,
-                _ => 0.0,
-            };
-            if slack.value < -tolerance {
-                let omega_rad_s = fine[slack.plant].omega_rad_s[slack.point];
-                missed.frequencies_rad_s[slack.plant].push(omega_rad_s);
-                missed.limits |= slack.kind != Kind::Goal;
-            }
-        }
-        missed
-    }
-
-    /// The candidate after rounds of verification on a fine grid, and of improvement with the frequencies where it misses a limit.
-    fn mended(&self, mut problem: Problem, mut candidate: Candidate) -> Result<Design, TuneError> {
-        let mut growths = 0;
-        for _ in 0..ROUNDS {
-            let target = candidate
-                .target
-                .ok_or_else(|| self.conflict(&problem, &candidate))?;
-            let missed = self.missed(&candidate.cascade.clone().rounded(), target);
-            if missed.frequencies_rad_s.iter().all(Vec::is_empty) {
-                break;
-            }
-            growths += i32::from(missed.limits);
-            self.add_points(&mut problem, &missed.frequencies_rad_s);
-            problem.requirements.modulus_margin = self.margin_with_reserve(growths);
-            candidate = problem.improve(&candidate.cascade, self.effort.final_steps);
-        }
-        match candidate.target {
-            Some(_) => self.verified(candidate.cascade),
-            None => Err(self.conflict(&problem, &candidate)),
-        }
-    }
-
     /// The operating points on the grid of the search.
-    fn sampled_operating_points(&self) -> Vec<(&DesignPlant, SampledPlant)> {
+    pub(super) fn sampled_operating_points(&self) -> Vec<(&DesignPlant, SampledPlant)> {
         let nominal = self.plants.iter().filter(|plant| plant.is_nominal);
         let sampled = nominal.map(|plant| {
             let at = SampledPlant::of(plant, &self.bound, Spacing::Search, &[]);
@@ -258,84 +200,7 @@ impl DesignTask {
     }
 
     /// Frequencies in rad/s where the bound of the unmodelled modes bends.
-    fn bends_rad_s(&self) -> Vec<f64> {
+    pub(super) fn bends_rad_s(&self) -> Vec<f64> {
         self.bound.edges().into_iter().map(|(w, _)| w).collect()
-    }
-
-    /// The design that keeps the modulus margin and attains more.
-    fn better(
-        &self,
-        one: Result<Design, TuneError>,
-        other: Result<Design, TuneError>,
-    ) -> Result<Design, TuneError> {
-        let (first, second) = match (one, other) {
-            (Ok(first), Ok(second)) => (first, second),
-            (Ok(design), Err(_)) | (Err(_), Ok(design)) => return Ok(design),
-            (Err(error), Err(_)) => return Err(error),
-        };
-        let rank = |design: &Design| {
-            let keeps = design
-                .misses_margin(self.requirements.modulus_margin)
-                .is_none();
-            let attained = match self.requirements.goal {
-                Goal::Rms => -design.attained,
-                Goal::Disturbance | Goal::Bandwidth => design.attained,
-            };
-            (keeps, attained)
-        };
-        match rank(&second) > rank(&first) {
-            true => Ok(second),
-            false => Ok(first),
-        }
-    }
-
-    fn add_points(&self, problem: &mut Problem, missed: &[Vec<f64>]) {
-        for (index, added) in missed.iter().enumerate().filter(|(_, w)| !w.is_empty()) {
-            let mut grid = problem.plants[index].omega_rad_s.clone();
-            grid.extend_from_slice(added);
-            grid.sort_by(f64::total_cmp);
-            grid.dedup();
-            let plant = &self.plants[index];
-            let sampled = SampledPlant::at(plant, &self.bound, grid);
-            problem.plants[index] = self.completed(sampled, plant);
-        }
-    }
-
-    fn verified(&self, cascade: Cascade) -> Result<Design, TuneError> {
-        let cascade = cascade.rounded();
-        let fine = fine_samples(&self.plants, &self.bound, &self.disturbance, &cascade);
-        let attained = self.requirements.attained(&fine, &cascade);
-        let figures = figures(&self.plants, &fine, &cascade);
-        if let Some(unstable) = figures.iter().find(|figures| !figures.stable) {
-            return Err(TuneError::Unstable {
-                plant: unstable.plant.clone(),
-            });
-        }
-        let slacks = self.requirements.slacks(&fine, &cascade, attained);
-        Ok(Design {
-            attained,
-            binding: tightest(&slacks, &fine, BINDING),
-            figures,
-            cascade,
-        })
-    }
-
-    /// The two requirements that exclude each other at the best candidate.
-    fn conflict(&self, problem: &Problem, candidate: &Candidate) -> TuneError {
-        let easiest = self.requirements.easiest_target();
-        let cascade = &candidate.cascade;
-        let slacks = self.requirements.slacks(&problem.plants, cascade, easiest);
-        let mut tight = tightest(&slacks, &problem.plants, f64::INFINITY).into_iter();
-        let first = tight.next();
-        let differs = |other: &Binding| first.as_ref().is_some_and(|first| first.differs(other));
-        let second = tight.find(differs);
-        let sampled = self.sampled_operating_points();
-        let pairs: Vec<_> = sampled.iter().map(|(plant, at)| (*plant, at)).collect();
-        TuneError::Conflict(Box::new(Conflict {
-            order: self.order,
-            first,
-            second,
-            excluded_plant: excluded_plant(&pairs, &self.bends_rad_s(), &self.requirements),
-        }))
     }
 }

@@ -8,7 +8,7 @@
 //!                                                                    v
 //!  cascade (parameters are logarithms) <--- subproblem (linear programme) <--- descent (trust region, nyquist)
 //!                                                                    |
-//!                    search (rising order, several starts) -> design (figures on a fine grid, binding requirements)
+//!                    search (rising order, several starts) -> design -> verification (fine grid, binding requirements)
 //! ```
 //!
 //! The controller is evaluated at s = j (2/T) tan(w T/2), where a continuous section has exactly the response of the section that
@@ -38,6 +38,7 @@ mod task;
 mod uncertainty;
 mod unmodelled;
 mod variance;
+mod verification;
 
 pub use binding::Binding;
 pub use bound::ConvexBound;
