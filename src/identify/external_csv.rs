@@ -151,9 +151,29 @@ impl Table<'_> {
 
     fn not_a_table(&self, error: &csv::Error) -> ExternalCsvError {
         let path = self.path.display();
+        if let Some(line) = self.line_of_decimal_commas(error) {
+            return self.invalid_line(
+                line,
+                "has twice the columns of the header, so the numbers seem to have a comma in place of the decimal point; write them as in 0.5",
+            );
+        }
         ExternalCsvError::Data(format!(
             "{path} is not a table with one sample per line: {error}; repair the file"
         ))
+    }
+
+    /// The line with an error, if it has two columns, between commas, for each of the header.
+    fn line_of_decimal_commas(&self, error: &csv::Error) -> Option<u64> {
+        let csv::ErrorKind::UnequalLengths {
+            pos,
+            expected_len,
+            len,
+        } = error.kind()
+        else {
+            return None;
+        };
+        let is_doubled = separator(&self.text) == b',' && *len == 2 * expected_len;
+        is_doubled.then(|| pos.as_ref().map_or(0, csv::Position::line))
     }
 
     /// An error at a line of the file.

@@ -47,6 +47,27 @@ fn rejects_a_decimal_comma_with_the_remedy() {
 }
 
 #[test]
+fn rejects_decimal_commas_between_commas_with_the_remedy() {
+    let header_line = |line: &str| line.starts_with("time");
+    let lines = valid();
+    let lines = lines.lines().map(|line| match header_line(line) {
+        true => format!("{line}\n"),
+        false => {
+            let cells = line.split(',').map(|cell| match cell.contains('.') {
+                true => cell.replace('.', ","),
+                false => format!("{cell},0"),
+            });
+            cells.collect::<Vec<_>>().join(",") + "\n"
+        }
+    });
+    let answer = identify(lines.collect::<String>(), "--time time_s");
+    assert_eq!(answer.code, 1, "{answer:?}");
+    for word in ["line 2", "twice the columns", "decimal point"] {
+        assert!(answer.err.contains(word), "{word}: {}", answer.err);
+    }
+}
+
+#[test]
 fn rejects_options_that_do_not_match_the_file() {
     for (more, words) in [
         (
