@@ -1,6 +1,6 @@
 //! Motion of the output at the first and at the last sample of a record.
 
-use super::Defect;
+use super::defect::Defect;
 use crate::identify::Signals;
 
 /// Samples at each end from which its velocity is determined, and number of such intervals.

@@ -3,7 +3,7 @@
 //! A run of L equal samples in a record of n is a defect if n p^L is below 1e-6, with p the ratio of equal neighbours, and the input
 //! changes meanwhile.
 
-use super::Defect;
+use super::defect::Defect;
 use crate::identify::Signals;
 
 /// A repeated sample occurs at least this many times in succession ...

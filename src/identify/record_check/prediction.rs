@@ -14,7 +14,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::Defect;
+use super::defect::Defect;
 use crate::identify::Signals;
 use crate::identify::mean;
 

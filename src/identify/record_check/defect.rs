@@ -1,0 +1,79 @@
+//! The kinds of defects of a record, and their messages.
+
+use std::fmt;
+
+/// A defect of a record. Times are in seconds from its first sample, heights in units of the output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Defect {
+    /// A few samples are far off.
+    Spike {
+        /// Time of the first one.
+        time_s: f64,
+        /// By how much.
+        height: f64,
+    },
+    /// The output jumps.
+    Step {
+        /// Time of the first sample after the jump.
+        time_s: f64,
+        /// By how much.
+        height: f64,
+    },
+    /// The output keeps its value for some samples.
+    Repeated {
+        /// Time of the first one.
+        time_s: f64,
+        /// Number of samples.
+        samples: usize,
+    },
+    /// The output stays at its largest or smallest value.
+    Clipped {
+        /// Time of the first sample at that value.
+        time_s: f64,
+        /// The value.
+        value: f64,
+    },
+    /// The output moves at the beginning.
+    MovingAtStart {
+        /// Its velocity over the RMS velocity of the record.
+        ratio: f64,
+    },
+    /// The output moves at the end.
+    MovingAtEnd {
+        /// Its velocity over the RMS velocity of the record.
+        ratio: f64,
+    },
+}
+
+impl fmt::Display for Defect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Defect::Spike { time_s, height } => write!(
+                f,
+                "the output has a spike of {height:.3e} at {time_s:.4} s; replace these samples by interpolation"
+            ),
+            Defect::Step { time_s, height } => write!(
+                f,
+                "the output jumps by {height:.3e} at {time_s:.4} s; subtract the jump from the samples after it, or repeat the record"
+            ),
+            Defect::Repeated { time_s, samples } => write!(
+                f,
+                "{samples} samples of the output from {time_s:.4} s on have the same value; check the probe and its connection, and repeat the record"
+            ),
+            Defect::Clipped { time_s, value } => write!(
+                f,
+                "the output is clipped at {value:.6e}, for the first time at {time_s:.4} s; lower the amplitude, or extend the range of the probe"
+            ),
+            Defect::MovingAtStart { ratio } => write!(
+                f,
+                "the output moves at the first sample, with {:.0} % of its RMS velocity; begin the record before the excitation, with the plant at rest, or give --period if it is periodic",
+                100.0 * ratio
+            ),
+            Defect::MovingAtEnd { ratio } => write!(
+                f,
+                "the output still moves at the last sample, with {:.0} % of its RMS velocity; record for longer after the excitation, until the plant is at rest, or give --period if it is periodic",
+                100.0 * ratio
+            ),
+        }
+    }
+}
