@@ -25,8 +25,7 @@ macro_rules! embedded {
 }
 
 /// All embedded profiles. To add one, add its file and its name here.
-pub const PROFILES: &[EmbeddedFile] =
-    embedded!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab");
+pub const PROFILES: &[EmbeddedFile] = embedded!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab", "stage-step", "stage-tracking");
 
 /// All embedded controllers. To add one, add its file and its name here.
 pub const CONTROLLERS: &[EmbeddedFile] = embedded!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass", "stage-disturbance", "lab-disturbance");

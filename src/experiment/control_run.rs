@@ -75,14 +75,15 @@ pub struct PredictedSine {
 }
 
 impl PredictedSine {
-    /// The response at the frequency of a sine reference; `None` for another reference, and for an unstable loop.
+    /// The response at the frequency of a sine reference; `None` for another reference, for an unstable loop, and with a feedforward
+    /// current, whose gain is 1 by the model.
     pub fn of(
         config: &Config,
         closed_loop: &ClosedLoop,
         margins: &Margins,
     ) -> Option<PredictedSine> {
         let frequency_hz = config.control.reference.design().sine_hz()?;
-        if !margins.stable {
+        if !margins.stable || !config.control.feedforward.is_none() {
             return None;
         }
         let response = closed_loop.complementary_sensitivity(rad_s(frequency_hz));

@@ -130,3 +130,29 @@ fn prefilter_removes_the_overshoot_of_the_step() {
     let (without, with) = (overshoot(""), overshoot("--prefilter 10Hz"));
     assert!(without > 1.0 && with < 0.5 * without, "{with} of {without}");
 }
+
+#[test]
+fn profile_stage_tracking_follows_a_sine_without_lag() {
+    let bench = Bench::new();
+    let (answer, _) = run(&bench, "--config stage-tracking --no-report");
+    let sine = &answer["measured"]["sine"];
+    let (gain, phase_deg) = (number(&sine["gain"]), number(&sine["phase_deg"]));
+    // Three times the uncertainty that the run prints: 0.0003 and 0.02 deg. The fast loop alone has 0.66 and -23 deg.
+    assert!((gain - 1.0).abs() < 1e-3, "{gain}");
+    assert!(phase_deg.abs() < 0.06, "{phase_deg}");
+    assert!(answer["predicted"]["sine"].is_null(), "{answer}");
+}
+
+#[test]
+fn profile_stage_step_settles_at_0_and_8_percent_within_16_ms() {
+    let bench = Bench::new();
+    for point in ["0%", "8%"] {
+        let arguments = format!("--config stage-step --operating-point {point} --no-report");
+        let (answer, _) = run(&bench, &arguments);
+        let settling_s = number(&answer["measured"]["settling_time_s"]);
+        assert!(
+            (0.004..0.016).contains(&settling_s),
+            "{point}: {settling_s}"
+        );
+    }
+}
