@@ -41,6 +41,8 @@ const WIDEST: f64 = 0.6;
 const NARROWEST: f64 = 1e-5;
 /// First, largest and smallest relative change of the target.
 const STRIDES: (f64, f64, f64) = (0.2, 0.5, 5e-4);
+/// Relative concessions of the target while a missed limit is regained.
+const CONCESSIONS: [f64; 3] = [0.003, 0.01, 0.04];
 /// A rise of the slack that is too small to continue.
 const LEAST_RISE: f64 = 1e-6;
 /// Slacks that are larger than the smallest one by this are not linearised; the trust region takes account of them.
@@ -76,6 +78,25 @@ impl Problem {
             target: Some(target),
             slack: 0.0,
         }
+    }
+
+    /// Improves a cascade that attains a target, but misses a limit by a little: the target is kept as far as possible while the
+    /// limit is regained, since a cascade that gives it up may end at a lower one.
+    pub fn mend(&self, start: &Cascade, target: f64, steps: usize) -> Candidate {
+        for concession in CONCESSIONS {
+            let mut walk = Walk::new(self, steps);
+            let eased = self.requirements.harder(target, -concession);
+            let ascent = walk.ascend(start.clone(), eased);
+            if ascent.slack >= 0.0 {
+                let (cascade, target) = walk.raise(ascent.cascade, eased);
+                return Candidate {
+                    cascade,
+                    target: Some(target),
+                    slack: 0.0,
+                };
+            }
+        }
+        self.improve(start, steps)
     }
 
     /// Tightens the limits of |S| from those that the cascade fulfils to the required ones. Gives the factor of the limits that remains,

@@ -66,7 +66,7 @@ impl DesignTask {
             growths += i32::from(missed.limits);
             self.add_points(&mut problem, &missed.frequencies_rad_s);
             problem.requirements.modulus_margin = self.margin_with_reserve(growths);
-            candidate = problem.improve(&candidate.cascade, self.effort.final_steps);
+            candidate = problem.mend(&candidate.cascade, target, self.effort.final_steps);
         }
         match candidate.target {
             Some(_) => self.verified(candidate.cascade),
