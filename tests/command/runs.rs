@@ -142,17 +142,3 @@ fn profile_stage_tracking_follows_a_sine_without_lag() {
     assert!(phase_deg.abs() < 0.06, "{phase_deg}");
     assert!(answer["predicted"]["sine"].is_null(), "{answer}");
 }
-
-#[test]
-fn profile_stage_step_settles_at_0_and_8_percent_within_16_ms() {
-    let bench = Bench::new();
-    for point in ["0%", "8%"] {
-        let arguments = format!("--config stage-step --operating-point {point} --no-report");
-        let (answer, _) = run(&bench, &arguments);
-        let settling_s = number(&answer["measured"]["settling_time_s"]);
-        assert!(
-            (0.004..0.016).contains(&settling_s),
-            "{point}: {settling_s}"
-        );
-    }
-}
