@@ -21,6 +21,9 @@ use crate::experiment::tracking::steady_tick;
 use crate::recording::{Recording, RecordingError};
 use crate::util::units::rad_s;
 
+/// Least length of the steady state in seconds: ten segments of the spectrum, which give each band to about 30 %.
+const LEAST_STEADY_S: f64 = 10.0;
+
 /// A recording from which no disturbance can be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum DisturbanceError {
@@ -45,7 +48,7 @@ pub enum DisturbanceError {
     Tripped(String),
     /// Too short for a spectrum.
     #[error(
-        "the steady state in {0} is too short for a spectrum; repeat `bench control --reference hold` with --duration 20s or longer"
+        "the steady state in {0} is shorter than 10 s, too short for a spectrum; repeat `bench control --reference hold` with --duration 20s or longer"
     )]
     TooShort(String),
 }
@@ -80,8 +83,12 @@ pub fn recorded_disturbance(
     let closed_loop = closed_loop_of(controller, config)?;
     let signals = ClosedSignals::of(recording)?;
     let steady = steady_tick(&config.control, rate_hz) as usize;
-    let spectrum = error_spectrum(&signals, steady, rate_hz, None)
-        .ok_or_else(|| DisturbanceError::TooShort(file.into()))?;
+    let too_short = || DisturbanceError::TooShort(file.into());
+    let steady_s = signals.error_m.len().saturating_sub(steady) as f64 / rate_hz;
+    if steady_s < LEAST_STEADY_S {
+        return Err(too_short());
+    }
+    let spectrum = error_spectrum(&signals, steady, rate_hz, None).ok_or_else(too_short)?;
     let noise_m2_per_hz = 2.0 * noise_rms_m * noise_rms_m / rate_hz;
     let rows = spectrum.frequency_hz.iter().zip(&spectrum.measured);
     let densities = rows.map(|(frequency_hz, error_m2_per_hz)| {
