@@ -66,10 +66,7 @@ impl Design {
 }
 
 /// The search designs for a modulus margin that is larger by this ratio, so that rounding and the grid cost nothing.
-const RESERVE: f64 = 1e-3;
-/// Factor of the reserve after a round of verification that finds a missed limit: the valleys between the frequencies of the grid
-/// become flatter with each round, and the reserve deeper.
-const RESERVE_GROWTH: f64 = 1.5;
+pub(super) const RESERVE: f64 = 1e-3;
 /// Candidates of the search that are verified.
 const VERIFIED: usize = 2;
 
@@ -137,7 +134,7 @@ impl DesignTask {
         Problem {
             plants: plants.collect(),
             requirements: Requirements {
-                modulus_margin: self.margin_with_reserve(0),
+                modulus_margin: self.margin_with_reserve(RESERVE),
                 ..self.requirements.clone()
             },
             limits: self.limits,
@@ -145,10 +142,9 @@ impl DesignTask {
         }
     }
 
-    /// The modulus margin for which the search designs, after some growths of the reserve.
-    pub(super) fn margin_with_reserve(&self, growths: i32) -> f64 {
-        let reserve = RESERVE * libm::pow(RESERVE_GROWTH, f64::from(growths));
-        self.requirements.modulus_margin * (1.0 + reserve)
+    /// The modulus margin for which the search designs, larger by a reserve.
+    pub(super) fn margin_with_reserve(&self, reserve_ratio: f64) -> f64 {
+        self.requirements.modulus_margin * (1.0 + reserve_ratio)
     }
 
     /// The problem with the variations of the first and of the last operating point only, and all operating points themselves.

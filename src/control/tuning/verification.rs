@@ -4,7 +4,7 @@ use super::binding::{Binding, tightest, valleys};
 use super::bound::excluded_plant;
 use super::cascade::Cascade;
 use super::descent::{Candidate, Problem};
-use super::design::{Design, DesignTask};
+use super::design::{Design, DesignTask, RESERVE};
 use super::error::{Conflict, TuneError};
 use super::figures::{figures, fine_samples};
 use super::requirement::{Goal, Kind};
@@ -12,6 +12,9 @@ use super::sampled::SampledPlant;
 
 /// Rounds of verification and improvement of each candidate.
 const ROUNDS: usize = 10;
+/// In each round the reserve grows by what a limit is missed by, but at most by this ratio: a deep valley between the frequencies of
+/// the grid is mended by its new frequency, and not by the reserve.
+const MOST_GROWTH: f64 = 2e-3;
 /// A goal that is missed by less between the frequencies of the grid is not mended: what is attained counts.
 const GOAL_TOLERANCE: f64 = 2e-3;
 /// Slack up to which a requirement binds.
@@ -21,8 +24,8 @@ const BINDING: f64 = 0.01;
 struct Missed {
     /// Frequencies in rad/s for each plant.
     frequencies_rad_s: Vec<Vec<f64>>,
-    /// Whether a limit is missed, and not only the goal.
-    limits: bool,
+    /// By how much the worst limit is missed, relative to it; 0 if only the goal is missed.
+    worst_ratio: f64,
 }
 
 impl DesignTask {
@@ -32,7 +35,7 @@ impl DesignTask {
         let slacks = self.requirements.slacks(&fine, cascade, target);
         let mut missed = Missed {
             frequencies_rad_s: vec![Vec::new(); fine.len()],
-            limits: false,
+            worst_ratio: 0.0,
         };
         for slack in valleys(&slacks) {
             let tolerance = match slack.kind {
@@ -42,7 +45,9 @@ impl DesignTask {
             if slack.value < -tolerance {
                 let omega_rad_s = fine[slack.plant].omega_rad_s[slack.point];
                 missed.frequencies_rad_s[slack.plant].push(omega_rad_s);
-                missed.limits |= slack.kind != Kind::Goal;
+                if slack.kind != Kind::Goal {
+                    missed.worst_ratio = missed.worst_ratio.max(-slack.value);
+                }
             }
         }
         missed
@@ -54,7 +59,7 @@ impl DesignTask {
         mut problem: Problem,
         mut candidate: Candidate,
     ) -> Result<Design, TuneError> {
-        let mut growths = 0;
+        let mut reserve_ratio = RESERVE;
         for _ in 0..ROUNDS {
             let target = candidate
                 .target
@@ -63,9 +68,9 @@ impl DesignTask {
             if missed.frequencies_rad_s.iter().all(Vec::is_empty) {
                 break;
             }
-            growths += i32::from(missed.limits);
+            reserve_ratio += missed.worst_ratio.min(MOST_GROWTH);
             self.add_points(&mut problem, &missed.frequencies_rad_s);
-            problem.requirements.modulus_margin = self.margin_with_reserve(growths);
+            problem.requirements.modulus_margin = self.margin_with_reserve(reserve_ratio);
             candidate = problem.mend(&candidate.cascade, target, self.effort.final_steps);
         }
         match candidate.target {
