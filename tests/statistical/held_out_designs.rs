@@ -52,14 +52,7 @@ fn profile(name: &str) -> Config {
 fn designed(config: &Config) -> Result<Design, TuneError> {
     let plant = NamedPlant::of("the plant", &config.plant).unwrap();
     let options = DesignOptions {
-        requirements: Requirements {
-            goal: Goal::Disturbance,
-            modulus_margin: MODULUS_MARGIN,
-            max_sensitivity: Vec::new(),
-            max_control_sensitivity_a_per_m: None,
-            margin_disc: None,
-            max_current_rms_a: None,
-        },
+        requirements: Requirements::new(Goal::Disturbance, MODULUS_MARGIN),
         tolerances: Tolerances {
             frequency_ratio: 0.01,
             damping_factor: 0.7,

@@ -23,14 +23,7 @@ const SETS: [&str; 2] = ["chirp.duration_s=60", "chirp.start_hz=0.2"];
 
 fn options() -> DesignOptions {
     DesignOptions {
-        requirements: Requirements {
-            goal: Goal::Disturbance,
-            modulus_margin: 0.5,
-            max_sensitivity: Vec::new(),
-            max_control_sensitivity_a_per_m: None,
-            margin_disc: None,
-            max_current_rms_a: None,
-        },
+        requirements: Requirements::new(Goal::Disturbance, 0.5),
         tolerances: Tolerances {
             frequency_ratio: 0.01,
             damping_factor: 0.7,

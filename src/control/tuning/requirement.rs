@@ -145,6 +145,18 @@ impl Loop {
 const LEAST_DISTANCE: f64 = 1e-3;
 
 impl Requirements {
+    /// A goal and a modulus margin, without other limits.
+    pub fn new(goal: Goal, modulus_margin: f64) -> Requirements {
+        Requirements {
+            goal,
+            modulus_margin,
+            max_sensitivity: Vec::new(),
+            max_control_sensitivity_a_per_m: None,
+            margin_disc: None,
+            max_current_rms_a: None,
+        }
+    }
+
     /// The slack of all requirements for a target of the goal: ws or wb in rad/s, or the standard deviation in metres.
     pub fn slacks(&self, plants: &[SampledPlant], cascade: &Cascade, target: f64) -> Vec<Slack> {
         let mut slacks = Vec::new();
