@@ -45,6 +45,8 @@ mod table;
 mod tune;
 mod tune_measured;
 mod tune_output;
+mod tune_plants;
+mod tune_values;
 mod value_range;
 
 pub use crate::experiment::ErrorKind;

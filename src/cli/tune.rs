@@ -1,9 +1,6 @@
 //! `bench tune`: designs a controller.
 
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
-
-use clap::ValueEnum;
 
 use super::error::CliError;
 use super::help::GLOSSARY;
@@ -12,20 +9,26 @@ use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
 use super::tune_measured::{self, SourceOptions};
-use super::tune_output::{Certificate, Extras, OppositeAsymmetry, text};
+use super::tune_output::text;
+use super::tune_plants::{ModelOptions, model_plants};
+use super::tune_values::{
+    GoalName, factor, gain_margin, margin, phase_margin_deg, positive, sensitivity_limit,
+};
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, DisturbanceSpectrum, Effort, Goal, MarginDisc,
-    NamedPlant, PlantFigures, Requirements, SensitivityLimit, Tolerances, bound_of, design,
-    evaluate, loop_curves,
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
+    Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
 };
-use crate::experiment::tuning::{IdentifiedFrf, TuneSourceError, evidence, recorded_disturbance};
+use crate::experiment::tuning::{
+    DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
+    recorded_disturbance,
+};
 use crate::model::plant::SignalPath;
 use crate::recording::Recording;
-use crate::report::{DesignLimits, ReportError, design_loop_svg, design_nyquist_svg};
+use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
-use crate::util::quantity::{AngularFrequency, OfRatio, OperatingPoint, si};
+use crate::util::quantity::{OfRatio, OperatingPoint, si};
 use crate::util::units::UM_PER_M;
 
 /// What is designed, and for which plants.
@@ -98,105 +101,11 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
-/// The goal as typed.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum GoalName {
-    /// Largest slope bandwidth.
-    Disturbance,
-    /// Largest sensitivity bandwidth.
-    Bandwidth,
-    /// Smallest standard deviation of the error.
-    Rms,
-}
-
-impl From<GoalName> for Goal {
-    fn from(name: GoalName) -> Goal {
-        match name {
-            GoalName::Disturbance => Goal::Disturbance,
-            GoalName::Bandwidth => Goal::Bandwidth,
-            GoalName::Rms => Goal::Rms,
-        }
-    }
-}
-
-fn number(text: &str) -> Result<f64, String> {
-    let number = f64::from_str(text).ok().filter(|number| number.is_finite());
-    number.ok_or_else(|| format!("`{text}` is not a number; give one, such as 0.5"))
-}
-
-/// A modulus margin. For clap.
-fn margin(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (0.05..=0.95).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 0.05 and 0.95; a usual value is 0.5"
-        )),
-    }
-}
-
-/// A gain margin. For clap.
-fn gain_margin(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (1.01..=100.0).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 1.01 and 100; a usual value is 2"
-        )),
-    }
-}
-
-/// A phase margin in degrees. For clap.
-fn phase_margin_deg(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (1.0..=80.0).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 1 and 80; a usual value is 40"
-        )),
-    }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    match value > 0.0 {
-        true => Ok(value),
-        false => Err(format!("{value} is not positive; give a limit above 0")),
-    }
-}
-
-fn factor(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    match (0.01..=1.0).contains(&value) {
-        true => Ok(value),
-        false => Err(format!(
-            "{value} is not between 0.01 and 1; 1 leaves the damping unchanged"
-        )),
-    }
-}
-
-/// A limit such as `0.141@10rad/s`. For clap.
-fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> {
-    let form = "give a ratio and a frequency, as in 0.141@10rad/s";
-    let (magnitude, frequency) = text
-        .split_once('@')
-        .ok_or_else(|| format!("`{text}` has no @; {form}"))?;
-    let frequency: AngularFrequency = frequency.parse().map_err(|e| format!("{e}; {form}"))?;
-    let omega_rad_s = frequency.si();
-    match omega_rad_s > 0.0 {
-        true => Ok(SensitivityLimit {
-            magnitude: positive(magnitude)?,
-            omega_rad_s,
-        }),
-        false => Err(format!("`{text}`: the frequency is not positive; {form}")),
-    }
-}
-
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.configuration()?;
     let progress = Progress::new("tune");
     let line = ProgressLine::show(&progress);
-    let goal = args.goal.into();
+    let goal = Goal::from(args.goal);
     let sources = &args.sources;
     let frfs = sources.identified(&args.bench, goal, &config, &progress)?;
     let remarks = tune_measured::remarks(&frfs);
@@ -213,13 +122,15 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         true => opposite_asymmetry(args, &config, &task, &design)?,
         false => None,
     };
-    let extras = Extras {
+    let disturbance = args.disturbance.as_ref();
+    let extras = DesignExtras {
         bound,
         opposite,
         frfs: evidence,
+        disturbance: disturbance.map(|file| file.display().to_string()),
         remarks,
     };
-    let certificate = Certificate::new(args.bench.profile(), &config, &task, &design, extras);
+    let certificate = DesignCertificate::new(args.bench.profile(), &config, &task, &design, extras);
     write(args, &task, &design, &certificate)?;
     print_result(args.bench.json, &certificate, |certificate| {
         text(certificate, args.explain, &args.out)
@@ -228,7 +139,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let missed = missed.map(|figures| missed_margin(figures, args.modulus_margin));
     let mut failures: Vec<String> = missed.into_iter().collect();
     failures.extend(tune_measured::failures(
-        certificate.frfs(),
+        &certificate.extras.frfs,
         args.modulus_margin,
     ));
     warn(&failures);
@@ -258,23 +169,30 @@ fn task(args: &Args, frfs: &[IdentifiedFrf], config: &Config) -> Result<DesignTa
     let options = options(args)?;
     Ok(match frfs.is_empty() {
         true => {
-            let task = DesignTask::new(config, &plants(args, config, &[])?, options)?;
-            let noise_rms_m = task.disturbance.noise_rms_m;
-            task.with_disturbance(disturbance(args, noise_rms_m)?)
+            let plants = model_plants(&model_options(args), config, &[])?;
+            let task = DesignTask::new(config, &plants, options)?;
+            match &args.disturbance {
+                Some(file) => with_recorded_disturbance(task, file)?,
+                None => task,
+            }
         }
         false => DesignTask::measured(&tune_measured::plants(frfs), options)?,
     })
 }
 
-/// The spectrum in the recording of --disturbance.
-fn disturbance(args: &Args, noise_rms_m: f64) -> Result<Option<DisturbanceSpectrum>, CliError> {
-    let Some(file) = &args.disturbance else {
-        return Ok(None);
-    };
+fn model_options(args: &Args) -> ModelOptions<'_> {
+    ModelOptions {
+        bench: &args.bench,
+        operating_points: &args.operating_points,
+    }
+}
+
+/// The task with the disturbance of a recording.
+fn with_recorded_disturbance(task: DesignTask, file: &Path) -> Result<DesignTask, CliError> {
     let recording = Recording::open(file)?;
     let name = file.display().to_string();
-    let spectrum = recorded_disturbance(&recording, &name, noise_rms_m);
-    Ok(Some(spectrum.map_err(TuneSourceError::from)?))
+    let spectrum = recorded_disturbance(&recording, &name, task.disturbance.noise_rms_m);
+    Ok(task.with_disturbance(spectrum.map_err(TuneSourceError::from)?))
 }
 
 fn missed_margin(figures: &PlantFigures, least: f64) -> String {
@@ -290,7 +208,7 @@ fn options(args: &Args) -> Result<DesignOptions, CliError> {
         .map_err(|e| CliError::Usage(e.to_string()))?;
     Ok(DesignOptions {
         requirements: Requirements {
-            goal: args.goal.into(),
+            goal: Goal::from(args.goal),
             modulus_margin: args.modulus_margin,
             max_sensitivity: args.max_sensitivity.clone(),
             max_control_sensitivity_a_per_m: args
@@ -326,7 +244,7 @@ fn opposite_asymmetry(
         return Ok(None);
     };
     let setting = OptionSetting::new("plant.mass_asymmetry", asymmetry, "--explain");
-    let plants = plants(args, config, &[setting])?;
+    let plants = model_plants(&model_options(args), config, &[setting])?;
     let path = SignalPath::from(config);
     let plants = plants.into_iter();
     let plants: Vec<_> = plants
@@ -338,79 +256,12 @@ fn opposite_asymmetry(
     }))
 }
 
-/// The plant at each operating point, or the configured one if it has none; `more` are further settings.
-fn plants(
-    args: &Args,
-    config: &Config,
-    more: &[OptionSetting],
-) -> Result<Vec<NamedPlant>, CliError> {
-    if args.bench.operating_point.is_some() {
-        return Err(CliError::Usage(
-            "--operating-point is one point, but a design is for several ones; use --operating-points".into(),
-        ));
-    }
-    let points_m = points_m(args, config)?;
-    if points_m.is_empty() {
-        let plant = args.bench.load(Purpose::Model, more)?.plant;
-        return Ok(vec![NamedPlant::of("the plant", &plant)?]);
-    }
-    let plants = points_m
-        .into_iter()
-        .map(|point_m| plant_at(args, point_m, more));
-    plants.collect()
-}
-
-/// The operating points in metres; none for a plant without them.
-fn points_m(args: &Args, config: &Config) -> Result<Vec<f64>, CliError> {
-    const COUNT: u32 = 5;
-    let configured = config.plant.operating_point_m();
-    let usage = |error: crate::util::quantity::QuantityError| CliError::Usage(error.to_string());
-    match (args.operating_points.is_empty(), configured) {
-        (true, Some(end_m)) => {
-            let parts = f64::from(COUNT - 1);
-            Ok((0..COUNT).map(|i| end_m * f64::from(i) / parts).collect())
-        }
-        (true, None) => Ok(Vec::new()),
-        (false, None) => Err(CliError::Usage(format!(
-            "--operating-points is not for the model `{}`, which has no operating point; leave it out",
-            config.plant.model()
-        ))),
-        (false, Some(_)) => {
-            let length_m = config.plant.beam_length_m();
-            let points = args.operating_points.iter();
-            points
-                .map(|point| point.metres(length_m).map_err(usage))
-                .collect()
-        }
-    }
-}
-
-fn plant_at(args: &Args, point_m: f64, more: &[OptionSetting]) -> Result<NamedPlant, CliError> {
-    let mut settings = more.to_vec();
-    settings.push(OptionSetting::new(
-        "plant.operating_point_m",
-        point_m,
-        "--operating-points",
-    ));
-    let plant = args.bench.load(Purpose::Model, &settings)?.plant;
-    let name = match plant.beam_length_m() {
-        Some(length_m) => format!("{} % of L", rounded_percent(point_m / length_m)),
-        None => format!("{} mm", point_m * 1e3),
-    };
-    Ok(NamedPlant::of(&name, &plant)?)
-}
-
-/// A ratio in percent without the rounding of its division.
-fn rounded_percent(ratio: f64) -> f64 {
-    (ratio * 1e6).round() / 1e4
-}
-
 /// Writes all files of the design.
 fn write(
     args: &Args,
     task: &DesignTask,
     design: &Design,
-    certificate: &Certificate,
+    certificate: &DesignCertificate,
 ) -> Result<(), CliError> {
     let failed = |what: String| CliError::Failed(what);
     std::fs::create_dir_all(&args.out).map_err(|e| cannot_write(&args.out, &e))?;
@@ -422,7 +273,12 @@ fn write(
     let picture = |svg: Result<String, ReportError>| svg.map_err(|e| failed(e.to_string()));
     let loop_svg = picture(design_loop_svg(&curves, limits, &title))?;
     let nyquist_svg = picture(design_nyquist_svg(&curves, limits, &title))?;
-    let page = certificate.page(&loop_svg, &nyquist_svg);
+    let page = DesignPage {
+        certificate,
+        loop_svg: &loop_svg,
+        nyquist_svg: &nyquist_svg,
+    };
+    let page = page.html();
     let files = [
         ("controller.toml", certificate.controller_file()),
         ("certificate.json", json + "\n"),

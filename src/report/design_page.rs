@@ -3,11 +3,13 @@
 use super::html::{document_with_plots, escaped, facts, note, picture, row, section, table};
 use super::number::interval;
 use crate::control::tuning::{Binding, PlantFigures};
-use crate::experiment::tuning::{FrfEvidence, ModeRole};
+use crate::experiment::tuning::{DesignCertificate, FrfEvidence, ModeRole};
 use crate::util::units::UM_PER_M;
 
-const FIGURES_NOTE: &str = "Modulus margin: smallest distance of L from -1, with everything that the plant lacks at its most \
-    unfavourable phase. Slope: largest frequency w_s with |S(jw)| ≤ 0.707 w/w_s for all w ≤ w_s. Bandwidth: up to it |S| ≤ 0.707.";
+const FIGURES_NOTE: &str = "Margin: modulus margin, the smallest distance of L from -1 with everything that the plant lacks at its \
+    most unfavourable phase. Slope: largest frequency w_s in rad/s with |S(jw)| ≤ 0.707 w/w_s for all w ≤ w_s. Bandwidth: in rad/s, up \
+    to it |S| ≤ 0.707. |S| at 10: at 10 rad/s. |KS|: its largest value. Rms: error and current under the disturbance and the noise. Gain \
+    margin, phase: without what the plant lacks.";
 const BINDING_NOTE: &str =
     "Requirements that are fulfilled with almost no slack, the tightest first.";
 const FRF_NOTE: &str = "Lower margin: smallest |1 + L| − 2.448 σ |C| over the measured frequencies, with σ the standard deviation of \
@@ -18,37 +20,25 @@ const NYQUIST_CAPTION: &str =
 /// Rows of the table of binding requirements.
 const BINDING_ROWS: usize = 20;
 
-/// What the page shows.
+/// A design with its plots.
 #[derive(Clone, Copy, Debug)]
 pub struct DesignPage<'a> {
-    /// Controller, goal and margin in a line.
-    pub title: &'a str,
-    /// Names and values of goal, limits and settings of the search.
-    pub facts: &'a [(String, String)],
-    /// Distance to the convex bound, if it was computed.
-    pub bound: Option<&'a str>,
-    /// The figures of each plant.
-    pub plants: &'a [PlantFigures],
-    /// Requirements that limit the design.
-    pub binding: &'a [Binding],
-    /// The measured responses, of a design from them.
-    pub frfs: &'a [FrfEvidence],
-    /// Remarks, for example about uncertain signs.
-    pub remarks: &'a [String],
+    /// The design.
+    pub certificate: &'a DesignCertificate,
     /// |L|, |S| and |KS| as SVG.
     pub loop_svg: &'a str,
     /// Nyquist plot as SVG.
     pub nyquist_svg: &'a str,
-    /// The controller file.
-    pub controller: &'a str,
 }
 
 impl DesignPage<'_> {
     /// The page as an HTML document.
     pub fn html(&self) -> String {
+        let title = self.certificate.title();
+        let remarks = self.certificate.extras.remarks.iter();
         let body = [
-            format!("<h1>{}</h1>\n", escaped(self.title)),
-            self.remarks.iter().map(|text| note(text)).collect(),
+            format!("<h1>{}</h1>\n", escaped(&title)),
+            remarks.map(|text| note(text)).collect(),
             section("Goal and limits", &self.goal()),
             self.measured(),
             self.figures(),
@@ -63,45 +53,41 @@ impl DesignPage<'_> {
             ),
             section(
                 "Controller",
-                &format!("<pre>{}</pre>\n", escaped(self.controller)),
+                &format!(
+                    "<pre>{}</pre>\n",
+                    escaped(&self.certificate.controller_file())
+                ),
             ),
         ];
-        document_with_plots(self.title, &body.concat())
+        document_with_plots(&title, &body.concat())
     }
 
     fn goal(&self) -> String {
-        let bound = self.bound.map_or(String::new(), note);
-        facts(self.facts) + &bound
+        let certificate = self.certificate;
+        let bound = certificate.extras.bound.as_ref();
+        let bound = bound.map(|bound| note(&bound.sentence(certificate.attained)));
+        facts(&settings(certificate)) + &bound.unwrap_or_default()
     }
 
     fn figures(&self) -> String {
-        let header = [
-            "Plant",
-            "Modulus margin",
-            "Slope (rad/s)",
-            "Bandwidth (rad/s)",
-            "|S| at 10 rad/s",
-            "|KS| (A/µm)",
-            "Error rms (µm)",
-        ];
-        let rows: String = self.plants.iter().map(figures_row).collect();
-        section("Plants", &(note(FIGURES_NOTE) + &table(&header, &rows)))
+        let rows = self.certificate.plants.iter();
+        let rows: String = rows.map(|plant| row(&plant_cells(plant))).collect();
+        section(
+            "Plants",
+            &(note(FIGURES_NOTE) + &table(&PLANT_COLUMNS, &rows)),
+        )
     }
 
     fn limits(&self) -> String {
-        let header = ["Requirement", "Plant", "Frequency (rad/s)", "Slack (%)"];
-        let rows: String = self
-            .binding
-            .iter()
-            .take(BINDING_ROWS)
-            .map(binding_row)
-            .collect();
-        let body = note(BINDING_NOTE) + &table(&header, &rows);
+        let rows = self.certificate.binding.iter().take(BINDING_ROWS);
+        let rows: String = rows.map(|binding| row(&binding_cells(binding))).collect();
+        let body = note(BINDING_NOTE) + &table(&BINDING_COLUMNS, &rows);
         section("What limits the design", &body)
     }
 
     fn measured(&self) -> String {
-        if self.frfs.is_empty() {
+        let frfs = &self.certificate.extras.frfs;
+        if frfs.is_empty() {
             return String::new();
         }
         let header = [
@@ -114,9 +100,8 @@ impl DesignPage<'_> {
             "Modes used with sign (Hz)",
             "Tolerated above the band (µm/A)",
         ];
-        let rows: String = self.frfs.iter().map(frf_row).collect();
-        let files: Vec<(String, String)> = self
-            .frfs
+        let rows: String = frfs.iter().map(frf_row).collect();
+        let files: Vec<(String, String)> = frfs
             .iter()
             .map(|frf| {
                 (
@@ -130,34 +115,105 @@ impl DesignPage<'_> {
     }
 }
 
-fn figures_row(figures: &PlantFigures) -> String {
-    row(&[
+/// Goal, limits and settings of the search.
+fn settings(certificate: &DesignCertificate) -> Vec<(String, String)> {
+    let requirements = &certificate.requirements;
+    let mut facts = vec![
+        ("Goal".into(), certificate.goal_text()),
+        (
+            "Modulus margin".into(),
+            format!(
+                "at least {}, attained {:.4}",
+                requirements.modulus_margin, certificate.modulus_margin
+            ),
+        ),
+    ];
+    facts.extend(requirements.max_sensitivity.iter().map(|limit| {
+        let (magnitude, omega_rad_s) = (limit.magnitude, limit.omega_rad_s);
+        (
+            "|S|".into(),
+            format!("at most {magnitude} at {omega_rad_s} rad/s"),
+        )
+    }));
+    let control = requirements.max_control_sensitivity_a_per_m;
+    facts.extend(control.map(|limit| {
+        let limit = limit / UM_PER_M;
+        ("|KS|".into(), format!("at most {limit} A/µm"))
+    }));
+    facts.extend(requirements.margin_disc.map(|disc| {
+        let (centre, radius) = (disc.centre, disc.radius);
+        let text = format!(
+            "L outside of the disc of radius {radius:.3} around {:.3}",
+            -centre
+        );
+        ("Gain and phase margin".into(), text)
+    }));
+    let current = requirements.max_current_rms_a;
+    facts.extend(current.map(|limit| ("Rms current".into(), format!("at most {limit} A"))));
+    let disturbance = certificate.extras.disturbance.clone();
+    facts.extend(disturbance.map(|file| ("Disturbance of".into(), file)));
+    facts.extend([
+        ("Order".into(), certificate.order.to_string()),
+        ("Loop rate".into(), format!("{} Hz", certificate.rate_hz)),
+        ("Configuration".into(), certificate.profile.clone()),
+        ("Seed of the search".into(), certificate.seed.to_string()),
+        ("Program".into(), format!("bench {}", certificate.version)),
+    ]);
+    facts
+}
+
+/// Heads of the columns of [`plant_cells`].
+pub const PLANT_COLUMNS: [&str; 10] = [
+    "plant",
+    "margin",
+    "slope",
+    "bandwidth",
+    "|S| at 10",
+    "|KS| A/um",
+    "rms um",
+    "rms A",
+    "gain margin",
+    "phase deg",
+];
+
+/// The figures of a plant as the cells of a table.
+pub fn plant_cells(figures: &PlantFigures) -> Vec<String> {
+    vec![
         figures.plant.clone(),
         format!("{:.4}", figures.modulus_margin),
         format!("{:.1}", figures.slope_bandwidth_rad_s),
         format!("{:.1}", figures.sensitivity_bandwidth_rad_s),
         format!("{:.4}", figures.sensitivity_at_10_rad_s),
         format!("{:.4}", figures.control_sensitivity_a_per_um),
-        known(figures.error_rms_m * UM_PER_M),
-    ])
+        optional(figures.error_rms_m.map(|rms_m| rms_m * UM_PER_M), 4),
+        optional(figures.current_rms_a, 4),
+        optional(figures.gain_margin, 2),
+        optional(figures.phase_margin_deg, 1),
+    ]
 }
 
-/// A number with four digits, or a dash if it is not known.
-fn known(value: f64) -> String {
-    match value.is_finite() {
-        true => format!("{value:.4}"),
-        false => "–".into(),
-    }
-}
+/// Heads of the columns of [`binding_cells`].
+pub const BINDING_COLUMNS: [&str; 4] = [
+    "requirement that limits the design",
+    "plant",
+    "rad/s",
+    "slack %",
+];
 
-fn binding_row(binding: &Binding) -> String {
+/// A binding requirement as the cells of a table.
+pub fn binding_cells(binding: &Binding) -> Vec<String> {
     let frequency = binding.frequency_rad_s;
-    row(&[
+    vec![
         binding.requirement.to_string(),
         binding.plant.clone(),
         frequency.map_or("all".into(), |w| format!("{w:.1}")),
         format!("{:.2}", 100.0 * binding.slack),
-    ])
+    ]
+}
+
+/// A number, or a dash if there is none.
+fn optional(value: Option<f64>, digits: usize) -> String {
+    value.map_or("-".into(), |value| format!("{value:.digits$}"))
 }
 
 fn frf_row(frf: &FrfEvidence) -> String {

@@ -37,7 +37,7 @@ pub use chart::{
     Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
 };
 pub use coherence::coherence_svg;
-pub use design_page::DesignPage;
+pub use design_page::{BINDING_COLUMNS, DesignPage, PLANT_COLUMNS, binding_cells, plant_cells};
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;

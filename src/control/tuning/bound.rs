@@ -37,6 +37,27 @@ pub struct ConvexBound {
     pub with_half_rad_s: f64,
 }
 
+impl ConvexBound {
+    /// The bound, whether it has converged, and the share of it that a design attains.
+    pub fn sentence(&self, attained: f64) -> String {
+        let (limit, half) = (self.limit_rad_s, self.with_half_rad_s);
+        let (plant, functions) = (&self.plant, self.functions);
+        let percent = 100.0 * attained / limit;
+        // The value rises with the number of functions, so only one that hardly changes is a bound.
+        let state = match limit / half < CONVERGED {
+            true => "no linear controller of any order attains more".to_string(),
+            false => {
+                format!("not converged ({half:.0} rad/s with half of them), the bound is larger")
+            }
+        };
+        format!(
+            "convex bound: {limit:.0} rad/s at {plant} with {functions} functions, {state}; this design attains {percent:.0} % of it"
+        )
+    }
+}
+
+/// Ratio of the values with all and with half of the functions below which the bound does not depend on their number.
+const CONVERGED: f64 = 1.05;
 /// Numbers of basis functions: of the comparison of the plants, and of the bound.
 const FUNCTIONS: (usize, usize) = (30, 60);
 /// Relative width of the last interval of the bisection.

@@ -24,28 +24,40 @@ pub struct Variances {
     pub noise_m2: f64,
 }
 
-/// What disturbs the position.
+/// What moves the stage.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PositionDisturbance {
+    /// Lines of the acceleration of the floor.
+    Floor(Vec<FloorLine>),
+    /// A measured spectrum of the position, the same for every plant.
+    Measured(DisturbanceSpectrum),
+}
+
+impl Default for PositionDisturbance {
+    fn default() -> PositionDisturbance {
+        PositionDisturbance::Floor(Vec::new())
+    }
+}
+
+/// What disturbs the position and its reading.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Disturbance {
-    /// Lines of the acceleration of the floor.
-    pub floor: Vec<FloorLine>,
+    /// What moves the stage.
+    pub position: PositionDisturbance,
     /// RMS of the noise of a reading in metres.
     pub noise_rms_m: f64,
-    /// A measured spectrum, in place of the lines of the floor.
-    pub measured: Option<DisturbanceSpectrum>,
 }
 
 impl Disturbance {
     /// Frequency in rad/s and damping ratio of each line.
     pub fn features(&self) -> Vec<(f64, f64)> {
-        let lines = match self.measured {
-            Some(_) => &[],
-            None => self.floor.as_slice(),
-        };
-        lines
-            .iter()
-            .map(|line| (rad_s(line.frequency_hz), line.damping_ratio))
-            .collect()
+        match &self.position {
+            PositionDisturbance::Floor(lines) => lines
+                .iter()
+                .map(|line| (rad_s(line.frequency_hz), line.damping_ratio))
+                .collect(),
+            PositionDisturbance::Measured(_) => Vec::new(),
+        }
     }
 
     /// The variances at each frequency of a rising grid, for a loop of `period_s`.
@@ -55,25 +67,25 @@ impl Disturbance {
         let points = omega_rad_s.iter().zip(cells);
         points
             .map(|(w, (from, to))| Variances {
-                disturbance_m2: match &self.measured {
-                    Some(spectrum) => spectrum.variance_m2(from, to),
-                    None => self.density_m2(modes, *w) * (to - from),
+                disturbance_m2: match &self.position {
+                    PositionDisturbance::Floor(lines) => density_m2(lines, modes, *w) * (to - from),
+                    PositionDisturbance::Measured(spectrum) => spectrum.variance_m2(from, to),
                 },
                 noise_m2: noise_density * (to - from),
             })
             .collect()
     }
+}
 
-    /// Phi_d in m^2 s/rad.
-    fn density_m2(&self, modes: &[Mode], omega_rad_s: f64) -> f64 {
-        let s = Complex::new(0.0, omega_rad_s);
-        let moved: Complex<f64> = modes
-            .iter()
-            .map(|mode| mode.resonance(s) * (mode.sensor_gain * mode.floor_gain))
-            .sum();
-        let acceleration: f64 = self.floor.iter().map(|line| line_density(line, s)).sum();
-        moved.norm_sqr() * acceleration
-    }
+/// Phi_d of the lines of the floor in m^2 s/rad.
+fn density_m2(lines: &[FloorLine], modes: &[Mode], omega_rad_s: f64) -> f64 {
+    let s = Complex::new(0.0, omega_rad_s);
+    let moved: Complex<f64> = modes
+        .iter()
+        .map(|mode| mode.resonance(s) * (mode.sensor_gain * mode.floor_gain))
+        .sum();
+    let acceleration: f64 = lines.iter().map(|line| line_density(line, s)).sum();
+    moved.norm_sqr() * acceleration
 }
 
 /// Density of a line's acceleration in (m/s^2)^2 s/rad.

@@ -32,11 +32,11 @@ pub struct PlantFigures {
     pub sensitivity_at_10_rad_s: f64,
     /// Largest |K S| in A/um.
     pub control_sensitivity_a_per_um: f64,
-    /// Standard deviation of the error in metres under the disturbance and the noise of the configuration; not a number, `null` in
-    /// JSON, for a measured plant, whose disturbance is not known.
-    pub error_rms_m: f64,
-    /// Standard deviation of the current in A under the same; not a number for a measured plant.
-    pub current_rms_a: f64,
+    /// Standard deviation of the error in metres under the disturbance and the noise; `None` for a measured plant, whose disturbance is
+    /// not known.
+    pub error_rms_m: Option<f64>,
+    /// Standard deviation of the current in A under the same.
+    pub current_rms_a: Option<f64>,
     /// Smallest factor above 1 by which L may grow before it reaches -1, without the modes that the model lacks.
     pub gain_margin: Option<f64>,
     /// Smallest angle between L and -1 where |L| = 1, without the modes that the model lacks.
@@ -102,8 +102,7 @@ impl PlantFigures {
         let at_10 = grid.partition_point(|w| *w < 10.0).min(grid.len() - 1);
         let control = controller.iter().zip(&distances);
         let control = control.map(|(c, distance)| c.norm() / distance / UM_PER_M);
-        // The disturbance of a measured plant is not known.
-        let known = plant.uncertainty.is_none().then_some(());
+        let is_disturbance_known = plant.uncertainty.is_none();
         PlantFigures {
             plant: plant.name.clone(),
             stable: is_stable(plant, cascade),
@@ -116,8 +115,8 @@ impl PlantFigures {
             ),
             sensitivity_at_10_rad_s: 1.0 / distances[at_10],
             control_sensitivity_a_per_um: control.fold(0.0, f64::max),
-            error_rms_m: known.map_or(f64::NAN, |()| sigma_m(fine, cascade)),
-            current_rms_a: known.map_or(f64::NAN, |()| current_sigma_a(fine, cascade)),
+            error_rms_m: is_disturbance_known.then(|| sigma_m(fine, cascade)),
+            current_rms_a: is_disturbance_known.then(|| current_sigma_a(fine, cascade)),
             gain_margin: gain_margin(&open_loop),
             phase_margin_deg: phase_margin_deg(&open_loop),
         }

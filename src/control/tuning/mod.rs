@@ -45,7 +45,7 @@ pub use bound::ConvexBound;
 pub use cascade::{Cascade, ParameterLimits};
 pub use curves::{LoopCurve, loop_curves};
 pub use design::{Design, DesignTask, bound_of, design, evaluate};
-pub use disturbance::Disturbance;
+pub use disturbance::{Disturbance, PositionDisturbance};
 pub use disturbance_spectrum::DisturbanceSpectrum;
 pub use error::{Conflict, TuneError};
 pub use figures::PlantFigures;

@@ -2,7 +2,7 @@
 
 use super::cascade::ParameterLimits;
 use super::design::DesignTask;
-use super::disturbance::Disturbance;
+use super::disturbance::{Disturbance, PositionDisturbance};
 use super::disturbance_spectrum::DisturbanceSpectrum;
 use super::error::TuneError;
 use super::measured_plant::MeasuredPlant;
@@ -91,8 +91,8 @@ impl DesignTask {
 
 impl DesignTask {
     /// The same task with a measured disturbance in place of the lines of the floor.
-    pub fn with_disturbance(mut self, measured: Option<DisturbanceSpectrum>) -> DesignTask {
-        self.disturbance.measured = measured;
+    pub fn with_disturbance(mut self, measured: DisturbanceSpectrum) -> DesignTask {
+        self.disturbance.position = PositionDisturbance::Measured(measured);
         self
     }
 
@@ -133,9 +133,8 @@ fn disturbance(config: &Config) -> Disturbance {
         config.sim.probe_quantisation_m,
     );
     Disturbance {
-        floor: config.sim.floor.clone(),
+        position: PositionDisturbance::Floor(config.sim.floor.clone()),
         noise_rms_m: (noise_m * noise_m + step_m * step_m / 12.0).sqrt(),
-        measured: None,
     }
 }
 

@@ -8,6 +8,7 @@
 //!
 //! Of the configuration only the loop rate, the delays, the amplifier, the probe and the limits of the interlocks are used.
 
+mod certificate;
 mod distinct;
 mod disturbance;
 mod error;
@@ -16,6 +17,7 @@ mod identified;
 mod mode_fit;
 mod source;
 
+pub use certificate::{DesignCertificate, DesignExtras, OppositeAsymmetry};
 pub use distinct::check_distinct;
 pub use disturbance::{DisturbanceError, recorded_disturbance};
 pub use error::TuneSourceError;

@@ -64,11 +64,7 @@ impl FrfSource {
     /// Operating point and mass asymmetry of a recording, as text.
     pub fn point_name(&self) -> Option<String> {
         let plant = self.recorded_point()?;
-        let point_m = plant.operating_point_m()?;
-        let point = match plant.beam_length_m() {
-            Some(length_m) => format!("{} % of L", rounded(100.0 * point_m / length_m)),
-            None => format!("{} mm", rounded(1e3 * point_m)),
-        };
+        let point = plant.operating_point_name()?;
         Some(match plant.mass_asymmetry() {
             Some(asymmetry) => format!("{point}, D {:+} %", rounded(100.0 * asymmetry)),
             None => point,

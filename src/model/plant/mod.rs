@@ -173,6 +173,15 @@ impl PlantSettings {
         self.as_model().operating_point_m()
     }
 
+    /// Name of the operating point, as `8 % of L` or `3 mm`; `None` for a model without one.
+    pub fn operating_point_name(&self) -> Option<String> {
+        let point_m = self.operating_point_m()?;
+        Some(match self.beam_length_m() {
+            Some(length_m) => format!("{} % of L", rounded(100.0 * point_m / length_m)),
+            None => format!("{} mm", rounded(1e3 * point_m)),
+        })
+    }
+
     /// The same model at another operating point in metres; `None` for a model without one.
     pub fn at_operating_point(&self, point_m: f64) -> Option<PlantSettings> {
         let mut plant = self.clone();
@@ -208,6 +217,11 @@ impl PlantSettings {
             format!("is {point_m} m, beyond the length of the beams of {length_m} m; lower it");
         (point_m.abs() > length_m).then(|| Finding::new("plant.operating_point_m", what))
     }
+}
+
+/// A number without the rounding of its computation.
+fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
 }
 
 /// The structure that the settings describe.

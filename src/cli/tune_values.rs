@@ -1,0 +1,105 @@
+//! Values of the options of `bench tune`.
+
+use std::str::FromStr;
+
+use clap::ValueEnum;
+
+use crate::control::tuning::{Goal, SensitivityLimit};
+use crate::util::quantity::AngularFrequency;
+
+/// The goal as typed.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(super) enum GoalName {
+    /// Largest slope bandwidth.
+    Disturbance,
+    /// Largest sensitivity bandwidth.
+    Bandwidth,
+    /// Smallest standard deviation of the error.
+    Rms,
+}
+
+impl From<GoalName> for Goal {
+    fn from(name: GoalName) -> Goal {
+        match name {
+            GoalName::Disturbance => Goal::Disturbance,
+            GoalName::Bandwidth => Goal::Bandwidth,
+            GoalName::Rms => Goal::Rms,
+        }
+    }
+}
+
+/// A finite number.
+fn number(text: &str) -> Result<f64, String> {
+    let number = f64::from_str(text).ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| format!("`{text}` is not a number; give one, such as 0.5"))
+}
+
+/// A modulus margin. For clap.
+pub(super) fn margin(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (0.05..=0.95).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 0.05 and 0.95; a usual value is 0.5"
+        )),
+    }
+}
+
+/// A gain margin. For clap.
+pub(super) fn gain_margin(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (1.01..=100.0).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 1.01 and 100; a usual value is 2"
+        )),
+    }
+}
+
+/// A phase margin in degrees. For clap.
+pub(super) fn phase_margin_deg(text: &str) -> Result<f64, String> {
+    let margin = number(text)?;
+    match (1.0..=80.0).contains(&margin) {
+        true => Ok(margin),
+        false => Err(format!(
+            "{margin} is not between 1 and 80; a usual value is 40"
+        )),
+    }
+}
+
+/// A limit above 0. For clap.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    match value > 0.0 {
+        true => Ok(value),
+        false => Err(format!("{value} is not positive; give a limit above 0")),
+    }
+}
+
+/// A factor of the damping ratios. For clap.
+pub(super) fn factor(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    match (0.01..=1.0).contains(&value) {
+        true => Ok(value),
+        false => Err(format!(
+            "{value} is not between 0.01 and 1; 1 leaves the damping unchanged"
+        )),
+    }
+}
+
+/// A limit such as `0.141@10rad/s`. For clap.
+pub(super) fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> {
+    let form = "give a ratio and a frequency, as in 0.141@10rad/s";
+    let (magnitude, frequency) = text
+        .split_once('@')
+        .ok_or_else(|| format!("`{text}` has no @; {form}"))?;
+    let frequency: AngularFrequency = frequency.parse().map_err(|e| format!("{e}; {form}"))?;
+    let omega_rad_s = frequency.si();
+    match omega_rad_s > 0.0 {
+        true => Ok(SensitivityLimit {
+            magnitude: positive(magnitude)?,
+            omega_rad_s,
+        }),
+        false => Err(format!("`{text}`: the frequency is not positive; {form}")),
+    }
+}
