@@ -1,135 +1,16 @@
 //! Each defect of a certificate is refused on devices, with its remedy.
-use std::time::{Duration, SystemTime};
 
 use bench::experiment::certificate::{
-    Agreement, CertificateError, Evidence, OpenRig, Subject, require_evidence, sha256,
+    Agreement, CertificateError, OpenRig, Subject, require_evidence, sha256,
 };
 use bench::experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
 use bench::rig::calibration::Calibration;
-use serde_json::{Value, json};
+use serde_json::json;
 
-use crate::stage::{chirp, config, plan, reversed_chirp};
-
-/// The devices with which the certificate was made.
-fn simulated() -> DeviceNames {
-    DeviceNames {
-        amplifier: "simulated".into(),
-        probe: "simulated".into(),
-    }
-}
-
-fn required(plan: &Plan, devices: &DeviceNames) -> Result<Evidence, ExperimentError> {
-    let rig = OpenRig {
-        devices,
-        calibration: None,
-    };
-    require_evidence(plan, Stage::Devices, Some(rig))
-}
-
-/// The defect for which a plan is refused on devices. It is only reported on the simulated stage, and with an override.
-fn defect(plan: &Plan) -> CertificateError {
-    let rig = OpenRig {
-        devices: &simulated(),
-        calibration: None,
-    };
-    let error = required(plan, &simulated()).expect_err("refused");
-    let reported = require_evidence(plan, Stage::Simulated, Some(rig)).expect("only reported");
-    assert!(!reported.defects.is_empty() || plan.certificate.is_none());
-    let reason = "a reason of an operator".parse().expect("long enough");
-    let overridden = plan.clone().with_override(Some(reason));
-    let evidence = required(&overridden, &simulated()).expect("overridden");
-    assert!(!evidence.defects.is_empty());
-    assert_eq!(
-        evidence.override_reason.as_deref(),
-        Some("a reason of an operator")
-    );
-    let text = error.to_string();
-    assert!(
-        text.contains("; ") && text.contains("--override") && text.ends_with("nothing was moved"),
-        "{text}"
-    );
-    only_defect(&error)
-}
-
-/// The defect of a refusal that has one.
-fn only_defect(error: &ExperimentError) -> CertificateError {
-    match defects(error) {
-        [defect] => defect.clone(),
-        several => panic!("{several:?}"),
-    }
-}
-
-fn defects(error: &ExperimentError) -> &[CertificateError] {
-    match error {
-        ExperimentError::Certificate(defects) => defects.as_slice(),
-        other => panic!("{other}"),
-    }
-}
-
-/// The plan with a changed certificate.
-fn edited(mut plan: Plan, edit: impl FnOnce(&mut Value)) -> Plan {
-    let text = plan.certificate.as_mut().expect("a certificate");
-    let mut json: Value = serde_json::from_str(&text.json).expect("JSON");
-    edit(&mut json);
-    text.json = json.to_string();
-    plan
-}
-
-/// The plan with a changed response, whose digest is that of the change.
-fn with_response(mut plan: Plan, edit: impl Fn(&str) -> Option<String>) -> Plan {
-    let text = plan.certificate.as_mut().expect("a certificate");
-    let mut lines = text.frf_csv.lines();
-    let header = lines.next().expect("a header").to_string();
-    let rows = lines.filter_map(edit);
-    text.frf_csv = std::iter::once(header)
-        .chain(rows)
-        .collect::<Vec<_>>()
-        .join("\n")
-        + "\n";
-    let digest = sha256(&text.frf_csv);
-    edited(plan, |json| json["frf"]["sha256"] = json!(digest))
-}
-
-fn column(row: &str, index: usize) -> f64 {
-    row.split(',')
-        .nth(index)
-        .expect("a column")
-        .parse()
-        .expect("a number")
-}
-
-/// A row with another value in a column.
-fn with_column(row: &str, index: usize, value: f64) -> String {
-    let mut columns: Vec<String> = row.split(',').map(String::from).collect();
-    columns[index] = value.to_string();
-    columns.join(",")
-}
-
-fn date(offset_s: i64) -> Value {
-    let now = SystemTime::now();
-    let offset = Duration::from_secs(offset_s.unsigned_abs());
-    let time = match offset_s < 0 {
-        true => now - offset,
-        false => now + offset,
-    };
-    json!(humantime_text(time))
-}
-
-/// RFC 3339 with seconds, by the program of the system.
-fn humantime_text(time: SystemTime) -> String {
-    let seconds = time
-        .duration_since(SystemTime::UNIX_EPOCH)
-        .expect("after 1970")
-        .as_secs();
-    let output = std::process::Command::new("date")
-        .args(["-u", "-d", &format!("@{seconds}"), "+%Y-%m-%dT%H:%M:%SZ"])
-        .output()
-        .expect("date of coreutils");
-    String::from_utf8(output.stdout)
-        .expect("text")
-        .trim()
-        .into()
-}
+use crate::altered::{
+    column, date, defect, defects, edited, only_defect, required, simulated, with_response,
+};
+use crate::stage::{chirp, config, plan};
 
 #[test]
 fn matching_certificate_is_accepted_with_a_lower_bound_of_the_margin() {
@@ -276,59 +157,6 @@ fn rejects_other_signs_than_those_of_the_model() {
         panic!("another defect");
     };
     assert_eq!((measured.as_str(), model.as_str()), ("+++", "+-+"));
-}
-
-#[test]
-fn rejects_a_response_without_the_band_around_the_crossover() {
-    // The crossover of the fast controller is 284 rad/s, 45 Hz (thesis: 287 rad/s).
-    for (from_hz, to_hz) in [(0.0, 30.0), (38.0, 52.0)] {
-        let gap = with_response(plan(&[]), |row| {
-            let hz = column(row, 0);
-            (!(from_hz..to_hz).contains(&hz)).then(|| row.to_string())
-        });
-        assert!(
-            matches!(defect(&gap), CertificateError::Band { .. }),
-            "{from_hz} to {to_hz}"
-        );
-    }
-}
-
-#[test]
-fn rejects_a_margin_below_the_limit_with_95_percent_confidence() {
-    // The loop has a modulus margin of 0.42 at 5 kHz (READING of the thesis).
-    let high = plan(&["control.min_modulus_margin=0.9"]);
-    assert!(matches!(
-        defect(&high),
-        CertificateError::LowMargin { least: 0.9, .. }
-    ));
-    // The same response with a large uncertainty.
-    let limited = plan(&["control.min_modulus_margin=0.3"]);
-    assert!(required(&limited, &simulated()).is_ok());
-    let noisy = with_response(limited, |row| {
-        Some(with_column(row, 4, 0.5 * column(row, 1)))
-    });
-    assert!(matches!(defect(&noisy), CertificateError::LowMargin { .. }));
-}
-
-#[test]
-fn rejects_a_loop_that_encircles_minus_one_by_the_measured_response() {
-    // The thesis, section 6.2.3: with D = -10 % the resonance circle of mode v encloses -1. The model has +10 %, where the loop is
-    // stable.
-    let mut config = config(&[]);
-    config.control.certificate = Some(reversed_chirp().file("certificate").display().to_string());
-    let plan = Plan::control(config).expect("a plan");
-    let error = required(&plan, &simulated()).expect_err("refused");
-    let [
-        CertificateError::Signs { measured, .. },
-        CertificateError::Unstable,
-    ] = defects(&error)
-    else {
-        panic!("{error}");
-    };
-    assert_eq!(measured, "++-");
-    // If the signs were not known, the response alone would be refused.
-    let without_modes = edited(plan, |json| json["modes"] = json!([]));
-    assert_eq!(defect(&without_modes), CertificateError::Unstable);
 }
 
 #[test]
@@ -505,52 +333,4 @@ fn each_defect_has_its_own_remedy() {
         let remedy = remedy(defect);
         assert!(remedy.contains(words), "{words}: {remedy}");
     }
-}
-
-#[test]
-fn rejects_a_margin_that_is_not_above_zero_or_not_a_number() {
-    let unlimited = plan(&["control.min_modulus_margin=0"]);
-    assert!(required(&unlimited, &simulated()).is_ok());
-    // A standard deviation as large as the response leaves no margin.
-    let noisy = with_response(unlimited.clone(), |row| {
-        Some(with_column(row, 4, column(row, 1)))
-    });
-    assert!(matches!(
-        defect(&noisy),
-        CertificateError::LowMargin { margin, least: 0.0, .. } if margin <= 0.0
-    ));
-    let undefined = with_response(unlimited, |row| Some(with_column(row, 4, f64::NAN)));
-    assert!(required(&undefined, &simulated()).is_err());
-}
-
-#[test]
-fn rejects_a_response_without_frequencies() {
-    let empty = with_response(plan(&[]), |_| None);
-    let error = required(&empty, &simulated()).expect_err("refused");
-    assert!(error.to_string().contains("no frequencies"), "{error}");
-}
-
-/// With growing noise the loop is first undecided, below 4 standard deviations from -1, and then too close to it, below 1.96.
-#[test]
-fn rejects_a_loop_whose_stability_is_hidden_by_noise() {
-    let unlimited = plan(&["control.min_modulus_margin=0"]);
-    let with_noise = |relative: f64| {
-        let noisy = with_response(unlimited.clone(), |row| {
-            Some(with_column(row, 4, relative * column(row, 1)))
-        });
-        required(&noisy, &simulated()).map_err(|error| only_defect(&error))
-    };
-    assert!(with_noise(0.01).is_ok());
-    let found: Vec<_> = (0..30)
-        .map(|k| with_noise(0.05 * 1.12f64.powi(k)))
-        .collect();
-    let is_undecided = |found: &Result<Evidence, CertificateError>| matches!(found, Err(CertificateError::Undecided { sigmas }) if *sigmas < 4.0);
-    let is_low = |found: &Result<Evidence, CertificateError>| {
-        matches!(found, Err(CertificateError::LowMargin { .. }))
-    };
-    let first = found.iter().position(is_undecided).expect("undecided");
-    let low = found.iter().position(is_low).expect("too low");
-    assert!(found[..first].iter().all(Result::is_ok), "{found:?}");
-    assert!(found[first..low].iter().all(is_undecided), "{found:?}");
-    assert!(found[low..].iter().all(is_low), "{found:?}");
 }

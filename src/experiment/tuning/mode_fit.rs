@@ -11,27 +11,44 @@ use crate::identify::modal::{self, FitError, FittedMode, MeasurementChain, Modal
 /// A residue with a larger relative standard deviation, of a mode that is closer to another one than their widths, is not determined.
 const UNRESOLVED: f64 = 0.3;
 
+/// A selection of the data of a source.
+#[derive(Clone, Copy)]
+enum Selection {
+    /// Every second datum, beginning with this one.
+    EverySecond(usize),
+    /// The independent points of the FRF.
+    Points,
+}
+
+/// The selections that are tried after all data, in this order.
+const OTHERS: [Selection; 3] = [
+    Selection::EverySecond(0),
+    Selection::EverySecond(1),
+    Selection::Points,
+];
+
+impl Selection {
+    fn of(self, source: &FrfSource) -> Vec<FrfDatum> {
+        match self {
+            Selection::EverySecond(first) => {
+                source.data.iter().skip(first).step_by(2).copied().collect()
+            }
+            Selection::Points => independent(&source.measured.frf),
+        }
+    }
+}
+
 /// The fit with the fewest modes that are not determined: of all data, else of every second one, else of the points of the FRF.
 ///
 /// # Errors
 /// That of the fit of all data, if none succeeds.
 pub(super) fn best_fit(source: &FrfSource, chain: &MeasurementChain) -> Result<ModalFit, FitError> {
-    let every_second = |first: usize| -> Vec<FrfDatum> {
-        let data = source.data.iter().skip(first);
-        data.step_by(2).copied().collect()
-    };
     let mut best = modal::fit(&source.data, chain);
-    let others: [&dyn Fn() -> Vec<FrfDatum>; 3] =
-        [&|| every_second(0), &|| every_second(1), &|| {
-            independent(&source.measured.frf)
-        }];
-    for data in others {
-        if let Ok(fit) = &best
-            && unresolved(fit) == 0
-        {
+    for selection in OTHERS {
+        if best.as_ref().is_ok_and(|fit| unresolved(fit) == 0) {
             break;
         }
-        best = better(best, modal::fit(&data(), chain));
+        best = better(best, modal::fit(&selection.of(source), chain));
     }
     best
 }
