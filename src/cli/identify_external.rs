@@ -7,17 +7,20 @@ use serde::Serialize;
 
 use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
+use super::linearity_output;
 use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::experiment::{AnalysisError, analyse_external};
-use crate::identify::IdentifyError;
+use crate::experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
 use crate::identify::external_csv::{self, Columns, Sampling};
 use crate::identify::frf_csv;
+use crate::identify::linearity::Linearity;
 use crate::identify::modal::InputPath;
 use crate::identify::periodic::Repetition;
+use crate::identify::settling::settling_periods;
+use crate::identify::{IdentifyError, Signals};
 use crate::report::run_pages::{
-    ExistingFile, ExternalRecord, ModalSummary, PageFiles, ResultFiles,
+    ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
 };
 use crate::util::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
 
@@ -59,7 +62,7 @@ pub(super) struct ExternalOptions {
     /// end at rest
     #[arg(long, value_name = "SAMPLES|S", requires = "input")]
     period: Option<String>,
-    /// Number of periods to skip at the beginning, while the plant settles
+    /// Number of periods to skip at the beginning, while the plant settles [default: those that differ from the later ones]
     #[arg(long, value_name = "N", requires = "period")]
     skip_periods: Option<usize>,
     /// How the input is held between its samples: `zoh` if a command is constant over each sampling period, `none` for a measured input
@@ -112,6 +115,16 @@ struct Report {
     input_lag_s: f64,
     /// Number of averaged periods; `null` if the record is not periodic.
     periods: Option<usize>,
+    /// Number of omitted periods before them.
+    skipped_periods: Option<usize>,
+    /// Power of the distortion over that of the output; `null` if the record is not periodic.
+    distortion_ratio: Option<f64>,
+    distortion_source: Option<DistortionSource>,
+    #[serde(skip)]
+    distortion: Option<Distortion>,
+    /// Noise, odd and even distortion, if a periodic excitation omits lines.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    linearity: Option<Linearity>,
     frf_csv: String,
     #[serde(flatten)]
     pages: PageFiles,
@@ -206,16 +219,21 @@ impl ExternalOptions {
         Ok(InputPath { hold_s, lag_s })
     }
 
-    fn repetition(&self, rate_hz: f64) -> Result<Option<Repetition>, CliError> {
+    fn repetition(&self, signals: &Signals) -> Result<Option<Repetition>, CliError> {
         let Some(text) = &self.period else {
             return Ok(None);
         };
+        let rate_hz = signals.rate_hz;
         let period = period_samples(text, rate_hz).ok_or_else(|| {
             CliError::Usage(format!(
                 "--period {text} is not a whole number of samples at {rate_hz} Hz; give a number of samples (2500) or a time that is a multiple of the sampling period (1s)"
             ))
         })?;
-        let skip = self.skip_periods.unwrap_or(0);
+        let skip = match self.skip_periods {
+            Some(skip) => skip,
+            None => settling_periods(signals, period)
+                .map_err(|error| self.refused(AnalysisError::from(error)))?,
+        };
         Ok(Some(Repetition { period, skip }))
     }
 }
@@ -259,7 +277,7 @@ pub(super) fn run(
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
     let band_hz = options.band_hz()?;
-    let repetition = options.repetition(signals.rate_hz)?;
+    let repetition = options.repetition(&signals)?;
     let input_path = options.input_path(signals.rate_hz)?;
     let analysis = analyse_external(&signals, band_hz, repetition, input_path);
     let analysis = analysis.map_err(|error| options.refused(error))?;
@@ -290,6 +308,8 @@ impl Report {
     ) -> Result<Report, CliError> {
         let (analysis, input, output) = (record.analysis, record.input, record.output);
         let magnitude = frf_csv::external_magnitude(input, output);
+        let periodic = analysis.periodic.as_ref();
+        let distortion = periodic.and_then(|part| part.distortion);
         Ok(Report {
             outcome: None,
             trip: None,
@@ -304,9 +324,14 @@ impl Report {
             band_hz: analysis.band_hz,
             hold_s: analysis.input_path.hold_s,
             input_lag_s: analysis.input_path.lag_s,
-            periods: analysis.periods,
+            periods: periodic.map(|part| part.periods),
+            skipped_periods: periodic.map(|part| part.skipped),
+            distortion_ratio: distortion.map(|distortion| distortion.ratio),
+            distortion_source: distortion.map(|distortion| distortion.source),
+            distortion,
+            linearity: periodic.and_then(|part| part.linearity.clone()),
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
-            pages: PageFiles::write(&record.report(), results)?,
+            pages: PageFiles::write(&record.report().map_err(OutputError::from)?, results)?,
             frequencies: analysis.frf.len(),
             coherence_median: analysis.frf.median_coherence(),
             summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),
@@ -327,10 +352,7 @@ impl Report {
     }
 
     fn record_text(&self) -> String {
-        let periods = match self.periods {
-            Some(count) => format!("             {count} periods averaged\n"),
-            None => String::new(),
-        };
+        let periods = self.periods_text().unwrap_or_default();
         format!(
             "  record     {}\n             {} samples at {} from `{}` to `{}`\n{periods}{}",
             self.recording,
@@ -340,6 +362,19 @@ impl Report {
             self.output,
             self.input_path_text()
         )
+    }
+
+    /// The averaged periods and the distortion of a periodic record.
+    fn periods_text(&self) -> Option<String> {
+        let (count, skipped) = (self.periods?, self.skipped_periods?);
+        let mut text = format!("             {count} periods averaged, {skipped} skipped before\n");
+        if let Some(distortion) = self.distortion {
+            text += &format!("             distortion {}\n", distortion.description());
+        }
+        if let Some(linearity) = &self.linearity {
+            text += &linearity_output::text(linearity);
+        }
+        Some(text)
     }
 
     /// The assumed hold and lag, if there are any.

@@ -1,13 +1,17 @@
 //! The analysis of external signals, from force to displacement or similar quantities, without a model.
 
+use serde::Serialize;
+
 use super::analysis::judge;
 use super::analysis_error::AnalysisError;
+use crate::identify::harmonics::{InputSignal, harmonics};
+use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::identify::periodic::{self, Repetition};
+use crate::identify::periodic::{self, Periods, Repetition};
 use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
-    EstimatorSettings, Frf, FrfDatum, Signals, excited_band_hz, frf_data, local, record_check,
-    with_distortion,
+    EstimatorSettings, Frf, FrfDatum, Signals, distortion_ratio, excited_band_hz, frf_data, local,
+    record_check, with_distortion,
 };
 
 /// Half of the frequencies must have at least this coherence.
@@ -41,8 +45,70 @@ pub struct ExternalAnalysis {
     pub band_hz: (f64, f64),
     /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
     pub judged_up_to_rad_s: f64,
-    /// Number of averaged periods of a periodic record.
-    pub periods: Option<usize>,
+    /// Periods and distortion of a periodic record.
+    pub periodic: Option<PeriodicPart>,
+}
+
+/// What only a periodic record shows.
+#[derive(Clone, Debug)]
+pub struct PeriodicPart {
+    /// Number of averaged periods.
+    pub periods: usize,
+    /// Number of periods at the beginning that were omitted.
+    pub skipped: usize,
+    /// The distortion; `None` with too few lines.
+    pub distortion: Option<Distortion>,
+    /// Noise, odd and even distortion, if the excitation omits lines.
+    pub linearity: Option<Linearity>,
+}
+
+/// Distortion of a periodic record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Distortion {
+    /// Its power over that of the output, or of the response.
+    pub ratio: f64,
+    /// Where it was measured.
+    pub source: DistortionSource,
+}
+
+/// Where distortion was measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DistortionSource {
+    /// At the lines that the excitation omits: odd and even.
+    OmittedLines,
+    /// In the roughness of the response over frequency, as the mean over the lines.
+    Roughness,
+}
+
+impl Distortion {
+    fn of(linearity: Option<&Linearity>, data: &[FrfDatum]) -> Option<Distortion> {
+        let Some(linearity) = linearity else {
+            return Some(Distortion {
+                ratio: distortion_ratio(data)?,
+                source: DistortionSource::Roughness,
+            });
+        };
+        let whole = &linearity.whole;
+        let kinds = [whole.odd_distortion_ratio, whole.even_distortion_ratio];
+        Some(Distortion {
+            ratio: kinds.into_iter().flatten().sum::<f64>().max(0.0),
+            source: DistortionSource::OmittedLines,
+        })
+    }
+
+    /// Its amplitude as a percentage, and where it was measured.
+    pub fn description(&self) -> String {
+        let percent = 100.0 * self.ratio.sqrt();
+        match self.source {
+            DistortionSource::OmittedLines => {
+                format!("{percent:.2} % of the output, at the lines that are not excited")
+            }
+            DistortionSource::Roughness => {
+                format!("{percent:.2} % of the response, by its roughness over frequency")
+            }
+        }
+    }
 }
 
 /// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
@@ -59,9 +125,9 @@ pub fn analyse_external(
     let chain = MeasurementChain::Input(input_path);
     signals.check()?;
     let band_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
-    let (frf, data, periods) = response(signals, band_hz, repetition)?;
-    let fit = match repetition {
-        Some(_) => fit_of_periods(&data, &chain),
+    let (frf, data, periodic) = response(signals, band_hz, repetition)?;
+    let fit = match &periodic {
+        Some(periodic) => fit_of_periods(&data, periodic.linearity.as_ref(), &chain),
         None => modal::fit(&data, &chain),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
@@ -78,7 +144,7 @@ pub fn analyse_external(
         input_path,
         band_hz,
         judged_up_to_rad_s,
-        periods,
+        periodic,
     })
 }
 
@@ -95,10 +161,22 @@ fn response(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
-) -> Result<(Frf, Vec<FrfDatum>, Option<usize>), AnalysisError> {
+) -> Result<(Frf, Vec<FrfDatum>, Option<PeriodicPart>), AnalysisError> {
     if let Some(repetition) = repetition {
-        let periods = periodic::estimate(signals, band_hz, repetition)?;
-        return Ok((periods.frf, periods.frf_data, Some(periods.count)));
+        let Periods {
+            frf,
+            frf_data,
+            count,
+        } = periodic::estimate(signals, band_hz, repetition)?;
+        let lines = harmonics(signals, band_hz, repetition, InputSignal::Measured)?;
+        let linearity = lines.map(Linearity::new);
+        let part = PeriodicPart {
+            periods: count,
+            skipped: repetition.skip,
+            distortion: Distortion::of(linearity.as_ref(), &frf_data),
+            linearity,
+        };
+        return Ok((frf, frf_data, Some(part)));
     }
     let settings = EstimatorSettings::default();
     let frf = local::estimate(signals, band_hz, &settings)?;
@@ -117,10 +195,16 @@ fn describes(fit: &ModalFit) -> bool {
     fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
 }
 
-/// The modes of averaged periods. If they do not describe the data, they are fitted again with distortion added to the noise.
+/// The modes of averaged periods. Odd distortion at the omitted lines counts as noise. If the modes do not describe the data, they are
+/// fitted again with distortion of the roughness added to the noise.
 /// (Without periods, the noise is estimated from neighbouring frequencies and already includes distortion.)
-fn fit_of_periods(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
-    let fit = modal::fit(data, chain);
+fn fit_of_periods(
+    data: &[FrfDatum],
+    linearity: Option<&Linearity>,
+    chain: &MeasurementChain,
+) -> Result<ModalFit, FitError> {
+    let measured = linearity.map(|linearity| linearity.with_odd_distortion(data));
+    let fit = modal::fit(measured.as_deref().unwrap_or(data), chain);
     if fit.as_ref().is_ok_and(describes) {
         return fit;
     }

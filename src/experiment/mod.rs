@@ -78,7 +78,9 @@ pub use error::ExperimentError;
 pub use error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
-pub use external::{ExternalAnalysis, analyse_external};
+pub use external::{
+    Distortion, DistortionSource, ExternalAnalysis, PeriodicPart, analyse_external,
+};
 pub use live_rig::{LiveRig, run};
 pub use loop_check::{MarginError, RatedController, Stage, closed_loop, require_margins};
 pub use measured_frf::{FrfError, MeasuredFrf};

@@ -8,7 +8,7 @@
 //! | stepped sine | each sine from its own periods, and the noise from their scatter |
 
 use crate::excitation::{Pattern, Window};
-use crate::identify::harmonics::harmonics;
+use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
 use crate::identify::{Frf, FrfDatum, IdentifyError, Signals, repeated};
@@ -58,7 +58,7 @@ fn periodic_lines(
     repetition: Repetition,
 ) -> Result<Segments, IdentifyError> {
     let Periods { frf, frf_data, .. } = periodic::estimate(signals, band_hz, repetition)?;
-    let Some(lines) = harmonics(signals, band_hz, repetition)? else {
+    let Some(lines) = harmonics(signals, band_hz, repetition, InputSignal::Commanded)? else {
         return Ok(Segments::Lines(frf, with_mean_variance(&frf_data), None));
     };
     let linearity = Linearity::new(lines);
@@ -68,7 +68,7 @@ fn periodic_lines(
 
 /// The data with the mean variance of neighbouring lines. The scatter of a few periods alone is occasionally far too small,
 /// and a fit would then take such a line for a mode.
-fn with_mean_variance(data: &[FrfDatum]) -> Vec<FrfDatum> {
+pub(super) fn with_mean_variance(data: &[FrfDatum]) -> Vec<FrfDatum> {
     let with_mean = data.iter().enumerate().map(|(k, datum)| FrfDatum {
         variance: mean_variance(data, k),
         ..*datum

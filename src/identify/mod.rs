@@ -15,6 +15,7 @@
 //! | defects of an external record | [`record_check`] |
 //! | the band that an input excites | [`excited_band_hz`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
+//! | the periods in which a plant settles | [`settling`] |
 //! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
 //! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
 //! | the excess delay of a response over its model | [`delay`] |
@@ -54,8 +55,8 @@ pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phas
 pub use growing::{GrowingPoint, GrowingResponse};
 pub use local_model::frf_data::frf_data;
 pub use local_model::{joint, local};
-pub use multisine_lines::distortion::with_distortion;
-pub use multisine_lines::{harmonics, linearity, periodic};
+pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
+pub use multisine_lines::{harmonics, linearity, periodic, settling};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};
 

@@ -41,12 +41,13 @@ impl DistortionLevels<'_> {
     }
 }
 
-/// The levels as an SVG document: RMS values in metres per line.
+/// The levels as an SVG document: RMS values per line of a quantity, such as `Displacement` in `m`.
 ///
 /// # Errors
 /// When no line was excited.
 pub fn distortion_svg(
     levels: &DistortionLevels<'_>,
+    quantity: &str,
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
@@ -54,7 +55,7 @@ pub fn distortion_svg(
         return Err(ReportError::NoTrace);
     };
     let x = Scale::frequency((first.frequency_hz, last.frequency_hz));
-    let y = Scale::logarithmic("Displacement per line, RMS (m)");
+    let y = Scale::logarithmic(&format!("{quantity} per line, RMS"));
     let chart = with_levels(Chart::new("", x, y), levels);
     sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
 }
@@ -148,6 +149,9 @@ mod tests {
             even: &[],
             periods: 4,
         };
-        assert_eq!(distortion_svg(&levels, "", ""), Err(ReportError::NoTrace));
+        assert_eq!(
+            distortion_svg(&levels, "", "", ""),
+            Err(ReportError::NoTrace)
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! External records: a CSV with named columns, periodic or not, in any units.
 
+mod distortion;
 mod existing_results;
 mod motor_bench;
 mod periodic;

@@ -1,6 +1,7 @@
 //! Averages over periods: exact without noise, and with correct standard deviations.
 use bench::identify::IdentifyError;
 use bench::identify::periodic::{Repetition, estimate};
+use bench::identify::settling::settling_periods;
 
 use crate::python;
 use crate::signals::{PERIOD, multisine, response};
@@ -63,6 +64,41 @@ fn distortion_of_a_measured_input_is_no_excitation() {
     let periods = estimate(&signals, BAND_HZ, repetition(0)).unwrap();
     let hz: Vec<f64> = odd.iter().map(|f| *f as f64).collect();
     assert_eq!(periods.frf.frequency_hz, hz);
+}
+
+#[test]
+fn distortion_beside_a_band_of_all_lines_is_no_excitation() {
+    // Every line from 20 to 120 Hz, and 5 % of distortion with irregular amplitudes below and above.
+    let band: Vec<usize> = (20..=120).collect();
+    let beside: Vec<usize> = (5..20).chain(121..=200).collect();
+    let mut signals = multisine(&band, 6, 0.0, 1e-7, 2);
+    for (k, line) in beside.iter().enumerate() {
+        let amplitude = 0.05 * (1.0 + 0.8 * (3.0 * k as f64).sin()) / 1.8;
+        let distortion = multisine(&[*line], 6, 0.0, 0.0, 3).input_a;
+        for (input, distortion) in signals.input_a.iter_mut().zip(distortion) {
+            *input += amplitude * distortion;
+        }
+    }
+    let periods = estimate(&signals, (0.0, 500.0), repetition(0)).unwrap();
+    let hz: Vec<f64> = band.iter().map(|f| *f as f64).collect();
+    assert_eq!(periods.frf.frequency_hz, hz);
+}
+
+#[test]
+fn periods_in_which_the_plant_settles_are_skipped() {
+    let settling = |decay: f64, sigma: f64| {
+        let mut signals = multisine(&lines(1), 12, 1e-4, sigma, 1);
+        let transient = |n: usize| 1e-3 * (-(n as f64) / (decay * PERIOD as f64)).exp();
+        let samples = signals.output_m.iter_mut().enumerate();
+        samples.for_each(|(n, y)| *y += transient(n));
+        settling_periods(&signals, PERIOD).unwrap()
+    };
+    // The transient is below the noise of 1e-7 after ln(1e4) = 9.2 decays, as an RMS over a period a little earlier.
+    let skipped = settling(0.3, 1e-7);
+    assert!((2..=3).contains(&skipped), "{skipped}");
+    assert_eq!(settling(0.01, 1e-3), 0);
+    // At most half of the 11 periods are skipped.
+    assert!((3..=5).contains(&settling(2.0, 1e-9)));
 }
 
 #[test]

@@ -1,7 +1,8 @@
 """Rigid body and flexible mode of the motor bench, by scipy's least squares with a complex residual.
 
     motor_bench.py FILE COLUMN    prints value and standard deviation of the rigid body's residue, and of the flexible mode's frequency (Hz),
-                                  damping ratio and residue, all in rad per A
+                                  damping ratio and residue, all in rad per A, and the power of what the model does not describe over that of the
+                                  response, the mean over the lines
 
 How it differs from bench on purpose: the drift of a period is taken from the means of its neighbours; the body has viscous friction,
 r/(s (s + a)), and no frequency; every line has the same error of 3 % of |H|; errors are scaled by what the fit leaves.
@@ -46,3 +47,4 @@ best = min(fits, key=lambda fit: fit.cost)
 covariance = np.linalg.inv(best.jac.T @ best.jac) * 2 * best.cost / (2 * len(lines) - len(start))
 for k in (0, 2, 3, 4):
     print(repr(float(best.x[k])), repr(float(np.sqrt(covariance[k, k]))))
+print(repr(float(np.mean(abs(measured - model(best.x)) ** 2 / abs(measured) ** 2))), 0.0)

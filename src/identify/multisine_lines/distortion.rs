@@ -47,24 +47,65 @@ pub fn with_distortion(data: &[FrfDatum]) -> Vec<FrfDatum> {
     .collect()
 }
 
+/// Power of the distortion over that of the response, the mean over the lines; `None` with too few lines.
+pub fn distortion_ratio(data: &[FrfDatum]) -> Option<f64> {
+    let increased = with_distortion(data);
+    let ratios = data.iter().zip(&increased).map(|(datum, increased)| {
+        (increased.variance - datum.variance) / datum.response.norm_sqr()
+    });
+    // A response of zero makes 0/0 or infinity.
+    let finite: Vec<f64> = ratios.filter(|ratio| ratio.is_finite()).collect();
+    let is_enough = data.len() >= LINES && !finite.is_empty();
+    is_enough.then(|| finite.iter().sum::<f64>() / finite.len() as f64)
+}
+
+/// The response at a frequency between the lines, by the local model of the lines around it; `None` with too few lines.
+pub(super) fn interpolated(data: &[FrfDatum], frequency_hz: f64) -> Option<Complex<f64>> {
+    if data.len() < LINES {
+        return None;
+    }
+    let line = data.partition_point(|datum| datum.frequency_hz < frequency_hz);
+    let local = Local::around(data, line, frequency_hz)?;
+    Some(local.at_frequency)
+}
+
 /// The residual power of the local model around a line, per degree of freedom.
 fn roughness(data: &[FrfDatum], line: usize) -> f64 {
-    let low = line.saturating_sub(REACH).min(data.len() - LINES);
-    let near = &data[low..low + LINES];
-    let x = distances(near, data[line].frequency_hz);
-    let mut denominator = vec![Complex::new(1.0, 0.0); LINES];
-    let mut residual_power = f64::INFINITY;
-    for _ in 0..FITS {
-        let Some(model) = local_model(&x, near, &denominator) else {
-            break;
-        };
-        denominator = x.iter().map(|x| limited(model[3] * *x + 1.0)).collect();
-        residual_power = (0..LINES)
-            .map(|k| near[k].response - numerator(&model, x[k]) / denominator[k])
-            .map(|residual| residual.norm_sqr())
-            .sum();
-    }
+    let local = Local::around(data, line, data[line].frequency_hz);
+    let residual_power = local.map_or(f64::INFINITY, |local| local.residual_power);
     residual_power / (LINES - PARAMETERS) as f64
+}
+
+/// A local model of the lines around a frequency.
+struct Local {
+    /// Its response at the frequency.
+    at_frequency: Complex<f64>,
+    /// Sum of the squared residuals.
+    residual_power: f64,
+}
+
+impl Local {
+    /// The model of the lines around a line, of data that are enough for one.
+    fn around(data: &[FrfDatum], line: usize, frequency_hz: f64) -> Option<Local> {
+        let low = line.saturating_sub(REACH).min(data.len() - LINES);
+        let near = &data[low..low + LINES];
+        let x = distances(near, frequency_hz);
+        let mut denominator = vec![Complex::new(1.0, 0.0); LINES];
+        let mut local = None;
+        for _ in 0..FITS {
+            let Some(model) = local_model(&x, near, &denominator) else {
+                break;
+            };
+            denominator = x.iter().map(|x| limited(model[3] * *x + 1.0)).collect();
+            let residuals =
+                (0..LINES).map(|k| near[k].response - numerator(&model, x[k]) / denominator[k]);
+            local = Some(Local {
+                at_frequency: model[0],
+                residual_power: residuals.map(|residual| residual.norm_sqr()).sum(),
+            });
+        }
+        local
+    }
 }
 
 /// x of each line: its distance from a frequency in mean distances of the lines.

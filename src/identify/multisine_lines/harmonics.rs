@@ -26,13 +26,19 @@
 //! in a period. Pintelon, Schoukens, System Identification, 2nd ed., section 4.3: the fast method, with one realization of the
 //! phases.
 //!
+//! **A measured input** contains distortion of the amplifier at the omitted lines, to which the plant responds linearly. With H
+//! interpolated between the excited lines by a local model, H U_p is subtracted from Y_p there, and only the lines between the lowest and
+//! the highest excited one count (Pintelon, Schoukens, the same section).
+//!
 //! A disturbance at exactly a line (mains, with periods of whole seconds) also repeats in every period and counts as distortion;
 //! in the probability, one line weighs no more than ln(level).
 
 use nalgebra::Complex;
 
-use super::periodic::{Line, ROUNDING, Repetition, excited, lines, mean, variance_of_mean};
-use crate::identify::{IdentifyError, Signals};
+use super::distortion::interpolated;
+use super::excited::excited;
+use super::lines::{Line, ROUNDING, Repetition, lines, mean, variance_of_mean};
+use crate::identify::{FrfDatum, IdentifyError, Signals};
 
 /// A line is omitted if its input is below this ratio of the largest. With an excited line of a hundredth, a linear plant then
 /// responds with a thousandth of its amplitude.
@@ -68,6 +74,15 @@ pub struct Harmonics {
     pub periods: usize,
 }
 
+/// What the input signal is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum InputSignal {
+    /// A command, which is exactly 0 at the omitted lines.
+    Commanded,
+    /// A measured signal with distortion of its own.
+    Measured,
+}
+
 /// The lines of `band_hz`; `None` if no line shows distortion: none is omitted, or even lines are excited.
 ///
 /// # Errors
@@ -76,16 +91,26 @@ pub fn harmonics(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Repetition,
+    input: InputSignal,
 ) -> Result<Option<Harmonics>, IdentifyError> {
     let lines = lines(signals, band_hz, repetition)?;
     let scale = Scale::new(&lines, signals.rate_hz, repetition.period);
+    let excited: Vec<&Line> = excited(&lines).collect();
+    let omitted = match input {
+        InputSignal::Commanded => scale.silent(&lines),
+        InputSignal::Measured => between(&lines, &excited),
+    };
+    let levels = |parity: usize| -> Vec<LineLevel> {
+        let of_parity = omitted.iter().filter(|line| line.number % 2 == parity);
+        of_parity.map(|line| scale.level(line)).collect()
+    };
     let harmonics = Harmonics {
-        excited: excited(&lines).map(|line| scale.level(line)).collect(),
-        odd: scale.omitted(&lines, 1),
-        even: scale.omitted(&lines, 0),
+        excited: excited.iter().map(|line| scale.level(line)).collect(),
+        odd: levels(1),
+        even: levels(0),
         periods: scale.periods,
     };
-    let only_odd = excited(&lines).all(|line| line.number % 2 == 1);
+    let only_odd = excited.iter().all(|line| line.number % 2 == 1);
     let omitted = harmonics.odd.len() + harmonics.even.len();
     Ok((only_odd && !harmonics.excited.is_empty() && omitted > 0).then_some(harmonics))
 }
@@ -114,13 +139,10 @@ impl Scale {
         }
     }
 
-    /// The levels of the omitted lines that are odd (1) or even (0).
-    fn omitted(&self, lines: &[Line], parity: usize) -> Vec<LineLevel> {
-        lines
-            .iter()
-            .filter(|line| line.number % 2 == parity && self.is_omitted(line))
-            .map(|line| self.level(line))
-            .collect()
+    /// The lines without input.
+    fn silent(&self, lines: &[Line]) -> Vec<Line> {
+        let silent = lines.iter().filter(|line| self.is_omitted(line));
+        silent.cloned().collect()
     }
 
     fn is_omitted(&self, line: &Line) -> bool {
@@ -140,6 +162,33 @@ impl Scale {
             noise_m2: self.square * self.periods as f64 * of_mean,
             surprisal: freedom * libm::log1p(power / (freedom * (of_mean + self.rounding))),
         }
+    }
+}
+
+/// The other lines between the excited ones, without the linear response to their input.
+fn between(lines: &[Line], excited: &[&Line]) -> Vec<Line> {
+    let (Some(first), Some(last)) = (excited.first(), excited.last()) else {
+        return Vec::new();
+    };
+    let numbers: Vec<usize> = excited.iter().map(|line| line.number).collect();
+    let response: Vec<FrfDatum> = excited.iter().map(|line| datum(line)).collect();
+    let inner = lines.iter().filter(|line| {
+        (first.number..last.number).contains(&line.number) && !numbers.contains(&line.number)
+    });
+    let without = inner.filter_map(|line| {
+        let response = interpolated(&response, line.number as f64)?;
+        Some(line.without_linear_part(response))
+    });
+    without.collect()
+}
+
+/// The response at a line, with its number as the frequency.
+fn datum(line: &Line) -> FrfDatum {
+    FrfDatum {
+        frequency_hz: line.number as f64,
+        spread_hz: 0.0,
+        response: line.response(),
+        variance: line.variance(),
     }
 }
 

@@ -2,6 +2,9 @@
 //! and distortion from the lines that the excitation omits.
 
 pub mod distortion;
+mod excited;
 pub mod harmonics;
 pub mod linearity;
+mod lines;
 pub mod periodic;
+pub mod settling;

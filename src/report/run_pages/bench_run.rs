@@ -2,17 +2,17 @@
 
 use nalgebra::Complex;
 
+use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
 use crate::experiment::{Analysis, ClosedResponses};
-use crate::identify::linearity::Linearity;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
 use crate::report::html::row;
 use crate::report::number::angular_frequency;
-use crate::report::{DistortionLevels, ReportError, Trace, bode_svg, distortion_svg};
+use crate::report::{ReportError, Trace, bode_svg};
 
 const SENSITIVITY_CAPTION: &str = "S from reference to error and T from reference to displacement. The peak of S is the inverse \
     of the modulus margin.";
@@ -101,7 +101,9 @@ impl<'a> BenchRun<'a> {
             plots.push(self.sensitivity_plot(closed)?);
         }
         if let Some(linearity) = &self.analysis.linearity {
-            plots.push(self.distortion_plot(linearity)?);
+            let subtitle = self.subtitle("displacement by frequency");
+            let plot = distortion_plot(linearity, "Displacement (m)", &self.title, &subtitle)?;
+            plots.push(plot);
         }
         Ok(plots)
     }
@@ -140,17 +142,6 @@ impl<'a> BenchRun<'a> {
         bode_svg(Unit::Bare, traces, &self.title, &subtitle)
     }
 
-    fn distortion_plot(&self, linearity: &Linearity) -> Result<Plot, ReportError> {
-        let subtitle = self.subtitle("displacement by frequency");
-        let levels = DistortionLevels::from(&linearity.harmonics);
-        Ok(Plot {
-            kind: PlotKind::Linearity,
-            heading: "Distortion and noise",
-            caption: distortion_caption(linearity),
-            svg: distortion_svg(&levels, &self.title, &subtitle)?,
-        })
-    }
-
     fn scheduling(&self) -> String {
         let filled = self.analysis.filled_ticks.to_string();
         run_facts::scheduling(
@@ -158,14 +149,6 @@ impl<'a> BenchRun<'a> {
             &[("Missing ticks filled in".into(), filled)],
         )
     }
-}
-
-fn distortion_caption(linearity: &Linearity) -> String {
-    let (periods, why) = (linearity.harmonics.periods, &linearity.why);
-    format!(
-        "RMS of the displacement at each line, mean of {periods} periods: excited lines, and odd and even lines that are not \
-         excited, averaged over neighbours. Without distortion the latter lie on the noise of the mean. {why}."
-    )
 }
 
 fn model_trace<'a>(name: &'a str, frf: &'a Frf, response: &'a [Complex<f64>]) -> Trace<'a> {

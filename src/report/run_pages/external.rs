@@ -1,10 +1,12 @@
 //! The report of an external record: without model and loop.
 
 use super::RecordReport;
+use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named};
 use crate::experiment::ExternalAnalysis;
 use crate::identify::Unit;
 use crate::identify::modal::MeasurementChain;
+use crate::report::ReportError;
 use crate::report::html::{facts, section};
 
 /// An analysed table of samples.
@@ -26,12 +28,22 @@ pub struct ExternalRecord<'a> {
 
 impl<'a> ExternalRecord<'a> {
     /// The report of the record.
-    pub fn report(&self) -> RecordReport<'a> {
+    ///
+    /// # Errors
+    /// When drawing fails.
+    pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
         let (analysis, input, output) = (self.analysis, self.input, self.output);
         let fit = analysis.fit.as_ref().ok();
-        RecordReport {
+        let subtitle = format!("{input} to {output}, in the units of the columns");
+        let linearity = analysis
+            .periodic
+            .as_ref()
+            .and_then(|part| part.linearity.as_ref());
+        let plot =
+            linearity.map(|linearity| distortion_plot(linearity, output, self.file, &subtitle));
+        Ok(RecordReport {
             title: self.file.to_string(),
-            subtitle: format!("{input} to {output}, in the units of the columns"),
+            subtitle,
             record: format!("{} samples at {} Hz", self.samples, self.rate_hz),
             unit: Unit::Bare,
             residue_unit: format!("{output} per {input} and s^2"),
@@ -43,13 +55,14 @@ impl<'a> ExternalRecord<'a> {
             verdict: &analysis.verdict,
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),
-            further_plots: Vec::new(),
+            further_plots: plot.transpose()?.into_iter().collect(),
             before_plots: String::new(),
             after_plots: self.description(),
-        }
+        })
     }
 
     fn description(&self) -> String {
+        let periodic = self.analysis.periodic.as_ref();
         let pairs = named([
             ("Input", Some(self.input.to_string())),
             ("Output", Some(self.output.to_string())),
@@ -65,7 +78,17 @@ impl<'a> ExternalRecord<'a> {
             ),
             (
                 "Periods averaged",
-                self.analysis.periods.map(|count| count.to_string()),
+                periodic.map(|part| part.periods.to_string()),
+            ),
+            (
+                "Periods skipped before",
+                periodic.map(|part| part.skipped.to_string()),
+            ),
+            (
+                "Distortion",
+                periodic
+                    .and_then(|part| part.distortion)
+                    .map(|distortion| distortion.description()),
             ),
         ]);
         section("The record", &facts(&pairs))

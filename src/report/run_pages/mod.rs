@@ -11,6 +11,7 @@
 mod bench_run;
 mod comparison;
 mod control_page;
+mod distortion_plot;
 mod external;
 mod measured_loop;
 mod outputs;
