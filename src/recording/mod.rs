@@ -63,7 +63,7 @@ pub use error::{Emptiness, RecordingError};
 pub use event_message::event_text;
 pub use live_encoder::{EncodedMessage, LiveEncoder};
 pub use losses::{Cut, DamagedRange, MissingTicks};
-pub use reader::{Recording, StoredAttachment};
+pub use reader::{Recording, StoredAttachment, TickReceiver};
 pub use recover::{Recovered, recover};
 pub use schema::descriptor_set;
 pub use stream::Ticks;
