@@ -7,7 +7,7 @@ use bench_test_support::unrecorded;
 use bench::config::{Config, Source, load};
 use bench::identify::modal::{MeasurementChain, fit};
 use bench::identify::verdict::{Verdict, VerdictInput, verdict};
-use bench::identify::{Estimator, EstimatorSettings, Signals, frf_data, local, welch};
+use bench::identify::{Estimator, EstimatorSettings, FrfDatum, local, welch};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Samples of a segment.
@@ -27,14 +27,13 @@ fn config() -> Config {
     .expect("the profile is valid")
 }
 
-fn judged(signals: &Signals, config: &Config) -> Verdict {
-    let frf_data = frf_data(signals, BAND_HZ, &EstimatorSettings::default()).expect("excited");
+fn judged(frf_data: &[FrfDatum], config: &Config) -> Verdict {
     let chain = MeasurementChain::bench(config);
-    let fit = fit(&frf_data, &chain).expect("modes");
+    let fit = fit(frf_data, &chain).expect("modes");
     verdict(&VerdictInput {
         fit: &fit,
         chain: &chain,
-        frf_data: &frf_data,
+        frf_data,
         up_to_rad_s: 650.0,
         expected_modes: Some(3),
     })
@@ -58,10 +57,9 @@ fn identify(c: &mut Criterion) {
     });
     group.bench_function("local, modes and verdict", |b| {
         b.iter(|| {
-            (
-                local::estimate(&signals, BAND_HZ, &settings).expect("excited"),
-                judged(&signals, &config),
-            )
+            let (frf, data) =
+                local::estimate_with_data(&signals, BAND_HZ, &settings).expect("excited");
+            (frf, judged(&data, &config))
         })
     });
     group.finish();

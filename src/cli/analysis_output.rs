@@ -7,8 +7,8 @@ use super::error::CliError;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
-use crate::experiment::analyse_with_progress;
 use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
+use crate::experiment::{AnalysisPhase, analyse_opened, analyse_with_progress, open_with_signals};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use crate::util::decimal::Decimal;
@@ -31,13 +31,32 @@ pub(super) fn analyse_and_write(
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
-    let analysis = analyse_with_progress(recording, config, &mut |phase, fraction| {
+    let analysis = analyse_with_progress(recording, config, &mut shown_by(progress))?;
+    let run = BenchRun::new(recording, &analysis, config);
+    Ok(AnalysisOutputs::write(&run, results)?)
+}
+
+/// As [`analyse_and_write`], of a recording that is not open yet.
+pub(super) fn open_analyse_and_write(
+    path: &Path,
+    config: &Config,
+    results: ResultFiles<'_>,
+    progress: &Progress,
+) -> Result<AnalysisOutputs, CliError> {
+    let (recording, signals) = open_with_signals(path, config.servo.rate_hz)?;
+    progress.begin("analysing", STEPS);
+    let analysis = analyse_opened(&recording, signals, config, &mut shown_by(progress))?;
+    let run = BenchRun::new(&recording, &analysis, config);
+    Ok(AnalysisOutputs::write(&run, results)?)
+}
+
+/// A receiver of the progress of an analysis that never cancels it.
+fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) -> ControlFlow<()> {
+    move |phase, fraction| {
         let done = (phase.overall(fraction) * STEPS as f64) as u64;
         progress.set(done, STEPS);
         ControlFlow::Continue(())
-    })?;
-    let run = BenchRun::new(recording, &analysis, config);
-    Ok(AnalysisOutputs::write(&run, results)?)
+    }
 }
 
 /// Files, delay, modes, zeros and verdict.

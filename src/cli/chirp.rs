@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::analysis_output::{self, analyse_and_write};
+use super::analysis_output::{self, open_analyse_and_write};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::help::with_setting;
@@ -21,7 +21,6 @@ use crate::excitation::Extremes;
 use crate::experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
-use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
 use crate::util::progress::Progress;
@@ -174,12 +173,11 @@ fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
     let _line = ProgressLine::show(&progress);
     let (recording, config) = (path.to_path_buf(), config.clone());
     let work = move || {
-        let opened = Recording::open(&recording)?;
         let results = ResultFiles {
             beside: &recording,
             existing: ExistingFile::Replace,
         };
-        analyse_and_write(&opened, &config, results, &progress)
+        open_analyse_and_write(&recording, &config, results, &progress)
     };
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));

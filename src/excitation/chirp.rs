@@ -4,7 +4,7 @@ use super::amplitude::AmplitudeCurve;
 use super::design::{ExcitationDesign, Length, SharedSettings};
 use super::repeated::Repeated;
 use super::sweep::{ChirpSettings, Sweep, SweptSine};
-use super::waveform::Excitation;
+use super::waveform::{Excitation, Pattern};
 
 /// A chirp with zero current before and after, in amperes.
 #[derive(Clone, Debug)]
@@ -67,6 +67,14 @@ impl ExcitationDesign for ChirpDesign {
             ticks: once_s * f64::from(chirp.repetitions) * shared.rate_hz,
             key: "chirp.duration_s",
             value: chirp.duration_s,
+        }
+    }
+
+    /// A single chirp is not built for this, which takes as long as its sweep has ticks.
+    fn pattern(&self, shared: &SharedSettings<'_>) -> Pattern {
+        match shared.chirp.repetitions {
+            0 | 1 => Pattern::Once,
+            _ => self.build(shared).pattern(),
         }
     }
 

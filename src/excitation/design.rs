@@ -1,7 +1,7 @@
 //! Properties of an excitation that follow from its settings alone (length, limits).
 
-use super::Excitation;
 use super::sweep::ChirpSettings;
+use super::{Excitation, Pattern};
 use crate::util::finding::Finding;
 
 /// The settings that every kind of excitation shares: band, rest times, fades and amplitude over frequency in
@@ -58,6 +58,11 @@ pub trait ExcitationDesign {
     /// The excitation.
     fn build(&self, shared: &SharedSettings<'_>) -> Box<dyn Excitation>;
 
+    /// How it repeats.
+    fn pattern(&self, shared: &SharedSettings<'_>) -> Pattern {
+        self.build(shared).pattern()
+    }
+
     /// Relations between settings that no single range expresses.
     fn check(&self, _shared: &SharedSettings<'_>) -> Vec<Finding> {
         Vec::new()
@@ -102,6 +107,11 @@ impl ChosenExcitation<'_> {
     /// The excitation.
     pub fn build(&self) -> Box<dyn Excitation> {
         self.design.build(&self.shared)
+    }
+
+    /// How it repeats.
+    pub fn pattern(&self) -> Pattern {
+        self.design.pattern(&self.shared)
     }
 
     /// Kind, band and length as text.

@@ -9,21 +9,18 @@ use super::analysis_error::AnalysisError;
 use super::certificate::SignCheck;
 use super::closed_loop;
 use super::ending::Ending;
-use super::plan::{KIND, RunKind};
+use super::read_run::{ReadSignals, is_closed_loop, is_of_run};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
 use super::signal_builder::{RunSignals, SignalBuilder};
 use crate::config::Config;
-use crate::excitation::Excitation;
 use crate::identify::delay::excess_delay;
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::verdict::{Verdict, VerdictInput, verdict};
-use crate::identify::{Estimate, Frf, FrfDatum, Signals, frf_data, response};
+use crate::identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use crate::model::plant::{self, LoopPlant, ModalModel, Mode, Sign};
 use crate::recording::Recording;
-use crate::rt::arming::State;
-use crate::rt::record::flag;
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;
@@ -102,7 +99,32 @@ pub fn analyse_with_progress(
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
-    let (estimate, filled_ticks) = estimated(recording, config, progress)?;
+    let only_closed = is_closed_loop(recording.metadata());
+    let signals = read_signals(recording, config.servo.rate_hz, only_closed, progress)?;
+    analyse_signals(recording, signals, config, progress)
+}
+
+/// As [`analyse_with_progress`], with the signals of [`open_with_signals`](super::open_with_signals).
+///
+/// # Errors
+/// Those of [`analyse_with_progress`].
+pub fn analyse_opened(
+    recording: &Recording,
+    signals: ReadSignals,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Analysis, AnalysisError> {
+    analyse_signals(recording, signals.into_result()?, config, progress)
+}
+
+fn analyse_signals(
+    recording: &Recording,
+    signals: RunSignals,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Analysis, AnalysisError> {
+    let filled_ticks = signals.filled_ticks;
+    let estimate = estimated(recording, signals, config, progress)?;
     let analysis = with_modes(estimate, config, filled_ticks, progress)?;
     let verdict = cautions(recording)
         .into_iter()
@@ -121,7 +143,15 @@ pub(super) fn measured_data(
     recording: &Recording,
     config: &Config,
 ) -> Result<(Frf, Vec<FrfDatum>), AnalysisError> {
-    let (estimate, _) = estimated(recording, config, &mut |_, _| ControlFlow::Continue(()))?;
+    let mut no_progress = |_, _| ControlFlow::Continue(());
+    let only_closed = is_closed_loop(recording.metadata());
+    let signals = read_signals(
+        recording,
+        config.servo.rate_hz,
+        only_closed,
+        &mut no_progress,
+    )?;
+    let estimate = estimated(recording, signals, config, &mut no_progress)?;
     Ok((estimate.frf, estimate.frf_data))
 }
 
@@ -131,35 +161,26 @@ pub(super) fn cautions(recording: &Recording) -> Vec<String> {
     cautions.into_iter().flatten().collect()
 }
 
-/// The responses of a recording, and the number of interpolated ticks.
+/// The responses of a recording.
 fn estimated(
     recording: &Recording,
+    signals: RunSignals,
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
-) -> Result<(ResponseEstimate, u64), AnalysisError> {
-    let is_closed_loop = is_closed_loop(recording);
-    let RunSignals {
-        loop_signals,
-        filled_ticks,
-    } = read_signals(recording, config.servo.rate_hz, is_closed_loop, progress)?;
+) -> Result<ResponseEstimate, AnalysisError> {
+    let loop_signals = signals.loop_signals;
     report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
-    let estimate = match is_closed_loop {
-        true => closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)?,
-        false => open_loop(loop_signals.signals, band_hz, config)?,
-    };
-    Ok((estimate, filled_ticks))
+    match is_closed_loop(recording.metadata()) {
+        true => closed_loop::estimate_loop(&loop_signals, band_hz, recording, config),
+        false => open_loop(loop_signals.signals, band_hz, config),
+    }
 }
 
 /// A warning that records are lost: their ticks were interpolated, or the results lack them.
 fn loss_caution(recording: &Recording) -> Option<String> {
     let lost = recording.lost_records();
     (lost > 0).then(|| format!("{lost} records of the run are lost"))
-}
-
-fn is_closed_loop(recording: &Recording) -> bool {
-    let kind = recording.metadata().get(KIND);
-    kind.is_some_and(|kind| kind == RunKind::Control.name())
 }
 
 /// Reports progress; an error if the receiver cancels.
@@ -179,12 +200,11 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<ResponseEstimate, AnalysisError> {
-    let pattern = config.chosen_excitation().build().pattern();
+    let pattern = config.chosen_excitation().pattern();
     let (frf, frf_data, linearity) = match segments(signals, &pattern, band_hz)? {
         Segments::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
         Segments::Record(signals) => {
-            let frf = response(&signals, band_hz, &config.identify)?;
-            let data = frf_data(&signals, band_hz, &config.identify.local())?;
+            let (frf, data) = response_and_data(&signals, band_hz, &config.identify)?;
             (frf, data, None)
         }
     };
@@ -312,17 +332,16 @@ fn read_signals(
     only_closed: bool,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<RunSignals, AnalysisError> {
-    let mut signals = SignalBuilder::new(recording, rate_hz);
+    let mut signals = SignalBuilder::new(recording.metadata(), rate_hz);
     let total = recording.tick_count().max(1) as f64;
     for (index, record) in recording.ticks()?.enumerate() {
         let record = record?;
-        let is_closed = record.flags & flag::ACTIVE != 0;
-        if record.state == State::Running && (is_closed || !only_closed) {
+        if is_of_run(&record, only_closed) {
             signals.push(&record)?;
         }
         if index % TICKS_PER_REPORT == 0 {
             report(progress, AnalysisPhase::Reading, index as f64 / total)?;
         }
     }
-    signals.finish()
+    signals.finish(recording.tick_count())
 }

@@ -41,6 +41,7 @@ mod overview;
 mod plan;
 mod plan_error;
 mod prediction;
+mod read_run;
 mod recorded_rig;
 mod reference_check;
 mod remembered_motor;
@@ -69,7 +70,9 @@ mod tune_check;
 pub mod tuning;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
-pub use analysis::{Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_with_progress};
+pub use analysis::{
+    Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_opened, analyse_with_progress,
+};
 pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use command_plan::{CommandSummary, ShapedMode};
 pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
@@ -95,6 +98,7 @@ pub use overview::{Extent, Overview, overview};
 pub use plan::{Plan, RunKind};
 pub use plan_error::PlanError;
 pub use prediction::{extremes, predicted_extremes, rig_model};
+pub use read_run::{ReadSignals, open_with_signals};
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use response_estimate::ClosedResponses;

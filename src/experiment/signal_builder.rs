@@ -1,10 +1,11 @@
 //! The ticks of a recorded run as signals at regular times.
 
+use std::collections::BTreeMap;
+
 use super::analysis_error::AnalysisError;
 use crate::identify::joint::LoopSignals;
 use crate::identify::resampling::Readings;
 use crate::identify::{Signals, setpoint_timing};
-use crate::recording::Recording;
 use crate::rt::record::TickRecord;
 use crate::util::running_stats::RunningStats;
 
@@ -25,6 +26,15 @@ pub(super) struct RunSignals {
     pub(super) filled_ticks: u64,
 }
 
+/// Ticks that are missing between two records.
+struct Missing {
+    /// Number of ticks before them in the signals without them.
+    index: usize,
+    /// The last tick before them.
+    after_tick: u64,
+    ticks: u64,
+}
+
 /// Collects reference, command and position of every tick of a run, and interpolates missing ticks.
 pub(super) struct SignalBuilder {
     input_a: Vec<f64>,
@@ -36,27 +46,22 @@ pub(super) struct SignalBuilder {
     /// Mean and range of the time in seconds from a tick to the measurement of its reading, which is minus the age.
     offset_s: RunningStats,
     offset_range_s: (f64, f64),
-    before: Option<TickRecord>,
+    last_tick: Option<u64>,
     first_s: f64,
     rate_hz: f64,
     /// Devices answer when they are read; the simulated stage answers at the scheduled time, even if the tick was late.
     on_devices: bool,
-    filled: u64,
-    allowed: u64,
-    ticks: u64,
+    missing: Vec<Missing>,
 }
 
 impl SignalBuilder {
-    pub(super) fn new(recording: &Recording, rate_hz: f64) -> Self {
-        let on_devices = recording
-            .metadata()
-            .get("probe")
-            .is_some_and(|probe| probe != "simulated");
-        SignalBuilder::of(recording.tick_count(), rate_hz, on_devices)
+    /// For a recording with this metadata.
+    pub(super) fn new(metadata: &BTreeMap<String, String>, rate_hz: f64) -> Self {
+        let probe = metadata.get("probe");
+        SignalBuilder::of(rate_hz, probe.is_some_and(|probe| probe != "simulated"))
     }
 
-    /// For a recording of this number of ticks.
-    fn of(ticks: u64, rate_hz: f64, on_devices: bool) -> Self {
+    fn of(rate_hz: f64, on_devices: bool) -> Self {
         SignalBuilder {
             input_a: Vec::new(),
             output_m: Vec::new(),
@@ -65,27 +70,25 @@ impl SignalBuilder {
             readings: Readings::default(),
             offset_s: RunningStats::default(),
             offset_range_s: (f64::INFINITY, f64::NEG_INFINITY),
-            before: None,
+            last_tick: None,
             first_s: 0.0,
             rate_hz,
             on_devices,
-            filled: 0,
-            allowed: (ticks as f64 * FILLED_RATIO) as u64,
-            ticks,
+            missing: Vec::new(),
         }
     }
 
     pub(super) fn push(&mut self, record: &TickRecord) -> Result<(), AnalysisError> {
         check_age(record)?;
-        match self.before {
+        match self.last_tick {
             None => self.first_s = seconds(record.scheduled_ns),
-            Some(before) => self.fill(&before, record)?,
+            Some(last) => self.note_missing(last, record.tick),
         }
         self.push_times(record);
         self.input_a.push(record.command_a);
         self.output_m.push(record.position_m);
         self.reference_m.push(record.reference_m);
-        self.before = Some(*record);
+        self.last_tick = Some(record.tick);
         Ok(())
     }
 
@@ -117,39 +120,38 @@ impl SignalBuilder {
         self.offset_range_s = (low_s.min(offset_s), high_s.max(offset_s));
     }
 
-    /// Interpolates the ticks between two records: current by zero-order hold, position and reference linearly. Fails if too
-    /// many ticks are missing so far.
-    fn fill(&mut self, before: &TickRecord, after: &TickRecord) -> Result<(), AnalysisError> {
-        let missing = after.tick.saturating_sub(before.tick).saturating_sub(1);
-        let all = self.filled.saturating_add(missing);
-        if all > self.allowed {
-            return Err(AnalysisError::Gaps {
-                missing: all,
-                after: before.tick,
-                ticks: self.ticks,
-                allowed: self.allowed,
+    fn note_missing(&mut self, last_tick: u64, next_tick: u64) {
+        let ticks = next_tick.saturating_sub(last_tick).saturating_sub(1);
+        if ticks > 0 {
+            self.missing.push(Missing {
+                index: self.input_a.len(),
+                after_tick: last_tick,
+                ticks,
             });
         }
-        for step in 1..=missing {
-            let share = step as f64 / (missing + 1) as f64;
-            let between = |from: f64, to: f64| from + share * (to - from);
-            let position_m = between(before.position_m, after.position_m);
-            let reference_m = between(before.reference_m, after.reference_m);
-            self.input_a.push(before.command_a);
-            self.late.push(f64::NAN);
-            self.output_m.push(position_m);
-            self.reference_m.push(reference_m);
-        }
-        self.filled += missing;
-        Ok(())
     }
 
-    /// The signals. If the times differ from tick to tick, currents are shifted to the median time and positions to the mean
+    /// Interpolates the missing ticks: current by zero-order hold, position and reference linearly. Returns their number; fails
+    /// if there are too many.
+    fn fill(&mut self, ticks: u64) -> Result<u64, AnalysisError> {
+        let filled = missing_ticks(&self.missing, ticks)?;
+        if filled > 0 {
+            let missing = &self.missing;
+            self.input_a = with_missing(&self.input_a, missing, |before, _, _| before);
+            self.late = with_missing(&self.late, missing, |_, _, _| f64::NAN);
+            self.output_m = with_missing(&self.output_m, missing, between);
+            self.reference_m = with_missing(&self.reference_m, missing, between);
+        }
+        Ok(filled)
+    }
+
+    /// The signals of a recording with this number of ticks. If the times differ from tick to tick, currents are shifted to the median time and positions to the mean
     /// age.
-    pub(super) fn finish(self) -> Result<RunSignals, AnalysisError> {
+    pub(super) fn finish(mut self, ticks: u64) -> Result<RunSignals, AnalysisError> {
         if self.input_a.is_empty() {
             return Err(AnalysisError::NothingRan);
         }
+        let filled_ticks = self.fill(ticks)?;
         let aligned_m = self.aligned_positions();
         let signals = Signals {
             rate_hz: self.rate_hz,
@@ -161,7 +163,7 @@ impl SignalBuilder {
                 signals,
                 reference_m: self.reference_m,
             },
-            filled_ticks: self.filled,
+            filled_ticks,
         })
     }
 
@@ -176,6 +178,49 @@ impl SignalBuilder {
         let aligned = self.readings.at_regular_times(start_s, period_s, count);
         Some(aligned).filter(|aligned| aligned.len() == count)
     }
+}
+
+/// Number of missing ticks beside `ticks` recorded ones; fails if there are too many.
+fn missing_ticks(missing: &[Missing], ticks: u64) -> Result<u64, AnalysisError> {
+    let allowed = (ticks as f64 * FILLED_RATIO) as u64;
+    let mut all = 0u64;
+    for gap in missing {
+        all = all.saturating_add(gap.ticks);
+        if all > allowed {
+            return Err(AnalysisError::Gaps {
+                missing: all,
+                after: gap.after_tick,
+                ticks,
+                allowed,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// A signal with values at the missing ticks. `value` is given the values before and after them, and the share of the time between
+/// the two that has passed.
+fn with_missing(
+    signal: &[f64],
+    missing: &[Missing],
+    value: impl Fn(f64, f64, f64) -> f64,
+) -> Vec<f64> {
+    let mut filled = Vec::with_capacity(signal.len());
+    let mut done = 0;
+    for gap in missing {
+        filled.extend_from_slice(&signal[done..gap.index]);
+        done = gap.index;
+        let (before, after) = (signal[gap.index - 1], signal[gap.index]);
+        let share = |step: u64| step as f64 / (gap.ticks + 1) as f64;
+        filled.extend((1..=gap.ticks).map(|step| value(before, after, share(step))));
+    }
+    filled.extend_from_slice(&signal[done..]);
+    filled
+}
+
+/// Linear interpolation.
+fn between(before: f64, after: f64, share: f64) -> f64 {
+    before + share * (after - before)
 }
 
 /// The currents at the median time. A current whose time is not known (NaN) is treated as if it took effect then.
@@ -218,7 +263,8 @@ mod tests {
     /// The ticks from 0 to `count`, without those that are `lost`.
     fn gathered(count: u64, lost: impl Fn(u64) -> bool) -> Result<RunSignals, AnalysisError> {
         let kept: Vec<u64> = (0..count).filter(|tick| !lost(*tick)).collect();
-        let mut gathered = SignalBuilder::of(kept.len() as u64, 1000.0, false);
+        let ticks = kept.len() as u64;
+        let mut gathered = SignalBuilder::of(1000.0, false);
         for tick in kept {
             let (ns, position_m) = (tick * 1_000_000, tick as f64 * 1e-9);
             let times = TickRecord {
@@ -234,7 +280,7 @@ mod tests {
                 ..times
             })?;
         }
-        gathered.finish()
+        gathered.finish(ticks)
     }
 
     #[test]
@@ -245,7 +291,7 @@ mod tests {
             (i64::MAX as u64, false),
             (u64::MAX, false),
         ] {
-            let mut gathered = SignalBuilder::of(10, 1000.0, false);
+            let mut gathered = SignalBuilder::of(1000.0, false);
             let record = TickRecord {
                 tick: 7,
                 probe_age_ns,

@@ -60,6 +60,24 @@ pub use multisine_lines::{harmonics, linearity, periodic, settling};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};
 
+/// The frequency response as by [`response`], and the data for a fit as by [`frf_data()`].
+///
+/// # Errors
+/// Those of the two.
+pub fn response_and_data(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &IdentifySettings,
+) -> Result<(Frf, Vec<FrfDatum>), IdentifyError> {
+    match settings {
+        IdentifySettings::Local(local) => local::estimate_with_data(signals, band_hz, local),
+        IdentifySettings::Welch { .. } => Ok((
+            response(signals, band_hz, settings)?,
+            frf_data(signals, band_hz, &settings.local())?,
+        )),
+    }
+}
+
 /// The frequency response by the estimator that the configuration selects.
 ///
 /// # Errors

@@ -20,6 +20,9 @@ use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic
 use crate::rt::record::{Event, TickRecord};
 use crate::util::input_file;
 
+/// Receives the metadata of a recording so far and a tick.
+pub type TickReceiver<'a> = dyn FnMut(&BTreeMap<String, String>, &TickRecord) + 'a;
+
 /// A file inside the recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StoredAttachment {
@@ -71,11 +74,20 @@ struct RecordingContents {
 impl Recording {
     /// Opens a recording. A file that ends early is read up to its end, see [`Recording::truncated`]; a damaged file is refused.
     pub fn open(path: &Path) -> Result<Recording, RecordingError> {
+        Recording::open_with(path, &mut |_, _| {})
+    }
+
+    /// As [`Recording::open`]. `on_tick` receives every tick in its order with the metadata, before it is known whether the rest
+    /// of the file is intact.
+    pub fn open_with(
+        path: &Path,
+        on_tick: &mut TickReceiver<'_>,
+    ) -> Result<Recording, RecordingError> {
         let file = open(path)?;
         refuse_other_program(&file, path)?;
         let mut walk = Walk::new(file);
         let mut found = RecordingContents::default();
-        let stop = read_to_end(&mut walk, &mut found).err();
+        let stop = read_to_end(&mut walk, &mut found, on_tick).err();
         let cut = stop.map(|stop| judge(path, stop, walk.offset, &found));
         let cut = cut.transpose()?;
         let emptiness = match cut {
@@ -102,7 +114,10 @@ impl Recording {
         };
         let mut scanner = Scanner::new(open(path)?).map_err(failed)?;
         let mut found = RecordingContents::default();
-        while scanner.step(&mut |part| found.take(part)).map_err(failed)? {}
+        while scanner
+            .step(&mut |part| found.take(part, &mut |_, _| {}))
+            .map_err(failed)?
+        {}
         found.end();
         if found.account().ticks() == 0 && !scanner.has_magic {
             return Err(RecordingError::NotMcap { path: path.into() });
@@ -305,9 +320,12 @@ impl RecordingContents {
         &self.decoder.account
     }
 
-    fn take(&mut self, part: Part<'_>) -> Result<(), String> {
+    fn take(&mut self, part: Part<'_>, on_tick: &mut TickReceiver<'_>) -> Result<(), String> {
         match self.decoder.decode(&part)? {
-            Some(Decoded::Tick(tick, gap)) => self.tick(&tick, gap),
+            Some(Decoded::Tick(tick, gap)) => {
+                self.tick(&tick, gap);
+                on_tick(&self.metadata, &tick);
+            }
             Some(Decoded::Event(event)) => self.events.push(event),
             Some(Decoded::Timing(timing)) => self.timings.push(timing),
             None => {}
@@ -414,8 +432,12 @@ fn open(path: &Path) -> Result<File, RecordingError> {
 }
 
 /// Walks to the end of the file, or to where it cannot be read.
-fn read_to_end(walk: &mut Walk, found: &mut RecordingContents) -> Result<(), Stop> {
-    while walk.step(&mut |part| found.take(part))? {}
+fn read_to_end(
+    walk: &mut Walk,
+    found: &mut RecordingContents,
+    on_tick: &mut TickReceiver<'_>,
+) -> Result<(), Stop> {
+    while walk.step(&mut |part| found.take(part, on_tick))? {}
     Ok(())
 }
 

@@ -1,11 +1,17 @@
 //! The two clocks of the loop, virtual and real time. The clock is the only difference between a simulation and a rig.
 
+use std::time::Duration;
+
 use bench_hal::Tick;
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
 
 use super::publisher::Publisher;
 use super::record::ClockTimes;
+
+/// Pause of the virtual clock while the ring is full, in which a recorder takes some hundred records. Without a pause, the waiting
+/// loop needs as much processor time as the recorder.
+const FULL_RING_PAUSE: Duration = Duration::from_micros(200);
 
 /// When a tick was due and when it began.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -57,7 +63,7 @@ pub struct Virtual {
 impl Clock for Virtual {
     fn wait(&mut self, number: u64, publisher: &Publisher) -> TickTiming {
         while !publisher.has_room() && !publisher.is_abandoned() {
-            std::thread::yield_now();
+            std::thread::sleep(FULL_RING_PAUSE);
         }
         let tick = tick(number, self.period_s);
         TickTiming {

@@ -32,12 +32,15 @@
 //! rad/s, is that of cos^2 with the half-width h = R/(2 pi) in hertz. A parabola or rational model has the noise of a constant
 //! of 0.52 h.
 
+use core::ops::RangeInclusive;
+
+use super::frf_data;
 use super::noise_floor::NoiseFloor;
 use super::record_spectra::RecordSpectra;
 use super::spectra::Spectra;
 use crate::identify::estimator::{hv, inverse};
 use crate::identify::{
-    Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, LocalModel, Signals, band,
+    Estimator, EstimatorSettings, Frf, FrfDatum, FrfPoint, IdentifyError, LocalModel, Signals, band,
 };
 
 /// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` that have input.
@@ -65,12 +68,45 @@ pub fn estimate(
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
 ) -> Result<Frf, IdentifyError> {
+    let (bins, spectra) = spectra_in_band(signals, band_hz, settings)?;
+    of_spectra(&spectra, &bins, band_hz, settings)
+}
+
+/// As [`estimate`], with the data of [`frf_data()`](crate::identify::frf_data()).
+///
+/// # Errors
+/// Those of [`estimate`].
+pub fn estimate_with_data(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &EstimatorSettings,
+) -> Result<(Frf, Vec<FrfDatum>), IdentifyError> {
+    let (bins, spectra) = spectra_in_band(signals, band_hz, settings)?;
+    let frf = of_spectra(&spectra, &bins, band_hz, settings)?;
+    let data = frf_data::of_spectra(&spectra, &bins, settings);
+    Ok((frf, frf_data::non_empty(data, band_hz)?))
+}
+
+/// The bins of a band, and the spectra of a record that allows an estimate.
+fn spectra_in_band(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &EstimatorSettings,
+) -> Result<(RangeInclusive<usize>, RecordSpectra), IdentifyError> {
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    let spectra = RecordSpectra::of_signals(signals);
-    let positions = settings.positions(&bins, band_hz, spectra.bin_hz());
-    collect(estimates(&spectra, &positions, settings)).excited(band_hz)
+    Ok((bins, RecordSpectra::of_signals(signals)))
+}
+
+fn of_spectra(
+    spectra: &RecordSpectra,
+    bins: &RangeInclusive<usize>,
+    band_hz: (f64, f64),
+    settings: &EstimatorSettings,
+) -> Result<Frf, IdentifyError> {
+    let positions = settings.positions(bins, band_hz, spectra.bin_hz());
+    collect(estimates(spectra, &positions, settings)).excited(band_hz)
 }
 
 /// The response of those positions that have an estimate.

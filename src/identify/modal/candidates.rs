@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::measurement_chain::Nodes;
+use super::measurement_chain::{Delays, unit_phasor};
 use super::parameters::ModalParameters;
 use super::solution::{Problem, Solution};
 use crate::identify::FrfDatum;
@@ -33,7 +33,7 @@ pub(super) fn candidates(problem: Problem<'_>, solution: &Solution) -> Vec<Modal
     let trials = Trials {
         problem,
         solution,
-        nodes: problem.chain.nodes(*delay_s, problem.data),
+        delays: problem.nodes.delays(*delay_s),
     };
     let mut ranked: Vec<(f64, ModalTerm)> = largest_residuals(solution, problem.data)
         .into_iter()
@@ -49,7 +49,7 @@ pub(super) fn candidates(problem: Problem<'_>, solution: &Solution) -> Vec<Modal
 struct Trials<'a> {
     problem: Problem<'a>,
     solution: &'a Solution,
-    nodes: Nodes,
+    delays: Delays,
 }
 
 impl Trials<'_> {
@@ -67,10 +67,9 @@ impl Trials<'_> {
 
     /// A mode with its best residue, and the decrease of chi^2.
     fn with_best_residue(&self, term: ModalTerm) -> (f64, ModalTerm) {
-        let chain = self.problem.chain;
-        let response = chain.mode(term.omega_rad_s, term.damping_ratio, &self.nodes);
-        let (decrease, residue_per_kg) =
-            projection(self.solution, self.problem.data, &response, 0.0);
+        let Problem { chain, data, nodes } = self.problem;
+        let response = nodes.mean(&chain.mode(&term, nodes), &self.delays);
+        let (decrease, residue_per_kg) = Projection::new(self.solution, data, &response).result();
         let term = ModalTerm {
             residue_per_kg,
             ..term
@@ -91,30 +90,39 @@ pub(super) fn first_mode_starts(
     solution: &Solution,
     term: ModalTerm,
 ) -> Vec<ModalParameters> {
-    let Problem { chain, data } = problem;
-    let nodes = chain.nodes(0.0, data);
-    let response = chain.mode(term.omega_rad_s, term.damping_ratio, &nodes);
-    let starts = delays_s(data, term).map(|delay_s| {
-        let (decrease, residue_per_kg) = projection(solution, data, &response, delay_s);
+    let Problem { chain, data, nodes } = problem;
+    let response = nodes.mean(&chain.mode(&term, nodes), &nodes.delays(0.0));
+    let mut projection = Projection::new(solution, data, &response);
+    let delays_s: Vec<f64> = delays_s(data, term).collect();
+    let (first, step) = (delays_s[0], delay_step_s(data));
+    projection.delay(&phasors(data, first));
+    let step = phasors(data, step);
+    let mut starts = Vec::with_capacity(delays_s.len());
+    for delay_s in delays_s {
+        let (decrease, residue_per_kg) = projection.result();
         let term = ModalTerm {
             residue_per_kg,
             ..term
         };
-        (decrease, ModalParameters::one_mode(term, delay_s))
-    });
-    let mut starts = best_first(starts.collect());
+        starts.push((decrease, ModalParameters::one_mode(term, delay_s)));
+        projection.delay(&step);
+    }
+    let mut starts = best_first(starts);
     starts.truncate(TRIALS);
     starts
 }
 
 /// Delays in seconds from minus a quarter to plus half a period of a mode.
 pub(super) fn delays_s(data: &[FrfDatum], term: ModalTerm) -> impl Iterator<Item = f64> {
-    let step_s = data
-        .last()
-        .map_or(0.0, |last| 1.0 / (DELAYS_PER_PERIOD * last.frequency_hz));
+    let step_s = delay_step_s(data);
     let half_period_s = std::f64::consts::PI / term.omega_rad_s.max(data[0].omega_rad_s());
     let steps = (half_period_s / step_s).min(MAX_DELAYS).ceil() as i32;
     (-steps / 2..=steps).map(move |k| f64::from(k) * step_s)
+}
+
+fn delay_step_s(data: &[FrfDatum]) -> f64 {
+    let last = data.last();
+    last.map_or(0.0, |last| 1.0 / (DELAYS_PER_PERIOD * last.frequency_hz))
 }
 
 /// The data with the largest excess over the noise in each part of the band, the largest first.
@@ -144,18 +152,41 @@ fn excess_over_noise(solution: &Solution, data: &[FrfDatum]) -> Vec<f64> {
         .collect()
 }
 
-/// The decrease of chi^2 by a response with a delay of `delay_s` and its best real factor, and that factor.
-fn projection(
-    solution: &Solution,
-    data: &[FrfDatum],
-    response: &[Complex<f64>],
-    delay_s: f64,
-) -> (f64, f64) {
-    let (mut product, mut square) = (0.0, 0.0);
-    for ((response, residual), datum) in response.iter().zip(&solution.residual).zip(data) {
-        let delayed = response * Complex::from_polar(1.0, -datum.omega_rad_s() * delay_s);
-        product += 2.0 / datum.variance * (delayed.conj() * residual).re;
-        square += 2.0 / datum.variance * delayed.norm_sqr();
+/// A response of a free real factor beside the residual of a solution.
+struct Projection {
+    /// 2/v conj(h) e of each datum, with h the response and e the residual.
+    products: Vec<Complex<f64>>,
+    /// Sum of 2/v |h|^2.
+    square: f64,
+}
+
+impl Projection {
+    fn new(solution: &Solution, data: &[FrfDatum], response: &[Complex<f64>]) -> Projection {
+        let (mut products, mut square) = (Vec::with_capacity(data.len()), 0.0);
+        for ((h, residual), datum) in response.iter().zip(&solution.residual).zip(data) {
+            let weight = 2.0 / datum.variance;
+            products.push(h.conj() * residual * weight);
+            square += h.norm_sqr() * weight;
+        }
+        Projection { products, square }
     }
-    (product * product / square, product / square)
+
+    /// Delays the response by the delay of `phasors`. This changes the products only.
+    fn delay(&mut self, phasors: &[Complex<f64>]) {
+        for (product, phasor) in self.products.iter_mut().zip(phasors) {
+            *product *= phasor;
+        }
+    }
+
+    /// The decrease of chi^2 by the response with its best factor, and that factor.
+    fn result(&self) -> (f64, f64) {
+        let product: f64 = self.products.iter().map(|product| product.re).sum();
+        (product * product / self.square, product / self.square)
+    }
+}
+
+/// exp(j w tau) of each datum: the conjugate of a delay.
+fn phasors(data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
+    let angles = data.iter().map(|datum| datum.omega_rad_s() * delay_s);
+    angles.map(unit_phasor).collect()
 }

@@ -4,7 +4,7 @@ use nalgebra::{Complex, DVector};
 
 use crate::config::Config;
 use crate::identify::FrfDatum;
-use crate::model::plant::{LoopPlant, Mode, SignalPath};
+use crate::model::plant::{LoopPlant, Mode, PathResponse, SignalPath};
 use crate::model::zeros::ModalTerm;
 
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
@@ -46,66 +46,140 @@ impl InputPath {
     }
 }
 
-/// The frequencies at which the model of each datum is evaluated.
+/// The frequencies at which the model of each datum is evaluated, with that part of the model that its parameters do not change.
 pub(super) struct Nodes(Vec<DatumNodes>);
+
+/// A response without a delay at each node of each datum.
+pub(super) struct NodeResponse(Vec<[Complex<f64>; 2]>);
+
+/// exp(-s tau) at each node of each datum, for one delay tau.
+pub(super) struct Delays(Vec<[Complex<f64>; 2]>);
 
 /// Two frequencies that have the first three moments of a datum, or one.
 struct DatumNodes(Node, Option<Node>);
 
 struct Node {
     s: Complex<f64>,
-    /// exp(s T) of a bench.
-    z: Complex<f64>,
-    /// exp(-s tau).
-    delay: Complex<f64>,
+    chain: ChainResponse,
+    /// The response of a mode far above all frequencies.
+    far: Complex<f64>,
+}
+
+/// The chain at one frequency.
+enum ChainResponse {
+    Bench(PathResponse),
+    Direct,
+    Input(Complex<f64>),
+}
+
+/// A mode of residue 1, to be observed through a chain.
+struct ObservedMode {
+    mode: Mode,
+    /// The mode at the end of the signal path of a bench.
+    plant: Option<LoopPlant>,
+}
+
+impl ObservedMode {
+    fn response(&self, s: Complex<f64>, chain: &ChainResponse) -> Complex<f64> {
+        match (chain, &self.plant) {
+            (ChainResponse::Bench(path), Some(plant)) => plant.response_along(path),
+            (ChainResponse::Input(path), _) => self.mode.resonance(s) * path,
+            (ChainResponse::Bench(_) | ChainResponse::Direct, _) => self.mode.resonance(s),
+        }
+    }
 }
 
 impl Node {
-    fn new(frequency_hz: f64, period_s: f64, delay_s: f64) -> Node {
-        let omega_rad_s = 2.0 * std::f64::consts::PI * frequency_hz;
-        Node {
-            s: Complex::new(0.0, omega_rad_s),
-            z: unit_phasor(omega_rad_s * period_s),
-            delay: unit_phasor(-omega_rad_s * delay_s),
-        }
+    fn new(chain: &MeasurementChain, far: &ObservedMode, frequency_hz: f64) -> Node {
+        let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * frequency_hz);
+        let chain = match (chain, &far.plant) {
+            (MeasurementChain::Bench(path), Some(plant)) => {
+                ChainResponse::Bench(plant.path_response(unit_phasor(s.im * path.period_s)))
+            }
+            (MeasurementChain::Input(path), _) => ChainResponse::Input(path.response(s)),
+            (MeasurementChain::Bench(_) | MeasurementChain::Direct, _) => ChainResponse::Direct,
+        };
+        let far = far.response(s, &chain);
+        Node { s, chain, far }
     }
 
-    /// A response at this frequency, with the delay.
-    fn delayed(&self, response: impl Fn(&Node) -> Complex<f64>) -> Complex<f64> {
-        response(self) * self.delay
+    /// exp(-s tau).
+    fn delay(&self, delay_s: f64) -> Complex<f64> {
+        unit_phasor(-self.s.im * delay_s)
     }
 }
 
 impl DatumNodes {
-    fn new(datum: &FrfDatum, period_s: f64, delay_s: f64) -> DatumNodes {
+    fn new(chain: &MeasurementChain, far: &ObservedMode, datum: &FrfDatum) -> DatumNodes {
         let (frequency_hz, spread_hz) = (datum.frequency_hz, datum.spread_hz);
-        if spread_hz == 0.0 {
-            return DatumNodes(Node::new(frequency_hz, period_s, delay_s), None);
+        let node = |frequency_hz| Node::new(chain, far, frequency_hz);
+        match spread_hz == 0.0 {
+            true => DatumNodes(node(frequency_hz), None),
+            false => DatumNodes(
+                node(frequency_hz - spread_hz),
+                Some(node(frequency_hz + spread_hz)),
+            ),
         }
-        let [low, high] = [frequency_hz - spread_hz, frequency_hz + spread_hz]
-            .map(|frequency_hz| Node::new(frequency_hz, period_s, delay_s));
-        DatumNodes(low, Some(high))
     }
 
-    /// The mean of a response over the datum, with the delay.
-    fn mean(&self, response: impl Fn(&Node) -> Complex<f64>) -> Complex<f64> {
+    /// The delay at the nodes; 1 in place of a second node that does not exist.
+    fn delays(&self, delay_s: f64) -> [Complex<f64>; 2] {
+        let other = self.1.as_ref().map(|node| node.delay(delay_s));
+        [
+            self.0.delay(delay_s),
+            other.unwrap_or(Complex::new(1.0, 0.0)),
+        ]
+    }
+
+    /// A response at the nodes, without a delay; 0 in place of a second node that does not exist.
+    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> [Complex<f64>; 2] {
+        let other = self.1.as_ref().map(&response);
+        [response(&self.0), other.unwrap_or_default()]
+    }
+
+    /// The mean of a response over the datum, with the delays.
+    fn mean(&self, response: &[Complex<f64>; 2], delays: &[Complex<f64>; 2]) -> Complex<f64> {
         match &self.1 {
-            Some(other) => (self.0.delayed(&response) + other.delayed(&response)) * 0.5,
-            None => self.0.delayed(response),
+            Some(_) => (response[0] * delays[0] + response[1] * delays[1]) * 0.5,
+            None => response[0] * delays[0],
         }
     }
 }
 
 /// exp(j angle).
-fn unit_phasor(angle: f64) -> Complex<f64> {
+pub(super) fn unit_phasor(angle: f64) -> Complex<f64> {
     let (sine, cosine) = libm::sincos(angle);
     Complex::new(cosine, sine)
 }
 
 impl Nodes {
+    /// The delay at each node.
+    pub(super) fn delays(&self, delay_s: f64) -> Delays {
+        Delays(self.0.iter().map(|nodes| nodes.delays(delay_s)).collect())
+    }
+
+    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> NodeResponse {
+        NodeResponse(
+            self.0
+                .iter()
+                .map(|nodes| nodes.response(&response))
+                .collect(),
+        )
+    }
+
     /// The mean of a response over each datum, with the delay.
-    fn mean(&self, response: impl Fn(&Node) -> Complex<f64>) -> Vec<Complex<f64>> {
-        self.0.iter().map(|nodes| nodes.mean(&response)).collect()
+    pub(super) fn mean(&self, response: &NodeResponse, delays: &Delays) -> Vec<Complex<f64>> {
+        let data = self.0.iter().zip(&response.0).zip(&delays.0);
+        data.map(|((nodes, response), delays)| nodes.mean(response, delays))
+            .collect()
+    }
+
+    /// The response of a constant compliance of 1 m/N for each datum.
+    pub(super) fn constant(&self, delays: &Delays) -> Vec<Complex<f64>> {
+        let far = self.mean(&self.response(|node| node.far), delays);
+        far.into_iter()
+            .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
+            .collect()
     }
 }
 
@@ -115,39 +189,28 @@ impl MeasurementChain {
         MeasurementChain::Bench(SignalPath::from(config).with_mean_age())
     }
 
-    /// The nodes of `data` for a model with the delay `delay_s`.
-    pub(super) fn nodes(&self, delay_s: f64, data: &[FrfDatum]) -> Nodes {
-        let period_s = self.period_s();
-        let nodes = data
-            .iter()
-            .map(|datum| DatumNodes::new(datum, period_s, delay_s));
+    /// The nodes of `data`.
+    pub(super) fn nodes(&self, data: &[FrfDatum]) -> Nodes {
+        let far = self.observed(FAR_RAD_S, 1.0);
+        let nodes = data.iter().map(|datum| DatumNodes::new(self, &far, datum));
         Nodes(nodes.collect())
     }
 
     /// One node at each frequency.
-    pub(super) fn nodes_at(&self, delay_s: f64, frequency_hz: &[f64]) -> Nodes {
-        let period_s = self.period_s();
-        let nodes = frequency_hz
-            .iter()
-            .map(|frequency_hz| DatumNodes(Node::new(*frequency_hz, period_s, delay_s), None));
-        Nodes(nodes.collect())
+    pub(super) fn nodes_at(&self, frequency_hz: &[f64]) -> Nodes {
+        let far = self.observed(FAR_RAD_S, 1.0);
+        let node = |frequency_hz: &f64| DatumNodes(Node::new(self, &far, *frequency_hz), None);
+        Nodes(frequency_hz.iter().map(node).collect())
     }
 
-    /// Sampling period; 0 without sampling.
-    fn period_s(&self) -> f64 {
-        match self {
-            MeasurementChain::Bench(settings) => settings.period_s,
-            MeasurementChain::Direct | MeasurementChain::Input(_) => 0.0,
-        }
+    /// The response of a mode of residue 1, its own excluded, without a delay.
+    pub(super) fn mode(&self, term: &ModalTerm, nodes: &Nodes) -> NodeResponse {
+        let mode = self.observed(term.omega_rad_s, term.damping_ratio);
+        nodes.response(|node| mode.response(node.s, &node.chain))
     }
 
-    /// The response of a mode of residue 1 for each datum.
-    pub(super) fn mode(
-        &self,
-        omega_rad_s: f64,
-        damping_ratio: f64,
-        nodes: &Nodes,
-    ) -> Vec<Complex<f64>> {
+    /// A mode of residue 1 at this chain.
+    fn observed(&self, omega_rad_s: f64, damping_ratio: f64) -> ObservedMode {
         let mode = Mode {
             omega_rad_s,
             damping_ratio,
@@ -156,33 +219,21 @@ impl MeasurementChain {
             sensor_gain: 1.0,
             floor_gain: 0.0,
         };
-        match self {
-            MeasurementChain::Bench(settings) => {
-                let plant = LoopPlant::of(settings, &[mode]);
-                nodes.mean(|node| plant.response_at(node.z))
-            }
-            MeasurementChain::Direct => nodes.mean(|node| mode.resonance(node.s)),
-            MeasurementChain::Input(path) => {
-                nodes.mean(|node| mode.resonance(node.s) * path.response(node.s))
-            }
-        }
+        let plant = match self {
+            MeasurementChain::Bench(path) => Some(LoopPlant::of(path, std::slice::from_ref(&mode))),
+            MeasurementChain::Direct | MeasurementChain::Input(_) => None,
+        };
+        ObservedMode { mode, plant }
     }
 
     /// The response of the mechanics alone in m/N: the data without hold, motor, amplifier and delays, and without another
     /// delay of `delay_s`. Aliases are not removed.
     pub(crate) fn mechanics(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
-        let chain = self.constant(&self.nodes(delay_s, data));
+        let nodes = self.nodes(data);
+        let chain = nodes.constant(&nodes.delays(delay_s));
         data.iter()
             .zip(chain)
             .map(|(datum, chain)| datum.response / chain)
-            .collect()
-    }
-
-    /// The response of a constant compliance of 1 m/N for each datum.
-    pub(super) fn constant(&self, nodes: &Nodes) -> Vec<Complex<f64>> {
-        let far = self.mode(FAR_RAD_S, 1.0, nodes);
-        far.into_iter()
-            .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
             .collect()
     }
 }

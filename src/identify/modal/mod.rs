@@ -82,14 +82,14 @@ pub fn fit_with_progress(
         return Err(too_few(data));
     };
     let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
-    let orders = search::orders(Problem { chain, data }, &mut |done| {
-        progress(SEARCH_PROGRESS * done)
-    })?;
+    let nodes = &chain.nodes(data);
+    let problem = Problem { chain, data, nodes };
+    let orders = search::orders(problem, &mut |done| progress(SEARCH_PROGRESS * done))?;
     let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
     report(progress, SEARCH_PROGRESS)?;
     let fit = ModalFit {
         band_hz: (low_hz, high_hz),
-        ..final_fit(Problem { chain, data }, best.parameters.clone())?
+        ..final_fit(problem, best.parameters.clone())?
     };
     report(progress, 1.0)?;
     Ok(ModalFit { orders, ..fit })
@@ -108,7 +108,8 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     if 2 * data.len() <= start.free().len() {
         return Err(too_few(data));
     }
-    let problem = Problem { data, ..problem };
+    let (chain, nodes) = (problem.chain, &problem.chain.nodes(data));
+    let problem = Problem { chain, data, nodes };
     with_covariance(problem, pruned(problem, start))
 }
 

@@ -2,53 +2,81 @@
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
+use crate::identify::FrfDatum;
+
+/// Number of partial sums of a product, which the processor adds up side by side.
+const LANES: usize = 8;
+
+/// The columns of J, each datum weighted with the square root of 2/v: real and imaginary parts, one after the other.
+pub(super) struct WeightedColumns {
+    root_weights: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl WeightedColumns {
+    pub(super) fn new(data: &[FrfDatum]) -> Self {
+        let root_weights = data.iter().map(|datum| (2.0 / datum.variance).sqrt());
+        Self {
+            root_weights: root_weights.collect(),
+            columns: Vec::new(),
+        }
+    }
+
+    /// Adds the derivatives by one parameter.
+    pub(super) fn add(&mut self, column: impl Iterator<Item = Complex<f64>>) {
+        let column = self.weighted(column);
+        self.columns.push(column);
+    }
+
+    fn weighted(&self, column: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
+        let mut weighted = Vec::with_capacity(2 * self.root_weights.len());
+        for (value, root_weight) in column.zip(&self.root_weights) {
+            weighted.extend([value.re * root_weight, value.im * root_weight]);
+        }
+        weighted
+    }
+
+    /// The normal equations with the residual e.
+    pub(super) fn normal_equations(
+        &self,
+        residual: impl Iterator<Item = Complex<f64>>,
+    ) -> NormalEquations {
+        let (columns, residual) = (&self.columns, self.weighted(residual));
+        let right = columns.iter().map(|column| product(column, &residual));
+        let mut matrix = DMatrix::zeros(columns.len(), columns.len());
+        for (i, column) in columns.iter().enumerate() {
+            for (j, other) in columns.iter().enumerate().skip(i) {
+                matrix[(j, i)] = product(column, other);
+            }
+        }
+        NormalEquations {
+            right: DVector::from_iterator(columns.len(), right),
+            matrix,
+        }
+    }
+}
+
+/// The sum of the products of two columns, in an order that is the same on every processor.
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let (a_blocks, b_blocks) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
+    let rest = a_blocks.remainder().iter().zip(b_blocks.remainder());
+    let mut sums = [0.0; LANES];
+    for (a, b) in a_blocks.zip(b_blocks) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
+}
+
 /// J^T W J and J^T W e; real and imaginary parts are separate data points.
 pub(super) struct NormalEquations {
     /// J^T W J, lower triangle.
     matrix: DMatrix<f64>,
     right: DVector<f64>,
-    /// The current row, weighted.
-    re: Vec<f64>,
-    im: Vec<f64>,
 }
 
 impl NormalEquations {
-    pub(super) fn new(parameters: usize) -> Self {
-        Self {
-            matrix: DMatrix::zeros(parameters, parameters),
-            right: DVector::zeros(parameters),
-            re: vec![0.0; parameters],
-            im: vec![0.0; parameters],
-        }
-    }
-
-    /// Adds a datum: the derivatives of its model, the residual, and the square root of its weight.
-    pub(super) fn add(
-        &mut self,
-        derivatives: &[Complex<f64>],
-        residual: Complex<f64>,
-        root_weight: f64,
-    ) {
-        let rows = self.re.iter_mut().zip(&mut self.im);
-        for ((re, im), derivative) in rows.zip(derivatives) {
-            (*re, *im) = (derivative.re * root_weight, derivative.im * root_weight);
-        }
-        self.add_row(residual * root_weight);
-    }
-
-    /// Adds the products of the current row.
-    fn add_row(&mut self, residual: Complex<f64>) {
-        let (re, im) = (&self.re, &self.im);
-        // The matrix is stored column by column.
-        let columns = self.matrix.as_mut_slice().chunks_exact_mut(re.len());
-        for (i, column) in columns.enumerate() {
-            self.right[i] += re[i] * residual.re + im[i] * residual.im;
-            for ((sum, r), m) in column[i..].iter_mut().zip(&re[i..]).zip(&im[i..]) {
-                *sum += re[i] * r + im[i] * m;
-            }
-        }
-    }
-
     /// Entry of the symmetric matrix.
     fn entry(&self, i: usize, j: usize) -> f64 {
         self.matrix[(i.max(j), i.min(j))]

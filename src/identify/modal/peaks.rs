@@ -2,7 +2,7 @@
 
 use super::candidates::{TRIALS, delays_s};
 use super::parameters::ModalParameters;
-use super::solution::{Problem, Solution};
+use super::solution::{Problem, Solution, node_responses};
 use crate::identify::FrfDatum;
 use crate::model::zeros::ModalTerm;
 
@@ -25,13 +25,17 @@ pub(super) fn peak_starts(problem: Problem<'_>) -> Vec<ModalParameters> {
     let [first, _, ..] = modes[..] else {
         return Vec::new();
     };
+    let start = ModalParameters {
+        modes,
+        ..ModalParameters::default()
+    };
+    let responses = node_responses(problem, &start);
     let solutions = delays_s(problem.data, first).map(|delay_s| {
         let start = ModalParameters {
-            modes: modes.clone(),
-            remainder_m_per_n: 0.0,
             delay_s,
+            ..start.clone()
         };
-        Solution::with_best_residues(problem, start)
+        Solution::of_modes(problem, start, &responses)
     });
     let mut solutions: Vec<Solution> = solutions.collect();
     solutions.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));

@@ -7,16 +7,19 @@
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
-use super::measurement_chain::{MeasurementChain, log_derivatives};
-use super::normal_equations::NormalEquations;
+use super::measurement_chain::{MeasurementChain, NodeResponse, Nodes, log_derivatives};
+use super::normal_equations::{NormalEquations, WeightedColumns};
 use super::parameters::{ModalParameters, Parameter};
 use crate::identify::FrfDatum;
+use crate::model::zeros::ModalTerm;
 
 /// The data of a fit and the chain through which they were measured.
 #[derive(Clone, Copy)]
 pub(super) struct Problem<'a> {
     pub(super) chain: &'a MeasurementChain,
     pub(super) data: &'a [FrfDatum],
+    /// The nodes of the data.
+    pub(super) nodes: &'a Nodes,
 }
 
 impl Problem<'_> {
@@ -48,7 +51,8 @@ pub(super) struct Solution {
 impl Solution {
     /// The model of given parameters.
     pub(super) fn new(problem: Problem<'_>, parameters: ModalParameters) -> Solution {
-        let mut solution = Solution::components(problem, parameters);
+        let modes = node_responses(problem, &parameters);
+        let mut solution = Solution::components(problem, parameters, &modes);
         solution.compare(problem.data);
         solution
     }
@@ -58,7 +62,17 @@ impl Solution {
         problem: Problem<'_>,
         parameters: ModalParameters,
     ) -> Solution {
-        let mut solution = Solution::components(problem, parameters);
+        let modes = node_responses(problem, &parameters);
+        Solution::of_modes(problem, parameters, &modes)
+    }
+
+    /// As [`Solution::with_best_residues`], with the [`node_responses`] of the modes.
+    pub(super) fn of_modes(
+        problem: Problem<'_>,
+        parameters: ModalParameters,
+        modes: &[NodeResponse],
+    ) -> Solution {
+        let mut solution = Solution::components(problem, parameters, modes);
         if let Some(linear) = solution.best_residues(problem.data) {
             solution.parameters = solution.parameters.with_linear(&linear);
         }
@@ -66,15 +80,16 @@ impl Solution {
         solution
     }
 
-    fn components(problem: Problem<'_>, parameters: ModalParameters) -> Solution {
-        let chain = problem.chain;
-        let nodes = chain.nodes(parameters.delay_s, problem.data);
-        let modes = parameters.modes.iter();
+    fn components(
+        problem: Problem<'_>,
+        parameters: ModalParameters,
+        modes: &[NodeResponse],
+    ) -> Solution {
+        let nodes = problem.nodes;
+        let delays = nodes.delays(parameters.delay_s);
         Solution {
-            modes: modes
-                .map(|mode| chain.mode(mode.omega_rad_s, mode.damping_ratio, &nodes))
-                .collect(),
-            constant: chain.constant(&nodes),
+            modes: modes.iter().map(|mode| nodes.mean(mode, &delays)).collect(),
+            constant: nodes.constant(&delays),
             parameters,
             residual: Vec::new(),
             chi2: f64::NAN,
@@ -106,48 +121,31 @@ impl Solution {
 
     /// The residues and R of least chi^2. Normal equations suffice: an error of theirs increases chi^2, and the step is rejected.
     fn best_residues(&self, data: &[FrfDatum]) -> Option<DVector<f64>> {
-        let mut normal = NormalEquations::new(self.modes.len() + 1);
-        let mut row = Vec::with_capacity(self.modes.len() + 1);
-        for (b, datum) in data.iter().enumerate() {
-            row.clear();
-            row.extend(
-                self.modes
-                    .iter()
-                    .chain([&self.constant])
-                    .map(|response| response[b]),
-            );
-            normal.add(&row, datum.response, root_weight(datum));
+        let mut columns = WeightedColumns::new(data);
+        for response in self.modes.iter().chain([&self.constant]) {
+            columns.add(response.iter().copied());
         }
-        normal.solve(|_| 0.0)
+        let responses = data.iter().map(|datum| datum.response);
+        columns.normal_equations(responses).solve(|_| 0.0)
     }
 
-    /// Writes the derivatives of the model at datum `b`, in the order of [`ModalParameters::free`].
-    fn derivatives(&self, b: usize, datum: &FrfDatum, row: &mut Vec<Complex<f64>>) {
-        let omega = datum.omega_rad_s();
-        row.clear();
+    /// The normal equations of a step in ln w, ln zeta, r, R and tau, in the order of [`ModalParameters::free`].
+    pub(super) fn normal_equations(&self, data: &[FrfDatum]) -> NormalEquations {
+        let mut columns = WeightedColumns::new(data);
         for (mode, response) in self.parameters.modes.iter().zip(&self.modes) {
             if mode.omega_rad_s != 0.0 {
-                let [by_omega, by_damping] = log_derivatives(mode, omega);
-                let response = response[b] * mode.residue_per_kg;
-                row.push(response * by_omega * mode.omega_rad_s);
-                row.push(response * by_damping * mode.damping_ratio);
+                let (by_omega, by_damping) = logarithm_columns(mode, response, data);
+                columns.add(by_omega.into_iter());
+                columns.add(by_damping.into_iter());
             }
-            row.push(response[b]);
+            columns.add(response.iter().copied());
         }
-        row.push(self.constant[b]);
-        row.push((self.residual[b] - datum.response) * Complex::new(0.0, omega));
-    }
-
-    /// The normal equations of a step in ln w, ln zeta, r, R and tau.
-    pub(super) fn normal_equations(&self, data: &[FrfDatum]) -> NormalEquations {
-        let parameters = self.parameters.free().len();
-        let mut normal = NormalEquations::new(parameters);
-        let mut row = Vec::with_capacity(parameters);
-        for (b, datum) in data.iter().enumerate() {
-            self.derivatives(b, datum, &mut row);
-            normal.add(&row, self.residual[b], root_weight(datum));
-        }
-        normal
+        columns.add(self.constant.iter().copied());
+        let by_delay = self.residual.iter().zip(data).map(|(residual, datum)| {
+            (residual - datum.response) * Complex::new(0.0, datum.omega_rad_s())
+        });
+        columns.add(by_delay);
+        columns.normal_equations(self.residual.iter().copied())
     }
 
     /// The covariance of w (rad/s), zeta, r (1/kg) of each mode, R (m/N) and tau (s), in the order of
@@ -175,6 +173,30 @@ impl Solution {
     }
 }
 
-fn root_weight(datum: &FrfDatum) -> f64 {
-    (2.0 / datum.variance).sqrt()
+/// The response of each mode at the nodes of the data.
+pub(super) fn node_responses(
+    problem: Problem<'_>,
+    parameters: &ModalParameters,
+) -> Vec<NodeResponse> {
+    let modes = parameters.modes.iter();
+    modes
+        .map(|mode| problem.chain.mode(mode, problem.nodes))
+        .collect()
+}
+
+/// The derivatives of a mode's response to its ln w and ln zeta.
+fn logarithm_columns(
+    mode: &ModalTerm,
+    response: &[Complex<f64>],
+    data: &[FrfDatum],
+) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
+    let derivatives = response.iter().zip(data).map(|(response, datum)| {
+        let [by_omega, by_damping] = log_derivatives(mode, datum.omega_rad_s());
+        let response = response * mode.residue_per_kg;
+        (
+            response * by_omega * mode.omega_rad_s,
+            response * by_damping * mode.damping_ratio,
+        )
+    });
+    derivatives.unzip()
 }

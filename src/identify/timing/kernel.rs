@@ -9,30 +9,89 @@ const KAISER_BETA: f64 = 8.0;
 /// Entries of the kernel's table between two samples.
 const TABLE_STEPS: usize = 2048;
 
-/// The kernel at multiples of 1/[`TABLE_STEPS`] from 0 to [`HALF_WIDTH`], and one beyond.
-static KERNEL: LazyLock<Vec<f64>> = LazyLock::new(|| {
-    (0..=HALF_WIDTH as usize * TABLE_STEPS + 1)
-        .map(kernel)
-        .collect()
-});
+/// Samples that contribute to an interpolation.
+pub(super) const TAPS: usize = 2 * HALF_WIDTH as usize;
+/// Products that the processor adds up side by side.
+const LANES: usize = 4;
 
-/// The indices of a regular sequence around `position`, each with its weight; the weights sum to 1. The interpolation is flat
-/// to 1e-4 up to 0.8 of half the sequence's rate.
-pub(super) fn weights_at(position: f64) -> impl Iterator<Item = (i64, f64)> {
-    let floor = position.floor();
-    let (fraction, before) = (position - floor, floor as i64);
-    let weights = (1 - HALF_WIDTH..=HALF_WIDTH)
-        .map(move |offset| (offset, interpolated((fraction - offset as f64).abs())));
-    let sum: f64 = weights.clone().map(|(_, weight)| weight).sum();
-    weights.map(move |(offset, weight)| (before + offset, weight / sum))
+/// The kernel for positions at multiples of 1/[`TABLE_STEPS`] between two samples.
+static KERNEL: LazyLock<Kernel> = LazyLock::new(Kernel::new);
+
+/// A row of weights for each fraction of a position, from 0 to 1.
+struct Kernel {
+    rows: Vec<[f64; TAPS]>,
+    /// Sum of each row.
+    sums: Vec<f64>,
 }
 
-/// The kernel at a distance, between the entries of its table.
-fn interpolated(distance: f64) -> f64 {
-    let entry = distance * TABLE_STEPS as f64;
-    let below = entry as usize;
-    let (a, b) = (KERNEL[below], KERNEL[below + 1]);
-    a + (b - a) * (entry - below as f64)
+impl Kernel {
+    fn new() -> Kernel {
+        let half: Vec<f64> = (0..=HALF_WIDTH as usize * TABLE_STEPS)
+            .map(kernel)
+            .collect();
+        let row = |entry: usize| {
+            // The offsets of the samples from the one below the position are 1 - HALF_WIDTH to HALF_WIDTH.
+            std::array::from_fn(|tap| {
+                let offset = (tap as i64 + 1 - HALF_WIDTH) * TABLE_STEPS as i64;
+                half[offset.abs_diff(entry as i64) as usize]
+            })
+        };
+        let rows: Vec<[f64; TAPS]> = (0..=TABLE_STEPS).map(row).collect();
+        Kernel {
+            sums: rows.iter().map(|row| row.iter().sum()).collect(),
+            rows,
+        }
+    }
+}
+
+/// A position between the samples of a regular sequence. The interpolation there is flat to 1e-4 up to 0.8 of half the sequence's
+/// rate. Between the rows of the kernel's table it is linear.
+pub(super) struct Place {
+    /// Index of the first of [`TAPS`] samples.
+    pub(super) first: i64,
+    row: usize,
+    share: f64,
+}
+
+impl Place {
+    pub(super) fn at(position: f64) -> Place {
+        let floor = position.floor();
+        let entry = (position - floor) * TABLE_STEPS as f64;
+        let row = (entry as usize).min(TABLE_STEPS - 1);
+        Place {
+            first: (floor as i64).saturating_add(1 - HALF_WIDTH),
+            row,
+            share: entry - row as f64,
+        }
+    }
+
+    fn between(&self, below: f64, above: f64) -> f64 {
+        below + (above - below) * self.share
+    }
+
+    /// The interpolation of the samples from `first` on.
+    pub(super) fn interpolate(&self, samples: &[f64; TAPS]) -> f64 {
+        let Kernel { rows, sums } = &*KERNEL;
+        let [below, above] = [self.row, self.row + 1].map(|row| product(&rows[row], samples));
+        self.between(below, above) / self.between(sums[self.row], sums[self.row + 1])
+    }
+
+    /// The weights of the samples, whose sum is 1.
+    pub(super) fn weights(&self) -> [f64; TAPS] {
+        let Kernel { rows, sums } = &*KERNEL;
+        let (below, above) = (&rows[self.row], &rows[self.row + 1]);
+        let sum = self.between(sums[self.row], sums[self.row + 1]);
+        std::array::from_fn(|tap| self.between(below[tap], above[tap]) / sum)
+    }
+}
+
+/// The sum of the products of weights and samples, in an order that is the same on every processor.
+fn product(weights: &[f64; TAPS], samples: &[f64; TAPS]) -> f64 {
+    let mut sums = [0.0; LANES];
+    for tap in 0..TAPS {
+        sums[tap % LANES] += weights[tap] * samples[tap];
+    }
+    sums.iter().sum()
 }
 
 /// sinc(x) times the Kaiser window at an entry of the table.

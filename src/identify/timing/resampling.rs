@@ -12,10 +12,12 @@
 //!
 //! I g at any time is then the position, if the signal stays below some 0.8 of half the probe's rate.
 
-use super::kernel::weights_at;
+use super::kernel::{Place, TAPS};
 
-/// Iterations; each reduces the error by w |time - grid|.
+/// Largest number of iterations; each reduces the error by w |time - grid|.
 const ITERATIONS: usize = 24;
+/// The iteration ends when all errors are below this ratio of the largest reading: some hundred roundings.
+const CONVERGED_RATIO: f64 = 1e-13;
 /// Grids up to this ratio wider than the loop's period use the period itself.
 const SAME_SPACING: f64 = 1.05;
 
@@ -99,13 +101,17 @@ impl Grid {
     fn through(readings: &Readings, mut grid: Grid) -> Grid {
         let nearest = readings.nearest(&grid);
         grid.values = nearest.iter().map(|(_, position_m)| *position_m).collect();
+        let negligible_m = CONVERGED_RATIO * largest(&grid.values);
+        let mut errors_m = Vec::with_capacity(nearest.len());
         for _ in 0..ITERATIONS {
-            let errors: Vec<f64> = nearest
-                .iter()
-                .map(|(time_s, position_m)| position_m - grid.at(*time_s))
-                .collect();
-            for (value, error) in grid.values.iter_mut().zip(&errors) {
+            errors_m.clear();
+            let errors = nearest.iter();
+            errors_m.extend(errors.map(|(time_s, position_m)| position_m - grid.at(*time_s)));
+            for (value, error) in grid.values.iter_mut().zip(&errors_m) {
                 *value += error;
+            }
+            if largest(&errors_m) <= negligible_m {
+                break;
             }
         }
         grid
@@ -113,11 +119,29 @@ impl Grid {
 
     /// The interpolation at a time; the outermost values continue beyond the ends.
     fn at(&self, time_s: f64) -> f64 {
-        let last = self.values.len() as i64 - 1;
-        weights_at((time_s - self.from_s) / self.step_s)
-            .map(|(index, weight)| weight * self.values[index.clamp(0, last) as usize])
-            .sum()
+        let place = Place::at((time_s - self.from_s) / self.step_s);
+        let inside = usize::try_from(place.first).ok();
+        let inside = inside.and_then(|first| self.values.get(first..)?.first_chunk());
+        match inside {
+            Some(samples) => place.interpolate(samples),
+            None => place.interpolate(&self.samples_beyond_ends(place.first)),
+        }
     }
+
+    fn samples_beyond_ends(&self, first: i64) -> [f64; TAPS] {
+        let last = self.values.len() as i64 - 1;
+        std::array::from_fn(|tap| {
+            let index = first.saturating_add(tap as i64);
+            self.values[index.clamp(0, last) as usize]
+        })
+    }
+}
+
+/// The largest magnitude.
+fn largest(values: &[f64]) -> f64 {
+    values
+        .iter()
+        .fold(0.0, |largest, value| value.abs().max(largest))
 }
 
 #[cfg(test)]

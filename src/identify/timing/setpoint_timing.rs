@@ -10,7 +10,7 @@
 //! u_j, held at the regular times, has the spectrum of the current held at the irregular ones, up to 0.8 of half the rate.
 //! Without this correction, times that differ by a tenth of a period change a response by several percent.
 
-use super::kernel::weights_at;
+use super::kernel::Place;
 
 /// Resamples the set-points `set_a` to the tick times. Set-point k took effect `late_periods[k]` periods after tick
 /// k; the current before the first one is 0 A. Both slices have the same length.
@@ -35,7 +35,9 @@ fn add_step(steps_a: &mut [f64], step_a: f64, position: f64) {
     if step_a == 0.0 {
         return;
     }
-    for (index, weight) in weights_at(position) {
+    let place = Place::at(position);
+    for (tap, weight) in (0..).zip(place.weights()) {
+        let index = place.first.saturating_add(tap);
         if let Some(step) = steps_a.get_mut(index.max(0) as usize) {
             *step += weight * step_a;
         }

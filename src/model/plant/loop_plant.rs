@@ -83,6 +83,16 @@ struct Tap {
     setpoint: f64,
 }
 
+/// The part of a response at z = exp(j w T) that does not depend on the modes: that of the amplifier and of the delays.
+#[derive(Clone, Debug)]
+pub struct PathResponse {
+    z: Complex<f64>,
+    /// Of the amplifier, as [`DiscretePlant::current_response`].
+    current: Complex<f64>,
+    /// z^-periods of each tap.
+    arrivals: Vec<Complex<f64>>,
+}
+
 /// State of a [`LoopPlant`]: the state of the plant, and the delayed readings, indexed by the tick of their arrival.
 #[derive(Clone, Debug)]
 pub struct LoopPlantState {
@@ -144,9 +154,24 @@ impl LoopPlant {
 
     /// The same at z = exp(j w T).
     pub fn response_at(&self, z: Complex<f64>) -> Complex<f64> {
-        let current = self.held.current_response(z);
-        let taps = self.taps.iter();
-        taps.map(|tap| tap.response(&self.held, z, current)).sum()
+        self.response_along(&self.path_response(z))
+    }
+
+    /// The part of the response at z = exp(j w T) that all plants at the end of this signal path have in common.
+    pub fn path_response(&self, z: Complex<f64>) -> PathResponse {
+        let arrivals = self.taps.iter().map(|tap| z.powi(-(tap.periods as i32)));
+        PathResponse {
+            z,
+            current: self.held.current_response(z),
+            arrivals: arrivals.collect(),
+        }
+    }
+
+    /// As [`LoopPlant::response_at`], with the [`LoopPlant::path_response`] of any plant at the end of the same signal path.
+    pub fn response_along(&self, path: &PathResponse) -> Complex<f64> {
+        let taps = self.taps.iter().zip(&path.arrivals);
+        taps.map(|(tap, arrival)| tap.response(&self.held, path) * arrival)
+            .sum()
     }
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ..., next reading, the one after it, ...].
@@ -249,17 +274,13 @@ impl Tap {
         }
     }
 
-    fn response(
-        &self,
-        held: &DiscretePlant,
-        z: Complex<f64>,
-        current: Complex<f64>,
-    ) -> Complex<f64> {
+    /// The response without the whole periods of the delay.
+    fn response(&self, held: &DiscretePlant, path: &PathResponse) -> Complex<f64> {
         let rows = self.rows.iter().zip(&held.modes);
         let moved: Complex<f64> = rows
-            .map(|(row, mode)| mode.state_response(*row, z, current))
+            .map(|(row, mode)| mode.state_response(*row, path.z, path.current))
             .sum();
-        (moved + current * self.current + self.setpoint) * z.powi(-(self.periods as i32))
+        moved + path.current * self.current + self.setpoint
     }
 
     fn output_m(&self, state: &PlantState, setpoint_a: f64) -> f64 {

@@ -46,7 +46,7 @@ use damping::damping_matrix;
 pub use damping::{DampingPoint, DampingSettings};
 pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
 pub use error::PlantError;
-pub use loop_plant::{LoopPlant, LoopPlantState, SignalPath};
+pub use loop_plant::{LoopPlant, LoopPlantState, PathResponse, SignalPath};
 pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
 pub(crate) use matrix_exponential::matrix_exponential;
 pub use modal::{ModalSettings, ModeSettings};
