@@ -103,7 +103,7 @@ impl Pattern {
     fn contains(&self, number: usize) -> bool {
         match self.step {
             1 => (self.first..=self.last).contains(&number),
-            step => number.abs_diff(self.first) % step == 0,
+            step => number.abs_diff(self.first).is_multiple_of(step),
         }
     }
 
