@@ -16,7 +16,7 @@ import scipy.linalg as la
 
 RATE, PERIOD, PERIODS, STEPS = 2000, 2000, 12, 8
 MODES = np.array([[30.0, 0.01, 1.0], [83.0, 0.01, 0.6], [141.0, 0.01, 0.4]])  # Hz, damping ratio, residue
-SPRING = 4e12  # N/m^3
+SPRING = 1e12  # N/m^3
 LINES = np.arange(5, 250, 4)
 NOISE_M, NOISE_A = 30e-9, 1e-5
 
