@@ -19,7 +19,6 @@ mod doctor;
 mod emulate;
 mod error;
 mod excitation_options;
-mod export;
 mod help;
 mod identify;
 mod identify_external;
