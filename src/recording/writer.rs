@@ -1,12 +1,14 @@
 //! Writes one run of the loop into an MCAP file.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use mcap::McapError;
 use mcap::records::MessageHeader;
+use mcap::write::{Metadata, NoSeek};
+use mcap::{Attachment, Compression, McapError, McapResult, WriteOptions};
 use prost::Message;
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +16,6 @@ use super::continuity::Continuity;
 use super::digest::Digest;
 use super::event_message::of_override;
 use super::log_time::LogTime;
-use super::mcap_writer::{AttachedFile, McapWriter};
 use super::messages;
 use super::schema::descriptor_set;
 use super::sync::{Syncable, Syncing};
@@ -27,8 +28,8 @@ use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 /// 0.2 s is lost, the chunk and what is on the way to it. At 5 kHz a chunk holds 500 ticks, about 52 kB before compression.
 const CHUNK_NS: u64 = 100_000_000;
 
-/// Name of the program in the file.
-const LIBRARY: &str = concat!("bench ", env!("CARGO_PKG_VERSION"));
+/// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
+const CHUNK_BYTES: u64 = 1 << 20;
 
 /// Keys of the metadata: period of the loop, and log time of its start.
 pub(super) const PERIOD_S: &str = "period_s";
@@ -78,7 +79,7 @@ pub struct Totals {
 /// An open recording.
 pub struct Recorder {
     path: PathBuf,
-    mcap: McapWriter,
+    mcap: mcap::Writer<NoSeek<BufWriter<Box<dyn Write + Send>>>>,
     /// Numbers of the channels, in the order of [`Topic::ALL`].
     channels: [u16; 3],
     /// Messages written on each.
@@ -129,9 +130,11 @@ impl Recorder {
         let failed = |source| RecordingError::Write {
             path: path.into(),
             ticks: 0,
-            source: McapError::Io(source),
+            source,
         };
-        let mut mcap = McapWriter::new(out, LIBRARY).map_err(failed)?;
+        let mut mcap = options()
+            .create(NoSeek::new(BufWriter::new(out)))
+            .map_err(failed)?;
         let channels = write_head(&mut mcap, header).map_err(failed)?;
         Ok(Recorder {
             path: path.into(),
@@ -170,12 +173,8 @@ impl Recorder {
         media_type: &str,
         data: &[u8],
     ) -> Result<(), RecordingError> {
-        let written = self.mcap.attach(AttachedFile {
-            log_time_ns: self.last_log_ns,
-            name,
-            media_type,
-            data,
-        });
+        let file = (name, media_type, data);
+        let written = attach(&mut self.mcap, self.last_log_ns, file);
         written.map_err(|source| self.failed(source))
     }
 
@@ -193,7 +192,7 @@ impl Recorder {
         let written = self.write_end(attachments);
         written.map_err(|source| self.failed(source))?;
         let synced = self.syncing.take().map_or(Ok(()), Syncing::finish);
-        synced.map_err(|source| self.failed(source))?;
+        synced.map_err(|source| self.failed(McapError::Io(source)))?;
         Ok(self.totals())
     }
 
@@ -238,7 +237,7 @@ impl Recorder {
             return Ok(());
         };
         let failed = syncing.finish();
-        failed.map_err(|source| self.failed(source))
+        failed.map_err(|source| self.failed(McapError::Io(source)))
     }
 
     fn close_second(&mut self) -> Result<(), RecordingError> {
@@ -268,7 +267,7 @@ impl Recorder {
         self.last_log_ns = self.log_time.at(loop_ns);
         let header = self.next_header(topic);
         self.mcap
-            .write_message(&header, &self.encoded)
+            .write_to_known_channel(&header, &self.encoded)
             .map_err(|source| self.failed(source))?;
         if topic != Topic::Timing {
             self.digest.add(topic as u8, &self.encoded);
@@ -289,16 +288,11 @@ impl Recorder {
         }
     }
 
-    fn write_end(&mut self, attachments: &[(&str, &str, &[u8])]) -> io::Result<()> {
-        for (name, media_type, data) in attachments {
-            self.mcap.attach(AttachedFile {
-                log_time_ns: self.last_log_ns,
-                name,
-                media_type,
-                data,
-            })?;
+    fn write_end(&mut self, attachments: &[(&str, &str, &[u8])]) -> McapResult<()> {
+        for file in attachments {
+            attach(&mut self.mcap, self.last_log_ns, *file)?;
         }
-        self.mcap.finish()
+        self.mcap.finish().map(|_| ())
     }
 
     fn totals(&self) -> Totals {
@@ -317,32 +311,46 @@ impl Recorder {
         }
     }
 
-    fn failed(&self, source: io::Error) -> RecordingError {
+    fn failed(&self, source: McapError) -> RecordingError {
         RecordingError::Write {
             path: self.path.clone(),
             ticks: self.account.ticks(),
-            source: McapError::Io(source),
+            source,
         }
     }
 }
 
-fn write_head(mcap: &mut McapWriter, header: &Header) -> io::Result<[u16; 3]> {
+/// Chunks are completed in memory and appended to the file without seeking, so that only the last chunk of a cut file can be
+/// incomplete.
+fn options() -> WriteOptions {
+    WriteOptions::new()
+        .compression(Some(Compression::Lz4))
+        .chunk_size(Some(CHUNK_BYTES))
+        .disable_seeking(true)
+        .library(concat!("bench ", env!("CARGO_PKG_VERSION")))
+}
+
+fn write_head<W: Write + io::Seek>(
+    mcap: &mut mcap::Writer<W>,
+    header: &Header,
+) -> McapResult<[u16; 3]> {
     let mut metadata = header.metadata.clone();
     metadata.insert("period_ns".into(), period_ns(header).to_string());
     metadata.insert(PERIOD_S.into(), header.period_s.to_string());
     metadata.insert(STARTED_NS.into(), header.started_ns.to_string());
-    mcap.write_metadata(METADATA_RECORD, &metadata)?;
-    mcap.attach(AttachedFile {
-        log_time_ns: header.started_ns,
-        name: CONFIG_ATTACHMENT,
-        media_type: "application/toml",
-        data: header.config_toml.as_bytes(),
+    mcap.write_metadata(&Metadata {
+        name: METADATA_RECORD.into(),
+        metadata,
     })?;
+    let config = header.config_toml.as_bytes();
+    let file = (CONFIG_ATTACHMENT, "application/toml", config);
+    attach(mcap, header.started_ns, file)?;
     let schema = descriptor_set();
     let mut channels = [0; 3];
     for topic in Topic::ALL {
-        let id = mcap.add_schema(topic.schema_name(), "protobuf", &schema);
-        channels[topic as usize] = mcap.add_channel(id, topic.name(), "protobuf");
+        let id = mcap.add_schema(topic.schema_name(), "protobuf", &schema)?;
+        channels[topic as usize] =
+            mcap.add_channel(id, topic.name(), "protobuf", &BTreeMap::new())?;
     }
     mcap.flush()?;
     Ok(channels)
@@ -351,4 +359,19 @@ fn write_head(mcap: &mut McapWriter, header: &Header) -> io::Result<[u16; 3]> {
 /// The period in whole nanoseconds.
 fn period_ns(header: &Header) -> u64 {
     scheduled_ns(1, header.period_s)
+}
+
+/// Attaches a file, given as name, media type and content.
+fn attach<W: Write + io::Seek>(
+    mcap: &mut mcap::Writer<W>,
+    log_time: u64,
+    (name, media_type, data): (&str, &str, &[u8]),
+) -> McapResult<()> {
+    mcap.attach(&Attachment {
+        log_time,
+        create_time: log_time,
+        name: name.into(),
+        media_type: media_type.into(),
+        data: Cow::Borrowed(data),
+    })
 }
