@@ -31,6 +31,9 @@ const CHUNK_NS: u64 = 100_000_000;
 /// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
 const CHUNK_BYTES: u64 = 1 << 20;
 
+/// Level of the compression. Level 3 makes a recording 12 % smaller, and a whole `bench chirp` needs 9 % more processor time.
+const ZSTD_LEVEL: u32 = 1;
+
 /// Keys of the metadata: period of the loop, and log time of its start.
 pub(super) const PERIOD_S: &str = "period_s";
 pub(super) const STARTED_NS: &str = "started_ns";
@@ -324,7 +327,9 @@ impl Recorder {
 /// incomplete.
 fn options() -> WriteOptions {
     WriteOptions::new()
-        .compression(Some(Compression::Lz4))
+        .compression(Some(Compression::Zstd))
+        .compression_level(ZSTD_LEVEL)
+        .compression_threads(0)
         .chunk_size(Some(CHUNK_BYTES))
         .disable_seeking(true)
         .library(concat!("bench ", env!("CARGO_PKG_VERSION")))
