@@ -1,5 +1,6 @@
 //! Values of the options of `bench tune`.
 
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use clap::ValueEnum;
@@ -34,37 +35,34 @@ fn number(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("`{text}` is not a number; give one, such as 0.5"))
 }
 
+/// A number in a range; otherwise a message with the range and a hint.
+fn within(text: &str, range: RangeInclusive<f64>, hint: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    let (low, high) = (range.start(), range.end());
+    match range.contains(&value) {
+        true => Ok(value),
+        false => Err(format!("{value} is not between {low} and {high}; {hint}")),
+    }
+}
+
 /// A modulus margin. For clap.
 pub(super) fn margin(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (0.05..=0.95).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 0.05 and 0.95; a usual value is 0.5"
-        )),
-    }
+    within(text, 0.05..=0.95, "a usual value is 0.5")
 }
 
 /// A gain margin. For clap.
 pub(super) fn gain_margin(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (1.01..=100.0).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 1.01 and 100; a usual value is 2"
-        )),
-    }
+    within(text, 1.01..=100.0, "a usual value is 2")
 }
 
 /// A phase margin in degrees. For clap.
 pub(super) fn phase_margin_deg(text: &str) -> Result<f64, String> {
-    let margin = number(text)?;
-    match (1.0..=80.0).contains(&margin) {
-        true => Ok(margin),
-        false => Err(format!(
-            "{margin} is not between 1 and 80; a usual value is 40"
-        )),
-    }
+    within(text, 1.0..=80.0, "a usual value is 40")
+}
+
+/// A factor of the damping ratios. For clap.
+pub(super) fn factor(text: &str) -> Result<f64, String> {
+    within(text, 0.01..=1.0, "1 leaves the damping unchanged")
 }
 
 /// A limit above 0. For clap.
@@ -73,17 +71,6 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     match value > 0.0 {
         true => Ok(value),
         false => Err(format!("{value} is not positive; give a limit above 0")),
-    }
-}
-
-/// A factor of the damping ratios. For clap.
-pub(super) fn factor(text: &str) -> Result<f64, String> {
-    let value = number(text)?;
-    match (0.01..=1.0).contains(&value) {
-        true => Ok(value),
-        false => Err(format!(
-            "{value} is not between 0.01 and 1; 1 leaves the damping unchanged"
-        )),
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numerical helpers: comparison with a limit, evenly spaced values, roots by bisection, assignment by distance, confidence of a proportion.
+//! Numerical helpers: comparison with a limit, rounding for texts, evenly spaced values, roots by bisection, assignment by distance, confidence of a proportion.
 
 /// Whether a value is at most a limit. A value that is not a number is beyond every limit, whereas `value > limit` would
 /// accept it.
@@ -9,6 +9,11 @@ pub fn is_within(value: f64, limit: f64) -> bool {
 /// The larger one of two values; not a number if one of them is not a number, whereas [`f64::max`] would drop it.
 pub fn larger(a: f64, b: f64) -> f64 {
     if a >= b || a.is_nan() { a } else { b }
+}
+
+/// A value to four decimals: without the rounding of its computation, for texts.
+pub fn to_four_decimals(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
 }
 
 /// `count` evenly spaced values, two or more, both ends among them exactly.

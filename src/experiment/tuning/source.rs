@@ -9,6 +9,7 @@ use crate::config::{Config, PlantSettings};
 use crate::experiment::measured_frf::MeasuredFrf;
 use crate::experiment::response_points::variance;
 use crate::identify::{Frf, FrfDatum};
+use crate::util::numeric::to_four_decimals;
 
 /// A measured frequency response, from command (A) to reading (m), with the data for a fit.
 #[derive(Clone, Debug)]
@@ -66,15 +67,10 @@ impl FrfSource {
         let plant = self.recorded_point()?;
         let point = plant.operating_point_name()?;
         Some(match plant.mass_asymmetry() {
-            Some(asymmetry) => format!("{point}, D {:+} %", rounded(100.0 * asymmetry)),
+            Some(asymmetry) => format!("{point}, D {:+} %", to_four_decimals(100.0 * asymmetry)),
             None => point,
         })
     }
-}
-
-/// A number without the rounding of its computation.
-fn rounded(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
 }
 
 /// The points of a response as data of independent errors: where neighbours are closer than the noise bandwidth B of the estimator, at

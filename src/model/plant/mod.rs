@@ -58,6 +58,7 @@ pub use structure::Structure;
 pub use xy::{SecondaryMassDeviation, XyLayout, XySettings};
 
 use crate::util::finding::Finding;
+use crate::util::numeric::to_four_decimals;
 
 /// The functions that the settings of each model provide.
 trait PlantModel {
@@ -177,8 +178,8 @@ impl PlantSettings {
     pub fn operating_point_name(&self) -> Option<String> {
         let point_m = self.operating_point_m()?;
         Some(match self.beam_length_m() {
-            Some(length_m) => format!("{} % of L", rounded(100.0 * point_m / length_m)),
-            None => format!("{} mm", rounded(1e3 * point_m)),
+            Some(length_m) => format!("{} % of L", to_four_decimals(100.0 * point_m / length_m)),
+            None => format!("{} mm", to_four_decimals(1e3 * point_m)),
         })
     }
 
@@ -217,11 +218,6 @@ impl PlantSettings {
             format!("is {point_m} m, beyond the length of the beams of {length_m} m; lower it");
         (point_m.abs() > length_m).then(|| Finding::new("plant.operating_point_m", what))
     }
-}
-
-/// A number without the rounding of its computation.
-fn rounded(value: f64) -> f64 {
-    (value * 1e4).round() / 1e4
 }
 
 /// The structure that the settings describe.
