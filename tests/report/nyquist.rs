@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use bench::identify::{Frf, Unit};
-use bench::report::{Curve, Trace, nyquist_svg};
+use bench::report::{Curve, Trace, coherence_svg, nyquist_svg};
 use nalgebra::Complex;
 
 use crate::pictures::flat;
@@ -44,4 +44,27 @@ fn draws_overlapping_confidence_circles_once() {
         }),
         50
     );
+}
+
+/// Lines of a multisine that are farther apart than their resolution: no stroke joins them.
+#[test]
+fn lines_between_gaps_are_drawn_as_dots() {
+    let apart = Frf {
+        resolution_hz: vec![1e-6; 100],
+        magnitude_sigma: vec![1e-9; 100],
+        response: (0..100)
+            .map(|k| Complex::from_polar(1.5e-4, TAU * f64::from(k) / 100.0))
+            .collect(),
+        ..flat()
+    };
+    let measured = [Trace {
+        name: "measured",
+        curve: Curve::Measured(&apart),
+    }];
+    let nyquist = nyquist_svg(Unit::MetresPerAmpere, &measured, None, "Nyquist", "").unwrap();
+    let coherence = coherence_svg(&apart, "Coherence", "").unwrap();
+    let dots = |svg: &str| svg.matches("<circle").count();
+    assert_eq!(dots(&nyquist), 100);
+    // A coherence of 1 has no place in the logarithmic panel of 1 - coherence.
+    assert_eq!(dots(&coherence), 100);
 }

@@ -148,13 +148,16 @@ impl PlotArea {
         points: &[(f64, f64)],
         directed: bool,
     ) -> Result<(), ReportError> {
-        for part in self.frame.clipped(&self.places(points)) {
+        let places = self.places(points);
+        for part in self.frame.clipped(&places) {
             draw_stroke(canvas, pen, 1.0, &part)?;
             if directed {
                 self.draw_arrow_heads(canvas, pen, &part)?;
             }
         }
-        Ok(())
+        let alone = isolated(&places);
+        let mut inside = alone.filter(|place| self.frame.contains(*place));
+        inside.try_for_each(|place| canvas.dot(place, DOT, pen.colour.into()))
     }
 
     /// Arrow heads along a line, where they are wholly inside the frame.
@@ -334,6 +337,17 @@ fn draw_dots(
         }
     }
     Ok(())
+}
+
+/// The points of a line between two gaps, or between a gap and its end, which no stroke shows.
+fn isolated(places: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
+    let is_finite = |k: usize| {
+        let place = places.get(k);
+        place.is_some_and(|(x, y)| x.is_finite() && y.is_finite())
+    };
+    let indices = (0..places.len())
+        .filter(move |k| is_finite(*k) && !is_finite(*k + 1) && !(*k > 0 && is_finite(*k - 1)));
+    indices.map(|k| places[k])
 }
 
 /// A line with a head; a dot where it is shorter than its head.
