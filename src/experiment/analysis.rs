@@ -231,7 +231,7 @@ fn with_modes(
     let plant = LoopPlant::with_mean_age(config, &modal.modes);
     let frf = estimate.frf;
     let fitted = fit.as_ref().ok();
-    let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, band_hz(&frf)));
+    let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, response_band_hz(&frf)));
     let model = model_response(&plant, &frf.frequency_hz);
     Ok(Analysis {
         excess_delay: excess_delay(&frf, &model, up_to_rad_s / TAU),
@@ -262,7 +262,7 @@ fn fit_modes(
 }
 
 /// Lowest and highest frequency of a response in hertz.
-fn band_hz(frf: &Frf) -> (f64, f64) {
+pub(super) fn response_band_hz(frf: &Frf) -> (f64, f64) {
     let ends = [frf.frequency_hz.first(), frf.frequency_hz.last()];
     let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
     (from_hz, to_hz)

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::analysis::judge;
+use super::analysis::{judge, response_band_hz};
 use super::analysis_error::AnalysisError;
 use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
@@ -124,8 +124,13 @@ pub fn analyse_external(
 ) -> Result<ExternalAnalysis, AnalysisError> {
     let chain = MeasurementChain::Input(input_path);
     signals.check()?;
-    let band_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
-    let (frf, data, periodic) = response(signals, band_hz, repetition)?;
+    let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
+    let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
+    // Beyond the outermost excited lines nothing is known.
+    let band_hz = match band_hz.is_none() && periodic.is_some() {
+        true => response_band_hz(&frf),
+        false => requested_hz,
+    };
     let fit = match &periodic {
         Some(periodic) => fit_of_periods(&data, periodic.linearity.as_ref(), &chain),
         None => modal::fit(&data, &chain),

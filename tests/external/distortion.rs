@@ -28,6 +28,12 @@ fn odd_multisine_with_a_measured_current_gives_modes_verdict_and_distortion() {
     }
     // All residues are positive, so that all zeros lie between the modes, left of the axis.
     assert_eq!(answer["cnmp"], "excluded", "{}", answer["why"]);
+    // The lines are 4 Hz apart; nothing is known beyond the first and the last.
+    let [low_hz, high_hz] = [0, 1].map(|k| number(&answer["band_hz"][k]));
+    assert!(
+        (low_hz - 5.0).abs() < 1e-6 && (high_hz - 249.0).abs() < 1e-6,
+        "{low_hz} {high_hz}"
+    );
     assert_eq!(answer["distortion_source"], "omitted_lines");
     let linearity = &answer["linearity"];
     let odd = number(&linearity["odd_distortion_ratio"]) / distortion[0];
