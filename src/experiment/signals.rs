@@ -224,25 +224,46 @@ fn thread_panicked(_: RecvError) -> RunError {
 #[cfg(test)]
 #[allow(unsafe_code, reason = "the tests raise signals")]
 mod tests {
-    use std::sync::{Mutex, MutexGuard, PoisonError};
+    use std::os::unix::process::ExitStatusExt;
+    use std::process::Output;
 
     use super::*;
 
-    /// Held by each test: a raised signal reaches every listener of the process, also that of a test beside it.
-    fn one_at_a_time() -> MutexGuard<'static, ()> {
-        static LISTENERS: Mutex<()> = Mutex::new(());
-        LISTENERS.lock().unwrap_or_else(PoisonError::into_inner)
+    const CHILD: &str = "BENCH_TEST_SIGNAL_CHILD";
+
+    /// Does `body` in a process that runs the test `name` only: a raised signal reaches every listener of the process, also the
+    /// runs of the tests beside it. `None` within that process.
+    fn in_own_process(name: &str, body: fn()) -> Option<Output> {
+        if std::env::var_os(CHILD).is_some() {
+            body();
+            return None;
+        }
+        let mut child = std::process::Command::new(std::env::current_exe().unwrap());
+        child.args(["--exact", &format!("experiment::signals::tests::{name}")]);
+        child.args(["--nocapture", "--test-threads=1"]);
+        Some(child.env(CHILD, "1").output().unwrap())
+    }
+
+    fn assert_passed(output: Option<Output>) {
+        if let Some(output) = output {
+            let text = String::from_utf8_lossy(&output.stdout);
+            assert!(output.status.success(), "{text}");
+            assert!(text.contains("1 passed"), "{text}");
+        }
     }
 
     #[test]
     fn returns_the_result_of_finished_work() {
-        let _alone = one_at_a_time();
         assert_eq!(abandon_on_signal(|| 7).unwrap(), Some(7));
     }
 
     #[test]
     fn each_stop_signal_ends_the_wait_and_not_the_process() {
-        let _alone = one_at_a_time();
+        let name = "each_stop_signal_ends_the_wait_and_not_the_process";
+        assert_passed(in_own_process(name, stop_the_wait));
+    }
+
+    fn stop_the_wait() {
         for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let (release, held) = std::sync::mpsc::channel::<()>();
             let outcome = abandon_on_signal(move || {
@@ -257,7 +278,11 @@ mod tests {
 
     #[test]
     fn each_stop_signal_sets_the_flag_and_waits_for_the_work() {
-        let _alone = one_at_a_time();
+        let name = "each_stop_signal_sets_the_flag_and_waits_for_the_work";
+        assert_passed(in_own_process(name, stop_the_work));
+    }
+
+    fn stop_the_work() {
         for number in [libc::SIGINT, libc::SIGTERM, libc::SIGQUIT] {
             let ended = stop_on_signal(|stop| {
                 // SAFETY: no memory is touched; the handlers were installed before this thread began.
@@ -274,7 +299,6 @@ mod tests {
 
     #[test]
     fn analysis_has_the_lowest_priority() {
-        let _alone = one_at_a_time();
         // Field 19 [Linux, proc_pid_stat(5)]; the name in field 2 ends with the last parenthesis.
         let nice = abandon_on_signal(|| {
             let stat = std::fs::read_to_string("/proc/thread-self/stat").unwrap();
@@ -286,16 +310,12 @@ mod tests {
 
     #[test]
     fn a_signal_sets_the_flags_of_a_run_and_ends_the_process_afterwards() {
-        const CHILD: &str = "BENCH_TEST_SIGNAL_CHILD";
-        if std::env::var_os(CHILD).is_some() {
-            return signal_during_and_after_a_run();
-        }
         let name = "a_signal_sets_the_flags_of_a_run_and_ends_the_process_afterwards";
-        let mut child = std::process::Command::new(std::env::current_exe().unwrap());
-        child.args([name, "--nocapture", "--test-threads=1"]);
-        let output = child.env(CHILD, "1").output().unwrap();
+        let Some(output) = in_own_process(name, signal_during_and_after_a_run) else {
+            return;
+        };
         let text = String::from_utf8_lossy(&output.stdout).into_owned();
-        let signal = std::os::unix::process::ExitStatusExt::signal(&output.status);
+        let signal = output.status.signal();
         assert_eq!(signal, Some(libc::SIGINT), "{text}");
         assert!(text.contains("the run is over"), "{text}");
     }
@@ -317,7 +337,6 @@ mod tests {
 
     #[test]
     fn work_that_panics_is_an_error() {
-        let _alone = one_at_a_time();
         let outcome = abandon_on_signal(|| std::panic::panic_any("no one's fault"));
         assert!(outcome.unwrap_err().to_string().contains("panic"));
     }

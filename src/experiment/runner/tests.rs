@@ -182,7 +182,7 @@ fn refuses_another_stage_on_devices_before_the_loop_closes() {
         match result {
             Err(ExperimentError::StageCheck(StageCheckError::Compliance(_))) => assert!(is_refused),
             Err(other) => panic!("{other}"),
-            Ok(_) => assert!(!is_refused, "{names:?}"),
+            Ok(run) => assert!(!is_refused, "{names:?}: {:?}", run.ended),
         }
         let closed = names.iter().filter(|name| name.contains("_control-"));
         assert_eq!(closed.count(), usize::from(!is_refused), "{names:?}");
