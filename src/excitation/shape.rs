@@ -38,7 +38,8 @@ impl CurrentLimit {
         }
     }
 
-    fn at_a(&self, frequency_hz: f64) -> f64 {
+    /// The largest amplitude at a frequency in amperes.
+    pub fn at_a(&self, frequency_hz: f64) -> f64 {
         self.current_a.min(self.slew_a_per_s / rad_s(frequency_hz))
     }
 

@@ -106,8 +106,7 @@ pub fn shape_amplitude(
         ResponseSource::Model => gain_of_model(&config)?,
         ResponseSource::Frf(path) => gain_of_frf(&config, path)?,
     };
-    let default_m = config.interlock.soft_limit_m / 3.0;
-    let travel_m = config.shape.travel_m.unwrap_or(default_m);
+    let travel_m = shape_travel_m(&config);
     let limit = CurrentLimit::new(&config.excitation_limits(), config.shape.current_ratio);
     config.chirp.amplitude = shaped_amplitude(&gain, travel_m, limit, span);
     if is_broadband {
@@ -116,8 +115,14 @@ pub fn shape_amplitude(
     Ok(config)
 }
 
-/// Lowers all amplitudes of a broadband excitation, whose displacements add up, until it moves the stage by `travel_m`.
-fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), ExperimentError> {
+/// The permitted travel of a shaped excitation in metres: `shape.travel_m`, or a third of the soft limit.
+pub(super) fn shape_travel_m(config: &Config) -> f64 {
+    let default_m = config.interlock.soft_limit_m / 3.0;
+    config.shape.travel_m.unwrap_or(default_m)
+}
+
+/// Lowers all amplitudes of an excitation until it moves the stage by at most `travel_m`, by the model.
+pub(super) fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), ExperimentError> {
     let excitation = config.chosen_excitation().build();
     let ratio = (travel_m / extremes(&excitation, config)?.travel_m).min(1.0);
     for point in &mut config.chirp.amplitude {

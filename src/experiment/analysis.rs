@@ -17,7 +17,7 @@ use crate::config::Config;
 use crate::identify::delay::excess_delay;
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
-use crate::identify::verdict::{Verdict, VerdictInput, verdict};
+use crate::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use crate::identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use crate::model::plant::{self, LoopPlant, ModalModel, Mode, Sign};
 use crate::recording::Recording;
@@ -125,7 +125,11 @@ fn analyse_signals(
 ) -> Result<Analysis, AnalysisError> {
     let filled_ticks = signals.filled_ticks;
     let estimate = estimated(recording, signals, config, progress)?;
-    let analysis = with_modes(estimate, config, filled_ticks, progress)?;
+    let with_modes = ModalStep {
+        config,
+        certainty: Certainty::ONE_LOOK,
+    };
+    let analysis = with_modes.of(estimate, filled_ticks, progress)?;
     let verdict = cautions(recording)
         .into_iter()
         .fold(analysis.verdict, |verdict, caution| {
@@ -162,7 +166,7 @@ pub(super) fn cautions(recording: &Recording) -> Vec<String> {
 }
 
 /// The responses of a recording.
-fn estimated(
+pub(super) fn estimated(
     recording: &Recording,
     signals: RunSignals,
     config: &Config,
@@ -216,36 +220,47 @@ fn open_loop(
     })
 }
 
-/// Fits the modes of a response and compares it with the model.
-fn with_modes(
-    estimate: ResponseEstimate,
-    config: &Config,
-    filled_ticks: u64,
-    progress: &mut AnalysisProgress<'_>,
-) -> Result<Analysis, AnalysisError> {
-    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
-    let chain = MeasurementChain::bench(config);
-    let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
-    let up_to_rad_s = LAST_MODE * highest_mode_rad_s(&modal);
-    let verdict = judge(&fit, &estimate.frf_data, &chain, up_to_rad_s, Some(&modal))?;
-    let plant = LoopPlant::with_mean_age(config, &modal.modes);
-    let frf = estimate.frf;
-    let fitted = fit.as_ref().ok();
-    let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, response_band_hz(&frf)));
-    let model = model_response(&plant, &frf.frequency_hz);
-    Ok(Analysis {
-        excess_delay: excess_delay(&frf, &model, up_to_rad_s / TAU),
-        delay_s: plant.delay_s(),
-        frf,
-        model,
-        filled_ticks,
-        fit,
-        signs,
-        verdict,
-        judged_up_to_rad_s: up_to_rad_s,
-        closed: estimate.closed,
-        linearity: estimate.linearity,
-    })
+/// The step of an analysis after the response: modes, comparison with the model, verdict.
+pub(super) struct ModalStep<'a> {
+    /// The configuration of the run.
+    pub(super) config: &'a Config,
+    /// How certain signs and sides must be.
+    pub(super) certainty: Certainty,
+}
+
+impl ModalStep<'_> {
+    /// Fits the modes of a response and compares it with the model.
+    pub(super) fn of(
+        &self,
+        estimate: ResponseEstimate,
+        filled_ticks: u64,
+        progress: &mut AnalysisProgress<'_>,
+    ) -> Result<Analysis, AnalysisError> {
+        let config = self.config;
+        let modal = ModalModel::of(&plant::build(&config.plant)?)?;
+        let chain = MeasurementChain::bench(config);
+        let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
+        let scope = VerdictScope::of_model(&modal, self.certainty);
+        let verdict = judge(&fit, &estimate.frf_data, &chain, scope)?;
+        let plant = LoopPlant::with_mean_age(config, &modal.modes);
+        let frf = estimate.frf;
+        let fitted = fit.as_ref().ok();
+        let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, response_band_hz(&frf)));
+        let model = model_response(&plant, &frf.frequency_hz);
+        Ok(Analysis {
+            excess_delay: excess_delay(&frf, &model, scope.up_to_rad_s / TAU),
+            delay_s: plant.delay_s(),
+            frf,
+            model,
+            filled_ticks,
+            fit,
+            signs,
+            verdict,
+            judged_up_to_rad_s: scope.up_to_rad_s,
+            closed: estimate.closed,
+            linearity: estimate.linearity,
+        })
+    }
 }
 
 /// The fitted modes, or why none can be fitted. Fails only if the receiver of the progress cancels.
@@ -285,26 +300,66 @@ impl Analysis {
     }
 }
 
-/// The verdict on CNMP zeros up to `up_to_rad_s`; with a model, as many modes are required as it has there.
+/// What a verdict covers, and what it requires.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VerdictScope {
+    /// It covers modes and zeros up to here.
+    pub(super) up_to_rad_s: f64,
+    /// The number of modes that must be found there, if it is known.
+    pub(super) expected_modes: Option<usize>,
+    /// How certain signs and sides must be.
+    pub(super) certainty: Certainty,
+}
+
+impl VerdictScope {
+    /// Up to a frequency, without a model.
+    pub(super) fn up_to(up_to_rad_s: f64) -> VerdictScope {
+        VerdictScope {
+            up_to_rad_s,
+            expected_modes: None,
+            certainty: Certainty::ONE_LOOK,
+        }
+    }
+
+    /// Above the highest mode of a model, whose visible modes must all be found.
+    pub(super) fn of_model(modal: &ModalModel, certainty: Certainty) -> VerdictScope {
+        let up_to_rad_s = LAST_MODE * highest_mode_rad_s(modal);
+        VerdictScope {
+            up_to_rad_s,
+            expected_modes: Some(visible_modes(modal, up_to_rad_s)),
+            certainty,
+        }
+    }
+
+    /// The input of a verdict.
+    pub(super) fn input<'a>(
+        self,
+        fit: &'a ModalFit,
+        frf_data: &'a [FrfDatum],
+        chain: &'a MeasurementChain,
+    ) -> VerdictInput<'a> {
+        VerdictInput {
+            fit,
+            chain,
+            frf_data,
+            up_to_rad_s: self.up_to_rad_s,
+            expected_modes: self.expected_modes,
+            certainty: self.certainty,
+        }
+    }
+}
+
+/// The verdict on CNMP zeros.
 pub(super) fn judge(
     fit: &Result<ModalFit, FitError>,
     frf_data: &[FrfDatum],
     chain: &MeasurementChain,
-    up_to_rad_s: f64,
-    model: Option<&ModalModel>,
+    scope: VerdictScope,
 ) -> Result<Verdict, AnalysisError> {
-    let fit = match fit {
-        Ok(fit) => fit,
-        Err(error) => return Ok(Verdict::undecided(error.to_string())),
-    };
-    let expected_modes = model.map(|modal| visible_modes(modal, up_to_rad_s));
-    Ok(verdict(&VerdictInput {
-        fit,
-        chain,
-        frf_data,
-        up_to_rad_s,
-        expected_modes,
-    })?)
+    match fit {
+        Ok(fit) => Ok(verdict(&scope.input(fit, frf_data, chain))?),
+        Err(error) => Ok(Verdict::undecided(error.to_string())),
+    }
 }
 
 /// Number of modes up to a frequency with a residue.

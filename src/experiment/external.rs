@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::analysis::{judge, response_band_hz};
+use super::analysis::{VerdictScope, judge, response_band_hz};
 use super::analysis_error::AnalysisError;
 use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
@@ -140,7 +140,7 @@ pub fn analyse_external(
         .or_else(|| implausible(signals.rate_hz, &frf, &data, &fit, &chain));
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
-        None => judge(&fit, &data, &chain, judged_up_to_rad_s, None)?,
+        None => judge(&fit, &data, &chain, VerdictScope::up_to(judged_up_to_rad_s))?,
     };
     Ok(ExternalAnalysis {
         frf,

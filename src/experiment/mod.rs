@@ -58,6 +58,7 @@ mod run_summary;
 mod run_supervisor;
 mod runner;
 mod segments;
+pub mod sequential;
 mod signal_builder;
 mod signals;
 mod sine_response;

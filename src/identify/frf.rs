@@ -81,6 +81,34 @@ pub struct FrfDatum {
     pub variance: f64,
 }
 
+/// The points of several responses of the same plant, each where its standard deviation is the smallest; frequencies rise.
+pub(crate) fn best_of(frfs: &[Frf]) -> Frf {
+    let mut points: Vec<(usize, usize)> = Vec::new();
+    for (which, frf) in frfs.iter().enumerate() {
+        let best = (0..frf.len()).filter(|index| is_best(frfs, which, *index));
+        points.extend(best.map(|index| (which, index)));
+    }
+    let hz = |(which, index): (usize, usize)| frfs[which].frequency_hz[index];
+    points.sort_by(|a, b| hz(*a).total_cmp(&hz(*b)));
+    points.dedup_by(|a, b| hz(*a) <= hz(*b));
+    let mut best = Frf::default();
+    for (which, index) in points {
+        best.take_from(&frfs[which], index);
+    }
+    best
+}
+
+/// Whether no other response has a smaller standard deviation at the frequency of a point, within its band.
+fn is_best(frfs: &[Frf], which: usize, index: usize) -> bool {
+    let (hz, sigma) = (
+        frfs[which].frequency_hz[index],
+        frfs[which].magnitude_sigma[index],
+    );
+    let others = frfs.iter().enumerate().filter(|(other, _)| *other != which);
+    let mut sigmas = others.filter_map(|(_, frf)| frf.magnitude_sigma_at(hz));
+    sigmas.all(|other| sigma <= other)
+}
+
 impl FrfDatum {
     /// Angular frequency in rad/s.
     pub fn omega_rad_s(&self) -> f64 {
@@ -118,6 +146,25 @@ impl Frf {
             response,
             ..self.clone()
         }
+    }
+
+    /// Standard deviation of |H| at the point below a frequency within the band; `None` outside.
+    fn magnitude_sigma_at(&self, frequency_hz: f64) -> Option<f64> {
+        let after = self.frequency_hz.partition_point(|hz| *hz <= frequency_hz);
+        let is_last = self.frequency_hz.last() == Some(&frequency_hz);
+        let is_within = after < self.len() || is_last;
+        let before = after.checked_sub(1).filter(|_| is_within)?;
+        self.magnitude_sigma.get(before).copied()
+    }
+
+    /// Appends a point of another response.
+    fn take_from(&mut self, other: &Frf, index: usize) {
+        self.frequency_hz.push(other.frequency_hz[index]);
+        self.response.push(other.response[index]);
+        self.coherence.push(other.coherence[index]);
+        self.magnitude_sigma.push(other.magnitude_sigma[index]);
+        self.phase_sigma_rad.push(other.phase_sigma_rad[index]);
+        self.resolution_hz.push(other.resolution_hz[index]);
     }
 
     /// Phase in radians, in (-pi, pi].

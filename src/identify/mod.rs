@@ -51,6 +51,7 @@ pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoin
 pub use crate::util::estimate::{Estimate, SIGMAS_95};
 pub use error::IdentifyError;
 pub use excited_band::excited_band_hz;
+pub(crate) use frf::best_of;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};
 pub use local_model::frf_data::frf_data;

@@ -1,7 +1,7 @@
 //! Verdicts: unknown delay, undefined numbers, missing modes, and zeros on the imaginary axis.
 use bench::identify::FrfDatum;
 use bench::identify::modal::{MeasurementChain, ModalFit, fit};
-use bench::identify::verdict::{Cnmp, Verdict, VerdictInput, verdict};
+use bench::identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
 use bench::model::plant::{self, ModalModel};
 use nalgebra::Complex;
 
@@ -58,6 +58,7 @@ fn verdict_from(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdi
         frf_data,
         up_to_rad_s,
         expected_modes: Some(expected),
+        certainty: Certainty::ONE_LOOK,
     })
     .expect("zeros")
 }

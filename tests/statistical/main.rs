@@ -12,5 +12,6 @@ mod measured_designs;
 mod measured_margins;
 mod modes;
 mod residual_monitor;
+mod sequential;
 mod stage_check;
 mod verdicts;

@@ -10,7 +10,7 @@ use super::source::FrfSource;
 use crate::config::{Config, UnmodelledMode};
 use crate::control::measured::{MeasuredLoop, check_gaps};
 use crate::control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
-use crate::experiment::analysis::judge;
+use crate::experiment::analysis::{VerdictScope, judge};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::measured_frf::{FrfError, check_rate, judge_excess};
 use crate::experiment::response_points::points;
@@ -387,7 +387,12 @@ fn verdict(
         .fold(0.0, f64::max);
     let up_to_rad_s = LAST_MODE * highest;
     let chain = MeasurementChain::bench(config);
-    let verdict = judge(&Ok(fit.clone()), &source.data, &chain, up_to_rad_s, None);
+    let verdict = judge(
+        &Ok(fit.clone()),
+        &source.data,
+        &chain,
+        VerdictScope::up_to(up_to_rad_s),
+    );
     verdict.map_err(|error| match error {
         AnalysisError::Plant(error) => TuneSourceError::Zeros(error),
         other => TuneSourceError::File {

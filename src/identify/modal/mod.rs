@@ -22,6 +22,7 @@ mod peaks;
 mod prune;
 mod refine;
 mod search;
+mod sensitivity;
 mod solution;
 
 use core::ops::ControlFlow;
@@ -40,6 +41,7 @@ pub use crate::identify::{Estimate, SIGMAS_95};
 pub(crate) use merge::merged;
 use prune::pruned;
 use refine::refine;
+pub(crate) use sensitivity::{by_denominator, mechanics_derivative};
 use solution::{Problem, Solution};
 
 /// Data to either side over which the noise is averaged: 64 degrees of freedom a side.

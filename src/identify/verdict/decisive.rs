@@ -5,39 +5,37 @@
 //! covariance:
 //!
 //! ```text
-//! theta' = theta +- q C e_k/sqrt(C_kk)             q = 3.1, the quantile of 0.999
+//! theta' = theta +- q C e_k/sqrt(C_kk)             q: the quantile of the required certainty, 3.1 for one look
 //! ```
 //!
 //! If the number of CNMP pairs stays the same, the sign has no effect on the verdict.
 
-use super::input::{VerdictInput, has_certain_sign};
-use crate::identify::modal::{FittedMode, ModalParameters, Parameter};
+use super::input::VerdictInput;
+use crate::identify::modal::{ModalParameters, Parameter};
 use crate::model::plant::PlantError;
 use crate::model::zeros::{ModalSum, ZeroKind};
 
-/// The quantile of 1 - 1e-3 of the normal distribution.
-const QUANTILE: f64 = 3.09;
-
-/// The first mode of the verdict whose sign is uncertain and changes the number of CNMP pairs.
+/// The first mode of the verdict, by its index, whose sign is uncertain and changes the number of CNMP pairs.
 ///
 /// # Errors
 /// When the zeros of the fit cannot be computed.
-pub(super) fn decisive_uncertain_sign(
+pub(super) fn decisive_uncertain_mode(
     input: &VerdictInput<'_>,
-) -> Result<Option<FittedMode>, PlantError> {
+) -> Result<Option<usize>, PlantError> {
     let pairs = cnmp_pairs(input, &input.fit.parameters)?;
-    for (k, mode) in input.fit.modes().into_iter().enumerate() {
-        let votes = input.covers(mode.omega_rad_s.value) && !has_certain_sign(&mode);
-        if votes && !is_same_at_both_ends(input, k, pairs) {
-            return Ok(Some(mode));
-        }
-    }
-    Ok(None)
+    let modes = input.fit.modes();
+    let is_decisive = |k: &usize| {
+        let mode = &modes[*k];
+        let votes = input.covers(mode.omega_rad_s.value) && !input.has_certain_sign(mode);
+        votes && !is_same_at_both_ends(input, *k, pairs)
+    };
+    Ok((0..modes.len()).find(is_decisive))
 }
 
 /// Whether the number of pairs is the same at both ends of the interval of a residue. Parameters without zeros are another case.
 fn is_same_at_both_ends(input: &VerdictInput<'_>, mode: usize, pairs: usize) -> bool {
-    [-QUANTILE, QUANTILE].into_iter().all(|sigmas| {
+    let quantile = input.certainty.quantile();
+    [-quantile, quantile].into_iter().all(|sigmas| {
         let shifted = with_shifted_residue(input, mode, sigmas);
         shifted.is_some_and(|parameters| {
             cnmp_pairs(input, &parameters).is_ok_and(|count| count == pairs)

@@ -17,17 +17,19 @@
 //! without response) makes the verdict undecided.
 
 mod decisive;
+mod information;
 mod input;
 mod phase_check;
 mod phase_drop;
 mod sign_groups;
 mod zeros;
 
-pub use input::VerdictInput;
+pub(crate) use information::{DecisiveQuantity, decisive_quantities};
+pub use input::{Certainty, MAX_LOOKS, VerdictInput};
 pub use phase_drop::PhaseDrop;
 pub use zeros::{UncertainZero, zeros};
 
-use decisive::decisive_uncertain_sign;
+use decisive::decisive_uncertain_mode;
 use phase_check::phase_drop_over;
 use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
@@ -37,8 +39,6 @@ use crate::identify::modal::FittedMode;
 use crate::model::plant::{PlantError, Sign};
 use crate::model::zeros::ZeroKind;
 
-/// A zero is certain to lie on one side if the probability of the other side is below this.
-const WRONG_SIDE_PROBABILITY: f64 = 1e-3;
 /// A CNMP pair that the phase does not confirm, because the response around it is noise, lies this many standard deviations off the
 /// axis: a fit is then extrapolated, and errors of the model count as well as noise.
 const UNCONFIRMED_SIGMAS: f64 = 6.0;
@@ -121,10 +121,10 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     modes.retain(|mode| input.covers(mode.omega_rad_s.value));
     let phase_drop = phase_drop_over(input, &modes, &zeros)?;
     zeros.retain(|zero| input.covers(zero.s.norm()));
-    let uncertain_sign = decisive_uncertain_sign(input)?;
+    let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
     let insufficient = insufficient_data(input, &modes)
-        .or_else(|| uncertain_sign.as_ref().map(uncertain_sign_reason))
-        .or_else(|| uncertain_side(&zeros));
+        .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
+        .or_else(|| uncertain_side(&zeros, input.certainty));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
         None => evaluate(&zeros, &signs_of(input), phase_drop),
@@ -182,9 +182,9 @@ fn uncertain_sign_reason(mode: &FittedMode) -> String {
 }
 
 /// A complex zero that may lie on either side of the imaginary axis. (A real zero is no CNMP zero on either side.)
-fn uncertain_side(zeros: &[UncertainZero]) -> Option<String> {
+fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<String> {
     let mut complex = zeros.iter().filter(|zero| zero.s.im != 0.0);
-    let zero = complex.find(|zero| !has_certain_side(zero))?;
+    let zero = complex.find(|zero| !has_certain_side(zero, certainty))?;
     let real_part = zero.real_part();
     Some(format!(
         "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
@@ -195,10 +195,10 @@ fn uncertain_side(zeros: &[UncertainZero]) -> Option<String> {
     ))
 }
 
-fn has_certain_side(zero: &UncertainZero) -> bool {
+fn has_certain_side(zero: &UncertainZero, certainty: Certainty) -> bool {
     let off_axis = zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm();
     let right = zero.rhp_probability;
-    off_axis && (right <= WRONG_SIDE_PROBABILITY || right >= 1.0 - WRONG_SIDE_PROBABILITY)
+    off_axis && (certainty.allows(right) || certainty.allows(1.0 - right))
 }
 
 /// The verdict from zeros that all have a certain side: the other two criteria must agree.

@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 
-use super::input::{VerdictInput, has_certain_sign};
+use super::input::VerdictInput;
 use super::phase_drop::{PhaseCurve, PhaseDrop, Roots, phase_drop};
 use super::zeros::UncertainZero;
 use crate::identify::FrfDatum;
@@ -49,7 +49,7 @@ pub(super) fn phase_drop_over(
 
 /// The highest mode with a certain sign or pair of zeros of the verdict.
 fn last_rad_s(input: &VerdictInput<'_>, modes: &[FittedMode], zeros: &[UncertainZero]) -> f64 {
-    let certain = modes.iter().filter(|mode| has_certain_sign(mode));
+    let certain = modes.iter().filter(|mode| input.has_certain_sign(mode));
     let modes = certain.map(|mode| mode.omega_rad_s.value);
     let pairs = zeros.iter().filter(|zero| zero.s.im > 0.0);
     let pairs = pairs

@@ -3,7 +3,7 @@
 //! Of modes closer than their widths only the sum of the residues is determined: neighbours whose signs are all uncertain are one
 //! group, with the sum of their residues and the variance of that sum.
 
-use super::input::{VerdictInput, has_certain_sign, is_certain_sign};
+use super::input::VerdictInput;
 use crate::identify::Estimate;
 use crate::identify::modal::{ModalFit, Parameter};
 
@@ -14,16 +14,20 @@ pub(super) fn signs_of(input: &VerdictInput<'_>) -> Vec<f64> {
     let covered = |k: &usize| input.covers(modes[*k].omega_rad_s.value);
     let mut groups: Vec<(bool, Vec<usize>)> = Vec::new();
     for k in (0..modes.len()).filter(covered) {
-        let certain = has_certain_sign(&modes[k]);
+        let certain = input.has_certain_sign(&modes[k]);
         match groups.last_mut() {
             Some((false, group)) if !certain => group.push(k),
             _ => groups.push((certain, vec![k])),
         }
     }
     let sums = groups.iter().map(|(_, group)| sum_of(fit, group));
-    sums.filter(|sum| is_certain_sign(magnitude(sum).below_zero_probability()))
-        .map(|sum| sum.value)
-        .collect()
+    sums.filter(|sum| {
+        input
+            .certainty
+            .allows(magnitude(sum).below_zero_probability())
+    })
+    .map(|sum| sum.value)
+    .collect()
 }
 
 fn magnitude(residue: &Estimate) -> Estimate {

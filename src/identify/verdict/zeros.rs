@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::identify::Estimate;
-use crate::identify::modal::{ModalFit, Parameter};
+use crate::identify::modal::{ModalFit, by_denominator, mechanics_derivative};
 use crate::model::plant::PlantError;
 use crate::model::zeros::{ModalSum, ModalTerm, ZeroKind};
 
@@ -95,7 +95,7 @@ fn zero_covariance(fit: &ModalFit, s: Complex<f64>) -> [[f64; 2]; 2] {
 }
 
 /// d(Re z)/d theta and d(Im z)/d theta, 2 x parameters.
-fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
+pub(super) fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
     let by_z: Complex<f64> = fit
         .parameters
         .modes
@@ -105,7 +105,7 @@ fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
     let free = fit.parameters.free();
     let moves: Vec<Complex<f64>> = free
         .iter()
-        .map(|parameter| -derivative(&fit.parameters.modes, *parameter, z) / by_z)
+        .map(|parameter| -mechanics_derivative(&fit.parameters.modes, *parameter, z) / by_z)
         .collect();
     DMatrix::from_fn(2, moves.len(), |row, column| {
         if row == 0 {
@@ -116,25 +116,6 @@ fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
     })
 }
 
-/// Derivative of a mode's response by the denominator of q.
-fn by_denominator(mode: &ModalTerm, z: Complex<f64>) -> Complex<f64> {
-    -mode.resonance(z) * mode.resonance(z) * mode.residue_per_kg
-}
-
 fn derivative_by_z(mode: &ModalTerm, z: Complex<f64>) -> Complex<f64> {
     by_denominator(mode, z) * (z * 2.0 + 2.0 * mode.damping_ratio * mode.omega_rad_s)
-}
-
-/// dG/dtheta of one parameter.
-fn derivative(modes: &[ModalTerm], parameter: Parameter, z: Complex<f64>) -> Complex<f64> {
-    match parameter {
-        Parameter::Frequency(k) => {
-            let by_frequency = z * (2.0 * modes[k].damping_ratio) + 2.0 * modes[k].omega_rad_s;
-            by_denominator(&modes[k], z) * by_frequency
-        }
-        Parameter::Damping(k) => by_denominator(&modes[k], z) * z * (2.0 * modes[k].omega_rad_s),
-        Parameter::Residue(k) => modes[k].resonance(z),
-        Parameter::Remainder => Complex::new(1.0, 0.0),
-        Parameter::Delay => Complex::new(0.0, 0.0),
-    }
 }

@@ -1,0 +1,67 @@
+//! The data of all shots.
+
+use core::ops::ControlFlow;
+use std::path::Path;
+
+use crate::config::Config;
+use crate::experiment::analysis::{Analysis, ModalStep, estimated};
+use crate::experiment::analysis_error::AnalysisError;
+use crate::experiment::read_run::open_with_signals;
+use crate::experiment::response_estimate::ResponseEstimate;
+use crate::identify::verdict::Certainty;
+use crate::identify::{Frf, FrfDatum, best_of};
+
+/// The responses of the shots, and their data for the fit.
+#[derive(Default)]
+pub(super) struct Evidence {
+    frfs: Vec<Frf>,
+    /// The data of all shots, frequencies rising.
+    pub(super) data: Vec<FrfDatum>,
+    filled_ticks: u64,
+}
+
+impl Evidence {
+    /// Adds the recording of a shot; returns its data.
+    ///
+    /// # Errors
+    /// When the recording cannot be read, or contains no frequency response.
+    pub(super) fn add(
+        &mut self,
+        recording: &Path,
+        config: &Config,
+    ) -> Result<Vec<FrfDatum>, AnalysisError> {
+        let (recording, signals) = open_with_signals(recording, config.servo.rate_hz)?;
+        let signals = signals.into_result()?;
+        self.filled_ticks += signals.filled_ticks;
+        let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
+        self.frfs.push(estimate.frf);
+        self.data.extend(estimate.frf_data.iter().copied());
+        self.data
+            .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        Ok(estimate.frf_data)
+    }
+
+    /// Fit and verdict of all data so far.
+    ///
+    /// # Errors
+    /// When the model of the plant cannot be analysed.
+    pub(super) fn analysis(&self, config: &Config) -> Result<Analysis, AnalysisError> {
+        let estimate = ResponseEstimate {
+            frf: best_of(&self.frfs),
+            frf_data: self.data.clone(),
+            closed: None,
+            linearity: None,
+        };
+        let step = ModalStep {
+            config,
+            certainty: Certainty::REPEATED_LOOKS,
+        };
+        step.of(estimate, self.filled_ticks, &mut |_, _| {
+            ControlFlow::Continue(())
+        })
+    }
+}
+
+fn never_cancels(_: crate::experiment::AnalysisPhase, _: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}

@@ -1,0 +1,73 @@
+//! The quantities whose signs decide a verdict, as linear functions of the parameters of the fit.
+//!
+//! ```text
+//! q(theta) = q + c^T (theta - theta_fit)             q: Re z of a zero, or the residue of a mode
+//! ```
+//!
+//! A quantity is decided when |q| is a certain multiple of its standard deviation sqrt(c^T C c). Only quantities that are not
+//! decided yet count.
+
+use nalgebra::DVector;
+
+use super::decisive::decisive_uncertain_mode;
+use super::input::VerdictInput;
+use super::zeros::{derivatives, zeros};
+use super::{UncertainZero, has_certain_side};
+use crate::identify::modal::Parameter;
+use crate::model::plant::PlantError;
+
+/// A quantity whose sign is not certain, and on which the verdict depends.
+#[derive(Clone, Debug)]
+pub(crate) struct DecisiveQuantity {
+    /// Its value by the fit: Re z in rad/s, or a residue in 1/kg.
+    pub(crate) value: f64,
+    /// Its derivative by each free parameter, in the order of the covariance.
+    pub(crate) gradient: DVector<f64>,
+    /// Its sign is certain from this multiple of its standard deviation.
+    pub(crate) quantile: f64,
+}
+
+/// The quantities that are not decided; none if the verdict is certain, or undecided for another reason than noise.
+///
+/// # Errors
+/// When the zeros of the fit cannot be computed.
+pub(crate) fn decisive_quantities(
+    input: &VerdictInput<'_>,
+) -> Result<Vec<DecisiveQuantity>, PlantError> {
+    let mut quantities: Vec<DecisiveQuantity> = zeros(input.fit)?
+        .iter()
+        .filter(|zero| is_open(input, zero))
+        .map(|zero| side_of(input, zero))
+        .collect();
+    let mode = decisive_uncertain_mode(input)?;
+    quantities.extend(mode.and_then(|k| sign_of(input, k)));
+    Ok(quantities)
+}
+
+fn is_open(input: &VerdictInput<'_>, zero: &UncertainZero) -> bool {
+    zero.s.im != 0.0 && input.covers(zero.s.norm()) && !has_certain_side(zero, input.certainty)
+}
+
+fn side_of(input: &VerdictInput<'_>, zero: &UncertainZero) -> DecisiveQuantity {
+    DecisiveQuantity {
+        value: zero.s.re,
+        gradient: derivatives(input.fit, zero.s).row(0).transpose(),
+        quantile: input.certainty.quantile(),
+    }
+}
+
+/// The residue of a mode.
+fn sign_of(input: &VerdictInput<'_>, mode: usize) -> Option<DecisiveQuantity> {
+    let parameters = &input.fit.parameters;
+    let free = parameters.free();
+    let index = free
+        .iter()
+        .position(|parameter| *parameter == Parameter::Residue(mode))?;
+    let mut gradient = DVector::zeros(free.len());
+    gradient[index] = 1.0;
+    Some(DecisiveQuantity {
+        value: parameters.modes[mode].residue_per_kg,
+        gradient,
+        quantile: input.certainty.quantile(),
+    })
+}
