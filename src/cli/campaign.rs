@@ -1,4 +1,4 @@
-//! `bench campaign`: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2). On devices an
+//! `bench campaign`: chirps at each point of a grid of operating points and mass asymmetries (section 5.2.2). On devices an
 //! operator loads the stage for each point.
 
 use std::io::IsTerminal;
@@ -14,7 +14,9 @@ use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{Config, Purpose, profiles};
-use crate::experiment::campaign::{Campaign, Evaluation, Grid, StageModel, Tolerances};
+use crate::experiment::campaign::{
+    Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
+};
 use crate::experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
 use crate::report::campaign_picture;
 use crate::rig::devices;
@@ -58,7 +60,10 @@ pub(super) struct Args {
     /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
     #[arg(long)]
     simulate: bool,
-    /// Keep the recording of each chirp as well, about 9 MB each
+    /// Make one chirp at each point, as configured in [chirp], in place of short chirps until the verdict is certain
+    #[arg(long)]
+    single_chirp: bool,
+    /// Keep the recording of each chirp as well, up to 9 MB each
     #[arg(long)]
     keep_recordings: bool,
     /// Accuracy with which an asymmetry can be set, for the recommendation [default: 0.25 g
@@ -73,12 +78,26 @@ pub(super) struct Args {
     threads: Option<u16>,
 }
 
+impl Args {
+    fn method(&self) -> Method {
+        match self.single_chirp {
+            true => Method::SingleChirp,
+            false => Method::UntilDecided,
+        }
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = config(args)?;
     let grid = grid(args, &config)?;
     let tolerances = tolerances(args, &grid, &config)?;
     let on_devices = is_guided(args, &config);
-    let mut campaign = Campaign::open(&args.out, &grid, &config, on_devices, args.keep_recordings)?;
+    let options = CampaignOptions {
+        on_devices,
+        keep_recordings: args.keep_recordings,
+        method: args.method(),
+    };
+    let mut campaign = Campaign::open(&args.out, &grid, &config, options)?;
     show_state(&campaign);
     if !campaign.missing().is_empty() {
         measure(args, &mut campaign, &config, tolerances)?;
@@ -159,7 +178,7 @@ fn measure_guided(
 ) -> Result<(), CliError> {
     let mut operator = TerminalOperator::new(stop, config.plant.beam_length_m())?;
     let tolerance = tolerances.operating_point;
-    Ok(campaign.run_guided(&mut operator, tolerance, &mut run_with_progress)?)
+    Ok(campaign.run_guided(&mut operator, tolerance, &mut run_with_progress, stop)?)
 }
 
 /// Runs a plan with progress on a terminal.

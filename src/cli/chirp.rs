@@ -16,8 +16,10 @@ use super::plan_output;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, exit, run_text};
 use super::table::{labelled, wrap};
+use super::until_decided::{self, SequentialOptions};
 use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::Extremes;
+use crate::experiment::sequential::first_shot_config;
 use crate::experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
@@ -30,9 +32,9 @@ use crate::util::quantity::Time;
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
-    bench: BenchOptions,
+    pub(super) bench: BenchOptions,
     #[command(flatten)]
-    run: RunOptions,
+    pub(super) run: RunOptions,
     /// Kind of excitation
     #[arg(long, value_name = "KIND", help = with_setting("Kind of excitation", "excitation.kind"))]
     excitation: Option<ExcitationKind>,
@@ -45,6 +47,8 @@ pub(super) struct Args {
     /// Frequency as a function of time
     #[arg(long, value_name = "KIND", help = with_setting("Frequency as a function of time", "chirp.sweep"))]
     sweep: Option<Sweep>,
+    #[command(flatten)]
+    sequential: SequentialOptions,
     /// Only print what the run would do: travel, current, heat, duration; no motion
     #[arg(long)]
     plan: bool,
@@ -116,7 +120,12 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.config()?;
+    let base = args.config()?;
+    let max_motion_s = args.sequential.max_motion_s(&base)?;
+    let config = match max_motion_s {
+        Some(_) => first_shot_config(&base)?,
+        None => base.clone(),
+    };
     let expected = predicted_extremes(&config)?;
     if args.plan {
         warn(&check_calibration(&config, args.run.stage(&config))?);
@@ -125,7 +134,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         print_result(args.bench.json, &plan, plan_output::text)?;
         return Ok(Outcome::Done);
     }
-    measure(args, &config, expected)
+    match max_motion_s {
+        Some(max_motion_s) => until_decided::measure(args, &base, max_motion_s),
+        None => measure(args, &config, expected),
+    }
 }
 
 /// Runs the excitation and analyses its recording.

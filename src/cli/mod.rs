@@ -47,6 +47,7 @@ mod tune_measured;
 mod tune_output;
 mod tune_plants;
 mod tune_values;
+mod until_decided;
 mod value_range;
 
 pub use crate::experiment::ErrorKind;

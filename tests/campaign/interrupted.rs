@@ -4,14 +4,14 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::config::{Source, load};
-use bench::experiment::campaign::{Grid, GridPoint, PointResult, Store};
+use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench::identify::verdict::Cnmp;
 use serde_json::Value;
 
 use crate::program::Bench;
 
 /// 4 x 3 points, each with the shortest chirp that passes over all modes.
-const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 \
+const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 --single-chirp \
                     --set chirp.start_hz=5 --set chirp.duration_s=8 --set chirp.fade_in_s=0.5 --set chirp.quiet_after_s=2";
 /// Time limit of a wait, not a requirement.
 const WAIT_LIMIT: Duration = Duration::from_secs(240);
@@ -255,11 +255,20 @@ fn rejects_results_of_simulation_for_devices_and_the_reverse() {
         signs: "+".into(),
         zeros_rad_s: Vec::new(),
         loop_digest: String::new(),
+        motion_s: None,
         load_check: None,
     };
     for simulated_first in [true, false] {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let open = |on_devices| Store::open(folder.path(), &grid, &config, on_devices);
+        let open = |on_devices| {
+            Store::open(
+                folder.path(),
+                &grid,
+                &config,
+                on_devices,
+                Method::SingleChirp,
+            )
+        };
         let first = open(!simulated_first).expect("a new folder");
         first
             .store
@@ -280,7 +289,8 @@ fn rejects_results_of_simulation_for_devices_and_the_reverse() {
 /// A folder with one finished point, and the file of the point.
 fn store_with_one_point(folder: &Path, grid: &Grid, point: &PointResult) -> PathBuf {
     let config = load(&Source::default()).expect("the default profile");
-    let opened = Store::open(folder, grid, &config, false).expect("a new folder");
+    let opened =
+        Store::open(folder, grid, &config, false, Method::SingleChirp).expect("a new folder");
     let place = GridPoint { row: 1, column: 0 };
     opened.store.add(place, point).expect("a point");
     folder.join("points/0001-0000.json")
@@ -294,6 +304,7 @@ fn measured_point() -> PointResult {
         signs: "+-".into(),
         zeros_rad_s: vec![[12.5, 340.0]],
         loop_digest: "0123456789abcdef".into(),
+        motion_s: None,
         load_check: None,
     }
 }
@@ -311,7 +322,8 @@ fn altered_file_of_a_point_is_not_used() {
         let mut altered = bytes.clone();
         altered[at] ^= 1 << (at % 7);
         std::fs::write(&path, altered).expect("room");
-        let opened = Store::open(folder.path(), &grid, &config, false).expect("the folder");
+        let opened = Store::open(folder.path(), &grid, &config, false, Method::SingleChirp)
+            .expect("the folder");
         rejected += opened.rejected.len();
         // Spaces between the values may be altered.
         for (_, result) in opened.done {
@@ -339,7 +351,8 @@ fn file_of_a_point_without_checksum_is_used_and_counted() {
         .remove("checksum");
     assert!(removed.is_some_and(|checksum| checksum.is_string()));
     std::fs::write(&path, record.to_string()).expect("room");
-    let opened = Store::open(folder.path(), &grid, &config, false).expect("the folder");
+    let opened =
+        Store::open(folder.path(), &grid, &config, false, Method::SingleChirp).expect("the folder");
     assert_eq!((opened.done.len(), opened.unverified), (1, 1));
     assert_eq!(opened.done[0].1, point);
 }

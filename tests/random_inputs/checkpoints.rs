@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bench::config::{Config, Source, load};
-use bench::experiment::campaign::{Grid, GridPoint, PointResult, Store};
+use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench::identify::verdict::Cnmp;
 use bench::model::study::{Block, Plan, Shard, StudyFile};
 use bench::rig::motor::{Moment, MotorMemory};
@@ -52,6 +52,7 @@ fn result(index: usize) -> PointResult {
         signs: "+-+".into(),
         zeros_rad_s: vec![[0.1, 200.0]],
         loop_digest: "0123456789abcdef".into(),
+        motion_s: None,
         load_check: None,
     }
 }
@@ -62,7 +63,7 @@ fn damaged_point_of_a_campaign_is_the_measured_one_or_rejected() {
     let config = stage();
     let grid = Grid::new(vec![0.02, 0.04], vec![0.0], &config).expect("a grid");
     let point = grid.points().next().expect("a point");
-    let open = || Store::open(folder.path(), &grid, &config, false);
+    let open = || Store::open(folder.path(), &grid, &config, false, Method::SingleChirp);
     open()
         .and_then(|opened| opened.store.add(point, &result(0)))
         .expect("a stored point");

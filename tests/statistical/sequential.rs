@@ -3,10 +3,10 @@
 //! By default a coarse grid with one seed; `BENCH_SEQUENTIAL_SEEDS=5` takes the whole grid of 15 x 10 points with five seeds.
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use bench::config::Config;
-use bench::experiment::sequential::{default_max_motion_s, until_decided};
+use bench::experiment::sequential::{SequenceLimits, default_max_motion_s, until_decided};
 use bench::experiment::{Plan, Runner, Setup, close};
 use bench::identify::verdict::Cnmp;
 use bench_test_support::identified::{config, truth};
@@ -41,7 +41,12 @@ fn outcome(point: Point) -> Outcome {
     let runner = Runner::new(Setup::simulated(folder.path().into()));
     let mut make_run = |plan: &Plan| runner.run(plan, "shot");
     let limit_s = default_max_motion_s(&config).expect("a model");
-    let sequence = until_decided(&config, limit_s, &mut make_run, &mut |_| {}).expect("shots");
+    let stop = AtomicBool::new(false);
+    let limits = SequenceLimits {
+        max_motion_s: limit_s,
+        stop: &stop,
+    };
+    let sequence = until_decided(&config, limits, &mut make_run, &mut |_| {}).expect("shots");
     let motion_s = sequence.motion_s();
     let last = sequence.shots.last().expect("a shot").clone();
     close(sequence.last, &last).expect("a good disk");

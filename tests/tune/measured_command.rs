@@ -123,6 +123,9 @@ fn campaign_without_recordings_is_refused_with_the_option_that_keeps_them() {
         r#"{"format": "bench campaign 1", "operating_points": [0.04, 0.08], "asymmetries": [0.1]}"#;
     bench.write("empty/campaign.json", settings);
     tune("empty").is_refused(&["no recordings", "--keep-recordings"]);
+    let short = settings.replace('{', r#"{"method": "until_decided", "#);
+    bench.write("empty/campaign.json", short);
+    tune("empty").is_refused(&["short chirps", "--single-chirp --keep-recordings"]);
     bench.write("empty/campaign.json", "{}");
     tune("empty").is_refused(&["not the folder of a campaign"]);
 }
@@ -130,7 +133,8 @@ fn campaign_without_recordings_is_refused_with_the_option_that_keeps_them() {
 #[test]
 fn campaign_gives_one_controller_for_all_its_points() {
     let bench = Bench::new();
-    let points = "--operating-points 6%:8%:2 --asymmetries 5%:10%:2 --keep-recordings";
+    let points =
+        "--operating-points 6%:8%:2 --asymmetries 5%:10%:2 --single-chirp --keep-recordings";
     // The points of a campaign are measured at 1 kHz.
     let sets = "--set chirp.duration_s=30";
     bench.json(&format!("campaign {points} {sets} --out stage"));

@@ -7,6 +7,7 @@ use crate::config::Config;
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::run::Run;
+use crate::experiment::sequential::Sequence;
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::Cnmp;
 use crate::recording::{Recording, RecordingError};
@@ -27,6 +28,9 @@ pub struct PointResult {
     pub zeros_rad_s: Vec<[f64; 2]>,
     /// Equal for two runs whose loops had the same input and output, bit for bit.
     pub loop_digest: String,
+    /// Length of all chirps in seconds, if several were made until the verdict was certain.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion_s: Option<f64>,
     /// The load that the operator set, and its check; none on the simulated stage.
     #[serde(default, skip_serializing_if = "Option::is_none", alias = "put_on")]
     pub load_check: Option<LoadCheck>,
@@ -44,9 +48,7 @@ impl PointResult {
 /// with the reason. Fails if the recording cannot be read.
 pub fn analyse_point(run: &mut Run, config: &Config) -> Result<PointResult, RecordingError> {
     let loop_digest = format!("{:016x}", run.totals()?.loop_digest);
-    if let Some((trip, tick)) = run.ended.trip {
-        let remedy = trip.remedy();
-        let why = format!("the run tripped at tick {tick}: {trip}; {remedy}");
+    if let Some(why) = trip_reason(run) {
         return Ok(undecided(why, loop_digest));
     }
     match analyse(&Recording::open(&run.path)?, config) {
@@ -54,6 +56,30 @@ pub fn analyse_point(run: &mut Run, config: &Config) -> Result<PointResult, Reco
         Err(AnalysisError::Recording(error)) => Err(error),
         Err(error) => Ok(undecided(error.to_string(), loop_digest)),
     }
+}
+
+/// The result of the chirps of a point that were made until the verdict was certain.
+///
+/// # Errors
+/// When the last recording was removed.
+pub(super) fn sequence_result(sequence: &mut Sequence) -> Result<PointResult, RecordingError> {
+    let loop_digest = format!("{:016x}", sequence.last.totals()?.loop_digest);
+    let motion_s = Some(sequence.motion_s());
+    let analysed = match (trip_reason(&sequence.last), &sequence.analysis) {
+        (None, Some(analysis)) => result(analysis, loop_digest),
+        (why, _) => undecided(why.unwrap_or_default(), loop_digest),
+    };
+    Ok(PointResult {
+        motion_s,
+        ..analysed
+    })
+}
+
+/// Why a run that tripped has no result.
+fn trip_reason(run: &Run) -> Option<String> {
+    let (trip, tick) = run.ended.trip?;
+    let remedy = trip.remedy();
+    Some(format!("the run tripped at tick {tick}: {trip}; {remedy}"))
 }
 
 fn undecided(why: String, loop_digest: String) -> PointResult {
@@ -64,6 +90,7 @@ fn undecided(why: String, loop_digest: String) -> PointResult {
         signs: String::new(),
         zeros_rad_s: Vec::new(),
         loop_digest,
+        motion_s: None,
         load_check: None,
     }
 }
@@ -79,6 +106,7 @@ fn result(analysis: &Analysis, loop_digest: String) -> PointResult {
         signs: modes.iter().map(FittedMode::sign).collect(),
         zeros_rad_s: verdict.zeros.iter().map(|z| [z.s.re, z.s.im]).collect(),
         loop_digest,
+        motion_s: None,
         load_check: None,
     }
 }

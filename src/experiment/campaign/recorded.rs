@@ -2,8 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
+
 use super::error::CampaignError;
 use super::grid::{Grid, GridPoint};
+use super::measure::Method;
 use super::store::{check_format, name};
 use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
 
@@ -20,6 +23,16 @@ pub struct RecordedPoint {
     /// The recording of its chirp.
     pub recording: PathBuf,
 }
+
+/// The part of `campaign.json` that tells how the points were measured.
+#[derive(Deserialize)]
+struct Measured {
+    #[serde(default)]
+    method: Method,
+}
+
+const SHORT_CHIRPS: &str = "has short chirps, which do not measure the response over the whole band; measure the campaign with --single-chirp \
+    --keep-recordings in a new folder, or give recordings with --frf";
 
 /// The recordings of all points of a campaign; with an asymmetry only those of its points.
 ///
@@ -51,7 +64,7 @@ pub fn recorded_points(
             percents(&grid.asymmetries)
         ))),
         (0, _) => Err(unusable(
-            "has no recordings of its points: `bench campaign` keeps them only with --keep-recordings; measure the campaign with it in a new folder".into(),
+            "has no recordings of its points: `bench campaign` keeps them only with --keep-recordings; measure the campaign with --single-chirp --keep-recordings in a new folder".into(),
         )),
         (_, 0) => Ok(with_values(&grid, found)),
         (found, _) => Err(unusable(format!(
@@ -73,16 +86,19 @@ fn with_values(grid: &Grid, found: Vec<(GridPoint, Option<PathBuf>)>) -> Vec<Rec
 
 /// The grid in `campaign.json`.
 fn grid(folder: &Path) -> Result<Grid, String> {
-    let remedy =
-        "give the folder of `bench campaign --keep-recordings --out DIR`, or recordings with --frf";
+    let remedy = "give the folder of `bench campaign --single-chirp --keep-recordings --out DIR`, or recordings with --frf";
     let path = folder.join("campaign.json");
     let text = input_file::read_text(&path, MAX_SETTINGS_BYTES)
         .map_err(|e| format!("is not the folder of a campaign (campaign.json: {e}); {remedy}"))?;
     check_format(&text).map_err(|why| {
         format!("is not the folder of a campaign (campaign.json: {why}); {remedy}")
     })?;
-    let grid: Grid = serde_json::from_str(&text)
-        .map_err(|e| format!("has a damaged campaign.json ({e}); {remedy}"))?;
+    let damaged = |e| format!("has a damaged campaign.json ({e}); {remedy}");
+    let grid: Grid = serde_json::from_str(&text).map_err(damaged)?;
+    let measured: Measured = serde_json::from_str(&text).map_err(damaged)?;
+    if measured.method == Method::UntilDecided {
+        return Err(SHORT_CHIRPS.into());
+    }
     match grid.operating_points.is_empty() || grid.asymmetries.is_empty() {
         true => Err(format!("has a campaign without points; {remedy}")),
         false => Ok(grid),

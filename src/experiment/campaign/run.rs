@@ -3,12 +3,13 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use super::error::{CampaignError, file_error};
+use super::error::CampaignError;
 use super::evaluation::Evaluation;
 use super::grid::{Grid, GridPoint};
 use super::guided::{GuidedCampaign, LoadedRig, Operator};
+use super::measure::{Method, PointMeasurement};
 use super::parallel::measure_in_parallel;
-use super::point::{PointResult, analyse_point};
+use super::point::PointResult;
 use super::recommend::Tolerances;
 use super::rest_position::RestPosition;
 use super::store::{OpenedStore, Store};
@@ -17,23 +18,32 @@ use crate::config::Config;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
-use crate::experiment::prediction::predicted_extremes;
 use crate::experiment::run::Run;
 use crate::experiment::runner::{Runner, Setup, close};
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
-use crate::util::checkpoint::FileAction;
 use crate::util::progress::Progress;
 
 /// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.
 pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;
+
+/// How a campaign is measured.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CampaignOptions {
+    /// Whether on devices, with an operator.
+    pub on_devices: bool,
+    /// Whether the recordings of the points are kept after their analysis.
+    pub keep_recordings: bool,
+    /// How each point is measured.
+    pub method: Method,
+}
 
 /// A campaign in progress.
 pub struct Campaign<'a> {
     config: &'a Config,
     grid: &'a Grid,
     store: Store,
-    keep_recordings: bool,
+    options: CampaignOptions,
     done: Vec<(GridPoint, PointResult)>,
     /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
@@ -42,26 +52,24 @@ pub struct Campaign<'a> {
 }
 
 impl<'a> Campaign<'a> {
-    /// Opens the folder of a campaign, or creates it; see [`Store::open`]. With `keep_recordings`, the recording of each point is
-    /// not removed after its analysis.
+    /// Opens the folder of a campaign, or creates it; see [`Store::open`].
     pub fn open(
         folder: &Path,
         grid: &'a Grid,
         config: &'a Config,
-        on_devices: bool,
-        keep_recordings: bool,
+        options: CampaignOptions,
     ) -> Result<Campaign<'a>, CampaignError> {
         let OpenedStore {
             store,
             done,
             rejected,
             unverified,
-        } = Store::open(folder, grid, config, on_devices)?;
+        } = Store::open(folder, grid, config, options.on_devices, options.method)?;
         Ok(Campaign {
             config,
             grid,
             store,
-            keep_recordings,
+            options,
             done,
             rejected,
             unverified,
@@ -90,11 +98,18 @@ impl<'a> Campaign<'a> {
         let missing = self.missing();
         progress.begin("campaign", missing.len() as u64);
         let (config, grid, store) = (self.config, self.grid, &self.store);
-        let keep = self.keep_recordings;
+        let options = self.options;
         let measure = |point| {
-            let run = |setup, plan: &Plan| Runner::new(setup).run(plan, "chirp");
-            let setup = Setup::simulated(store.recordings(point));
-            measure_point(&grid.config_at(config, point)?, setup, keep, run)
+            let folder = store.recordings(point);
+            let runner = Runner::new(Setup::simulated(folder.clone()));
+            let point = PointMeasurement {
+                config: &grid.config_at(config, point)?,
+                folder: &folder,
+                keep_recordings: options.keep_recordings,
+                method: options.method,
+                stop,
+            };
+            point.measure(&mut |plan| runner.run(plan, "chirp"))
         };
         let done = &mut self.done;
         let take = |point, result| {
@@ -109,12 +124,13 @@ impl<'a> Campaign<'a> {
     }
 
     /// Measures the missing points on devices, with an operator who loads the stage. `tolerance` is the allowed error of a
-    /// measured displacement, a ratio of the beam length; `run` makes each run.
+    /// measured displacement, a ratio of the beam length; `run` makes each run. When `stop` is set, no other chirp of a point begins.
     pub fn run_guided(
         &mut self,
         operator: &mut dyn Operator,
         tolerance: f64,
         run: &mut RunPlan<'_>,
+        stop: &AtomicBool,
     ) -> Result<(), CampaignError> {
         let points = visit_order(self.grid, &self.missing());
         let (config, grid) = (self.config, self.grid);
@@ -126,6 +142,7 @@ impl<'a> Campaign<'a> {
             rig: DeviceRig {
                 campaign: self,
                 run,
+                stop,
             },
         }
         .run(&points);
@@ -139,44 +156,11 @@ impl<'a> Campaign<'a> {
     }
 }
 
-/// Makes, analyses and records the chirp of one point; `None` if the run was stopped.
-fn measure_point(
-    config: &Config,
-    setup: Setup,
-    keep_recording: bool,
-    run: impl FnOnce(Setup, &Plan) -> Result<Run, ExperimentError>,
-) -> Result<Option<PointResult>, CampaignError> {
-    predicted_extremes(config)?;
-    let folder = setup.folder.clone();
-    // There is a recording without a result if an earlier process was killed.
-    remove(&folder)?;
-    let plan = Plan::chirp(config.clone());
-    let mut run = run(setup, &plan)?;
-    if run.stop_cause.is_some() {
-        remove(&folder)?;
-        return Ok(None);
-    }
-    let result = analyse_point(&mut run, config).map_err(ExperimentError::from)?;
-    close(run, &result)?;
-    if !keep_recording {
-        remove(&folder)?;
-    }
-    Ok(Some(result))
-}
-
-fn remove(folder: &Path) -> Result<(), CampaignError> {
-    match std::fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
-            Err(file_error(FileAction::Remove, folder, &e))
-        }
-        _ => Ok(()),
-    }
-}
-
 /// The configured devices, with a stage that the operator loads.
 struct DeviceRig<'r, 'a, 'f> {
     campaign: &'r mut Campaign<'a>,
     run: &'r mut RunPlan<'f>,
+    stop: &'r AtomicBool,
 }
 
 impl LoadedRig for DeviceRig<'_, '_, '_> {
@@ -200,12 +184,17 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
     fn measure(&mut self, point: GridPoint) -> Result<Option<PointResult>, CampaignError> {
         let campaign = &*self.campaign;
         let config = campaign.grid.config_at(campaign.config, point)?;
-        let setup = Setup::on_devices(campaign.store.recordings(point));
+        let folder = campaign.store.recordings(point);
+        let setup = Setup::on_devices(folder.clone());
         let run = &mut self.run;
-        let keep = campaign.keep_recordings;
-        measure_point(&config, setup, keep, |setup, plan| {
-            run(setup, plan, "chirp")
-        })
+        let point = PointMeasurement {
+            config: &config,
+            folder: &folder,
+            keep_recordings: campaign.options.keep_recordings,
+            method: campaign.options.method,
+            stop: self.stop,
+        };
+        point.measure(&mut |plan| run(setup.clone(), plan, "chirp"))
     }
 
     fn store(&mut self, point: GridPoint, result: &PointResult) -> Result<(), CampaignError> {

@@ -14,6 +14,7 @@ use serde_json::Value;
 
 use super::error::{CampaignError, file_error};
 use super::grid::{Grid, GridPoint};
+use super::measure::Method;
 use super::point::PointResult;
 use crate::config::Config;
 use crate::util::atomic_file::write_durable;
@@ -31,6 +32,9 @@ struct Header<'a> {
     /// Whether it was measured on devices. Results of the simulated stage are not valid for a real stage.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     on_devices: bool,
+    /// Folders of earlier versions do not have it: one chirp at each point.
+    #[serde(skip_serializing_if = "Method::is_single_chirp")]
+    method: Method,
     #[serde(flatten)]
     grid: &'a Grid,
     config: &'a Config,
@@ -99,6 +103,7 @@ impl Store {
         grid: &Grid,
         config: &Config,
         on_devices: bool,
+        method: Method,
     ) -> Result<OpenedStore, CampaignError> {
         let points = folder.join("points");
         std::fs::create_dir_all(&points)
@@ -109,6 +114,7 @@ impl Store {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
             on_devices,
+            method,
             grid,
             config,
         })?;

@@ -19,5 +19,8 @@ mod next_shot;
 mod run;
 mod shot;
 
-pub use run::{Sequence, SequenceEnd, ShotSummary, default_max_motion_s, until_decided};
+pub use run::{
+    Sequence, SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, first_shot_config,
+    until_decided,
+};
 pub use shot::Shot;

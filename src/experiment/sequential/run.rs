@@ -1,5 +1,7 @@
 //! The sequence of shots.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use serde::Serialize;
 
 use super::amplitude::{amplitude_of_fit, first_config, next_config};
@@ -22,8 +24,10 @@ use crate::model::plant::{self, ModalModel};
 
 /// The default limit of the motion, in lengths of the first shot.
 const DEFAULT_LIMIT: f64 = 20.0;
-/// A prediction that more motion than allowed is necessary counts after this number of shots.
+/// The sequence ends early, because nothing can be decided, after this number of shots or more.
 const MIN_LOOKS: usize = 2;
+/// A verdict needs this number of modes.
+const MIN_MODES: usize = 2;
 
 /// A shot with the verdict of all data up to it.
 #[derive(Clone, Debug, Serialize)]
@@ -52,8 +56,19 @@ pub enum SequenceEnd {
         /// The predicted motion in seconds.
         needed_s: f64,
     },
-    /// A run was stopped or tripped.
+    /// The model has fewer modes with a residue than a verdict needs, and all of them are found.
+    Undecidable,
+    /// A run was stopped or tripped, or the sequence was stopped between two runs.
     Interrupted,
+}
+
+/// What ends a sequence before the verdict is certain.
+#[derive(Clone, Copy, Debug)]
+pub struct SequenceLimits<'a> {
+    /// Largest length of all sweeps in seconds.
+    pub max_motion_s: f64,
+    /// When it is set, no other shot begins.
+    pub stop: &'a AtomicBool,
 }
 
 /// The result of a sequence.
@@ -78,7 +93,8 @@ impl Sequence {
 }
 
 fn motion_s(shots: &[ShotSummary]) -> f64 {
-    shots.iter().map(|shot| shot.shot.duration_s).sum()
+    let lengths = shots.iter().map(|shot| shot.shot.duration_s);
+    lengths.fold(0.0, |sum, length| sum + length)
 }
 
 /// The limit of the motion in seconds, if none is given: 20 first shots.
@@ -89,20 +105,27 @@ pub fn default_max_motion_s(config: &Config) -> Result<f64, ExperimentError> {
     Ok(DEFAULT_LIMIT * Shot::first(config)?.duration_s)
 }
 
-/// Makes shots until the verdict is certain, or the sweeps last longer than `max_motion_s` in all. `make_run` makes each run; `watch`
-/// is called after each shot.
+/// The configuration of the first shot.
+///
+/// # Errors
+/// When the model of the plant cannot be built.
+pub fn first_shot_config(base: &Config) -> Result<Config, ExperimentError> {
+    first_config(base, &Shot::first(base)?)
+}
+
+/// Makes shots until the verdict is certain or a limit is reached. `make_run` makes each run; `watch` is called after each shot.
 ///
 /// # Errors
 /// When a shot is refused or fails, or its recording contains no frequency response.
 pub fn until_decided(
     base: &Config,
-    max_motion_s: f64,
+    limits: SequenceLimits<'_>,
     make_run: &mut dyn FnMut(&Plan) -> Result<Run, ExperimentError>,
     watch: &mut dyn FnMut(&ShotSummary),
 ) -> Result<Sequence, ExperimentError> {
-    let mut experiment = SequentialExperiment::of(base, max_motion_s)?;
+    let mut experiment = SequentialExperiment::of(base, limits)?;
     let mut shot = Shot::first(base)?;
-    shot.duration_s = shot.duration_s.min(max_motion_s);
+    shot.duration_s = shot.duration_s.min(limits.max_motion_s);
     let mut config = first_config(base, &shot)?;
     loop {
         predicted_extremes(&config)?;
@@ -140,7 +163,7 @@ struct PlannedShot {
 /// The state between two shots.
 struct SequentialExperiment<'a> {
     base: &'a Config,
-    max_motion_s: f64,
+    limits: SequenceLimits<'a>,
     chain: MeasurementChain,
     scope: VerdictScope,
     evidence: Evidence,
@@ -152,12 +175,12 @@ struct SequentialExperiment<'a> {
 impl<'a> SequentialExperiment<'a> {
     fn of(
         base: &'a Config,
-        max_motion_s: f64,
+        limits: SequenceLimits<'a>,
     ) -> Result<SequentialExperiment<'a>, ExperimentError> {
         let modal = ModalModel::of(&plant::build(&base.plant)?)?;
         Ok(SequentialExperiment {
             base,
-            max_motion_s,
+            limits,
             chain: MeasurementChain::bench(base),
             scope: VerdictScope::of_model(&modal, Certainty::REPEATED_LOOKS),
             evidence: Evidence::default(),
@@ -197,13 +220,10 @@ impl<'a> SequentialExperiment<'a> {
         let (Some(first), Some(analysis)) = (&self.first, &self.analysis) else {
             return Ok(Step::End(SequenceEnd::LimitReached));
         };
-        if analysis.verdict.cnmp != Cnmp::Undecided {
-            return Ok(Step::End(SequenceEnd::Decided));
+        if let Some(end) = self.early_end(analysis) {
+            return Ok(Step::End(end));
         }
-        let left_s = self.max_motion_s - motion_s(&self.shots);
-        if self.shots.len() >= MAX_LOOKS {
-            return Ok(Step::End(SequenceEnd::LimitReached));
-        }
+        let left_s = self.limits.max_motion_s - motion_s(&self.shots);
         let shot = match self.informative_shot(first, analysis, left_s)? {
             Some(NextShot::Needs(needed_s)) if self.shots.len() >= MIN_LOOKS => {
                 return Ok(Step::End(SequenceEnd::NeedsMoreMotion { needed_s }));
@@ -215,6 +235,29 @@ impl<'a> SequentialExperiment<'a> {
             return Ok(Step::End(SequenceEnd::LimitReached));
         }
         self.planned(first, analysis, shot)
+    }
+
+    /// Why no other shot is planned.
+    fn early_end(&self, analysis: &Analysis) -> Option<SequenceEnd> {
+        let looks = self.shots.len();
+        if analysis.verdict.cnmp != Cnmp::Undecided {
+            Some(SequenceEnd::Decided)
+        } else if self.limits.stop.load(Ordering::Relaxed) {
+            Some(SequenceEnd::Interrupted)
+        } else if looks >= MAX_LOOKS {
+            Some(SequenceEnd::LimitReached)
+        } else if looks >= MIN_LOOKS && self.is_undecidable(analysis) {
+            Some(SequenceEnd::Undecidable)
+        } else {
+            None
+        }
+    }
+
+    /// Whether the model has fewer modes with a residue than a verdict needs, and all of them are found.
+    fn is_undecidable(&self, analysis: &Analysis) -> bool {
+        let found = analysis.fit.as_ref().map_or(0, |fit| fit.modes().len());
+        let expected = self.scope.expected_modes.unwrap_or(0);
+        analysis.verdict.phase_drop.is_none() && expected < MIN_MODES && found >= expected
     }
 
     /// The shot with the most information about the quantities that decide; `None` if there are none, or if nothing can be predicted.

@@ -35,6 +35,8 @@ pub struct BenchRun<'a> {
     excitation: String,
     /// Ticks per second.
     rate_hz: f64,
+    /// Whether the analysis is that of this recording alone, so that it can certify the stage.
+    pub(super) is_one_recording: bool,
 }
 
 impl<'a> BenchRun<'a> {
@@ -55,6 +57,16 @@ impl<'a> BenchRun<'a> {
                 None => config.chosen_excitation().describe(),
             },
             rate_hz: config.servo.rate_hz,
+            is_one_recording: true,
+        }
+    }
+
+    /// The run of the last of several shots, with the analysis of all of them. `excitation` describes the shots.
+    pub fn of_shots(self, excitation: String) -> BenchRun<'a> {
+        BenchRun {
+            excitation,
+            is_one_recording: false,
+            ..self
         }
     }
 

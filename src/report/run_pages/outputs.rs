@@ -398,6 +398,9 @@ fn write_certificate(
     frf_path: &str,
     csv: &str,
 ) -> Result<Option<String>, OutputError> {
+    if !run.is_one_recording {
+        return Ok(None);
+    }
     let name = Path::new(frf_path).file_name().unwrap_or_default();
     let response = ResponseFile {
         name: &name.to_string_lossy(),

@@ -1,0 +1,180 @@
+//! `bench chirp --until-decided`: short chirps until the verdict is certain.
+
+use std::path::Path;
+
+use serde::Serialize;
+
+use super::analysis_output;
+use super::chirp::{Args, analysis_failed, outcome};
+use super::error::CliError;
+use super::outcome::Outcome;
+use super::output::print_text;
+use super::progress::ProgressLine;
+use super::run_options::{close, run_text};
+use super::table::wrap;
+use crate::config::Config;
+use crate::experiment::sequential::{
+    Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, default_max_motion_s,
+    first_shot_config, until_decided,
+};
+use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
+use crate::recording::Recording;
+use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
+use crate::util::progress::Progress;
+use crate::util::quantity::Time;
+
+/// Options of a sequential experiment.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct SequentialOptions {
+    /// Make short chirps until the verdict on CNMP zeros is certain; bands, lengths and amplitudes are planned within the interlocks
+    #[arg(long, conflicts_with_all = ["duration", "sweep", "excitation", "amplitude", "shape"])]
+    until_decided: bool,
+    /// Limit of the length of all chirps together [default: 20 times the first chirp]
+    #[arg(
+        long,
+        value_name = "TIME",
+        requires = "until_decided",
+        allow_hyphen_values = true
+    )]
+    max_duration: Option<Time>,
+}
+
+impl SequentialOptions {
+    /// The limit of the motion in seconds; `None` for a single chirp.
+    pub(super) fn max_motion_s(&self, config: &Config) -> Result<Option<f64>, CliError> {
+        if !self.until_decided {
+            return Ok(None);
+        }
+        let Some(limit) = &self.max_duration else {
+            return Ok(Some(default_max_motion_s(config)?));
+        };
+        let first_s = first_shot_config(config)?.chirp.duration_s;
+        match limit.si() >= first_s {
+            true => Ok(Some(limit.si())),
+            false => Err(CliError::Usage(format!(
+                "--max-duration is {limit}, but the first chirp takes {first_s:.2} s; give a longer time"
+            ))),
+        }
+    }
+}
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    run: RunSummary,
+    shots: Vec<ShotSummary>,
+    sequence: SequenceEnd,
+    motion_s: f64,
+    #[serde(flatten)]
+    made: AnalysisOutputs,
+}
+
+/// Makes the shots and writes the results of all of them beside the last recording.
+pub(super) fn measure(args: &Args, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
+    let setup = args.run.setup(base)?;
+    let json = args.bench.json;
+    let sequence = stop_on_signal(|stop| {
+        let limits = SequenceLimits { max_motion_s, stop };
+        shots(base, limits, setup, json)
+    });
+    let mut sequence =
+        sequence.map_err(|error: RunError| CliError::Failed(error.to_string()))??;
+    let summary = RunSummary::of(&mut sequence.last)?;
+    let path = sequence.last.path.clone();
+    let made = outputs(&sequence, &path).map_err(|error| analysis_failed(&error, &path))?;
+    let report = Report {
+        run: summary,
+        motion_s: sequence.motion_s(),
+        shots: sequence.shots,
+        sequence: sequence.end,
+        made,
+    };
+    let text = run_text(&report.run, &sequence.config)
+        + &wrap(&end_text(report.sequence, report.motion_s), 2)
+        + &analysis_output::text(&report.made);
+    close(sequence.last, &report, json, &text)?;
+    Ok(match report.sequence {
+        SequenceEnd::Interrupted => Outcome::Failed,
+        _ => outcome(&report.run, &report.made),
+    })
+}
+
+fn shots(
+    base: &Config,
+    limits: SequenceLimits<'_>,
+    setup: Setup,
+    json: bool,
+) -> Result<Sequence, CliError> {
+    let progress = Progress::new("chirp");
+    let _line = ProgressLine::show(&progress);
+    let runner = Runner::with_progress(setup, progress);
+    let mut printed = Ok(());
+    let mut number = 0;
+    let mut watch = |shot: &ShotSummary| {
+        number += 1;
+        if !json && printed.is_ok() {
+            printed = print_text(&shot_text(number, shot));
+        }
+    };
+    let mut make_run = |plan: &Plan| runner.run(plan, "chirp");
+    let sequence = until_decided(base, limits, &mut make_run, &mut watch)?;
+    printed.map(|()| sequence)
+}
+
+/// Analysis, plots and page of all shots.
+fn outputs(sequence: &Sequence, path: &Path) -> Result<AnalysisOutputs, CliError> {
+    let Some(analysis) = &sequence.analysis else {
+        return Ok(AnalysisOutputs::run_incomplete());
+    };
+    let recording = Recording::open(path)?;
+    let shots: Vec<Shot> = sequence.shots.iter().map(|shot| shot.shot).collect();
+    let run = BenchRun::new(&recording, analysis, &sequence.config);
+    let run = run.of_shots(excitation_text(&shots));
+    let results = ResultFiles {
+        beside: path,
+        existing: ExistingFile::Replace,
+    };
+    Ok(AnalysisOutputs::write(&run, results)?)
+}
+
+/// `2 chirps (11.5 to 116 Hz, 3.1 s; 71 to 92 Hz, 1.5 s)`.
+fn excitation_text(shots: &[Shot]) -> String {
+    let plural = if shots.len() == 1 { "" } else { "s" };
+    let texts: Vec<String> = shots.iter().map(band_text).collect();
+    format!("{} chirp{plural} ({})", shots.len(), texts.join("; "))
+}
+
+fn band_text(shot: &Shot) -> String {
+    let Shot {
+        low_hz,
+        high_hz,
+        duration_s,
+    } = shot;
+    format!("{low_hz:.1} to {high_hz:.1} Hz, {duration_s:.1} s")
+}
+
+fn shot_text(number: usize, summary: &ShotSummary) -> String {
+    let band = band_text(&summary.shot);
+    wrap(
+        &format!("chirp {number}: {band}: {}", summary.cnmp.name()),
+        0,
+    )
+}
+
+fn end_text(end: SequenceEnd, motion_s: f64) -> String {
+    let why = match end {
+        SequenceEnd::Decided => "the verdict is certain".into(),
+        SequenceEnd::LimitReached => {
+            "the verdict is not certain at the limit; allow more with --max-duration".into()
+        }
+        SequenceEnd::NeedsMoreMotion { needed_s } => format!(
+            "the verdict is not certain, and about {needed_s:.0} s more are predicted to be necessary; allow them with --max-duration"
+        ),
+        SequenceEnd::Undecidable => {
+            "the modes that the verdict needs have no residue at this operating point, so that no length of chirp decides it; measure at another operating point".into()
+        }
+        SequenceEnd::Interrupted => "stopped before the verdict was certain".into(),
+    };
+    format!("{motion_s:.1} s of motion: {why}")
+}
