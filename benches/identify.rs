@@ -6,7 +6,7 @@ use bench_test_support::unrecorded;
 
 use bench::config::{Config, Source, load};
 use bench::identify::modal::{MeasurementChain, fit};
-use bench::identify::verdict::{Verdict, VerdictInput, verdict};
+use bench::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use bench::identify::{Estimator, EstimatorSettings, FrfDatum, local, welch};
 use criterion::{Criterion, criterion_group, criterion_main};
 
@@ -36,6 +36,7 @@ fn judged(frf_data: &[FrfDatum], config: &Config) -> Verdict {
         frf_data,
         up_to_rad_s: 650.0,
         expected_modes: Some(3),
+        certainty: Certainty::ONE_LOOK,
     })
     .expect("zeros")
 }

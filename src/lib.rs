@@ -57,6 +57,7 @@ pub mod daemon;
 pub mod doctor;
 pub mod excitation;
 pub mod experiment;
+pub mod export;
 pub mod identify;
 pub mod model;
 pub mod recording;

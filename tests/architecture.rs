@@ -8,7 +8,7 @@ use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. The settings of plants and excitations are defined with the
 /// plants and excitations, and `config` composes them: therefore `model::plant` precedes `config`, and the rest of `model` follows it.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "util",
     "model::plant",
     "excitation",
@@ -19,6 +19,7 @@ const ORDER: [&str; 15] = [
     "rt",
     "recording",
     "identify",
+    "export",
     "experiment",
     "report",
     "doctor",

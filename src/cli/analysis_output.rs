@@ -8,7 +8,7 @@ use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
 use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
-use crate::experiment::{AnalysisPhase, analyse_opened, analyse_with_progress, open_with_signals};
+use crate::experiment::{AnalysisPhase, ReadSignals, analyse_opened, open_with_signals};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use crate::util::decimal::Decimal;
@@ -26,12 +26,13 @@ const STEPS: u64 = 1000;
 /// Analyses a recording and writes the result files.
 pub(super) fn analyse_and_write(
     recording: &Recording,
+    signals: ReadSignals,
     config: &Config,
     results: ResultFiles<'_>,
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
-    let analysis = analyse_with_progress(recording, config, &mut shown_by(progress))?;
+    let analysis = analyse_opened(recording, signals, config, &mut shown_by(progress))?;
     let run = BenchRun::new(recording, &analysis, config);
     Ok(AnalysisOutputs::write(&run, results)?)
 }
@@ -43,11 +44,8 @@ pub(super) fn open_analyse_and_write(
     results: ResultFiles<'_>,
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
-    let (recording, signals) = open_with_signals(path, config.servo.rate_hz)?;
-    progress.begin("analysing", STEPS);
-    let analysis = analyse_opened(&recording, signals, config, &mut shown_by(progress))?;
-    let run = BenchRun::new(&recording, &analysis, config);
-    Ok(AnalysisOutputs::write(&run, results)?)
+    let (recording, signals) = open_with_signals(path)?;
+    analyse_and_write(&recording, signals, config, results, progress)
 }
 
 /// A receiver of the progress of an analysis that never cancels it.

@@ -8,7 +8,7 @@ use super::help::GLOSSARY;
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
-    calibrate, campaign, chirp, completions, config, control, controller, doctor, emulate,
+    calibrate, campaign, chirp, completions, config, control, controller, doctor, emulate, export,
     identify, linearity, margins, model, recover, remote, replay, report, serve, tune,
 };
 use crate::experiment::survive_file_size_limit;
@@ -56,6 +56,8 @@ enum Command {
     Identify(identify::Args),
     /// Write a page with the frequency responses and steps of one or several recordings
     Report(report::Args),
+    /// Write the signals or the frequency response of a recording as CSV, Parquet, MATLAB or UFF 58
+    Export(export::Args),
     /// Feed the recorded probe measurements to the loop code again and compare every command bit for bit
     Replay(replay::Args),
     /// Write a readable copy of a truncated or damaged recording and report what was lost
@@ -140,6 +142,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Tune(args) => tune::run(&args),
         Command::Identify(args) => identify::run(&args),
         Command::Report(args) => report::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Emulate(args) => emulate::run(&args),

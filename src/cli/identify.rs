@@ -13,7 +13,7 @@ use super::output::print_result;
 use super::progress::ProgressLine;
 use super::run_options::trip_text;
 use crate::config::Config;
-use crate::experiment::{Ending, Plan, RunKind, TripSummary};
+use crate::experiment::{Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::util::progress::Progress;
@@ -58,11 +58,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             args.json,
         );
     }
-    let recording = Recording::open(&args.recording)?;
+    let (recording, signals) = open_with_signals(&args.recording)?;
     warn_of_unchecked(&recording);
     let plan = Plan::of(&recording)?;
     check_kind(plan.kind, &args.recording)?;
-    let made = analysed(&recording, &plan.config, args)?;
+    let made = analysed(&recording, signals, &plan.config, args)?;
     let report = Report::new(&recording, &args.recording, made);
     print_result(args.json, &report, |report| report.text(&plan.config))?;
     Ok(match report.is_whole() {
@@ -103,6 +103,7 @@ fn check_kind(kind: RunKind, path: &Path) -> Result<(), CliError> {
 /// The analysis, with its progress on a terminal.
 fn analysed(
     recording: &Recording,
+    signals: ReadSignals,
     config: &Config,
     args: &Args,
 ) -> Result<AnalysisOutputs, CliError> {
@@ -113,7 +114,7 @@ fn analysed(
     };
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
-    analyse_and_write(recording, config, results, &progress)
+    analyse_and_write(recording, signals, config, results, &progress)
 }
 
 /// Beside the recording, existing results are its own. In another folder they may be those of a file of the same name.

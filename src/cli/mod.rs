@@ -19,6 +19,7 @@ mod doctor;
 mod emulate;
 mod error;
 mod excitation_options;
+mod export;
 mod help;
 mod identify;
 mod identify_external;

@@ -114,7 +114,21 @@ pub fn analyse_opened(
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
-    analyse_signals(recording, signals.into_result()?, config, progress)
+    let signals = run_signals_of(recording, signals, config, progress)?;
+    analyse_signals(recording, signals, config, progress)
+}
+
+/// The signals as read with the recording, or else by reading it again.
+pub(super) fn run_signals_of(
+    recording: &Recording,
+    signals: ReadSignals,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<RunSignals, AnalysisError> {
+    signals.into_result().unwrap_or_else(|| {
+        let only_closed = is_closed_loop(recording.metadata());
+        read_signals(recording, config.servo.rate_hz, only_closed, progress)
+    })
 }
 
 fn analyse_signals(
@@ -145,16 +159,11 @@ fn analyse_signals(
 /// fit.
 pub(super) fn measured_data(
     recording: &Recording,
+    signals: ReadSignals,
     config: &Config,
 ) -> Result<(Frf, Vec<FrfDatum>), AnalysisError> {
     let mut no_progress = |_, _| ControlFlow::Continue(());
-    let only_closed = is_closed_loop(recording.metadata());
-    let signals = read_signals(
-        recording,
-        config.servo.rate_hz,
-        only_closed,
-        &mut no_progress,
-    )?;
+    let signals = run_signals_of(recording, signals, config, &mut no_progress)?;
     let estimate = estimated(recording, signals, config, &mut no_progress)?;
     Ok((estimate.frf, estimate.frf_data))
 }

@@ -11,6 +11,7 @@ use super::analysis::{cautions, measured_data};
 use super::analysis_error::AnalysisError;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
+use super::read_run::{ReadSignals, open_with_signals};
 use crate::config::Config;
 use crate::control::ClosedLoop;
 use crate::control::measured::MeasuredLoopError;
@@ -172,12 +173,9 @@ impl MeasuredFrf {
     }
 
     fn of_recording(path: &Path) -> Result<(MeasuredFrf, Vec<FrfDatum>), FrfError> {
-        let recording = Recording::open(path)?;
+        let (recording, signals) = open_with_signals(path)?;
         let plan = Plan::of(&recording)?;
-        if !matches!(plan.kind, RunKind::Chirp | RunKind::Control) {
-            return Err(FrfError::Kind(path.display().to_string()));
-        }
-        let (frf, data) = measured_data(&recording, &plan.config)?;
+        let (frf, data) = recorded_data(&recording, signals, &plan)?;
         let measured = MeasuredFrf {
             frf,
             recorded: Some(Box::new(plan.config)),
@@ -202,6 +200,32 @@ impl MeasuredFrf {
         let first = self.frf.frequency_hz.first().copied();
         let last = self.frf.frequency_hz.last().copied();
         (first.unwrap_or(0.0), last.unwrap_or(0.0))
+    }
+}
+
+/// The response of a recorded run with this plan, from command (A) to reading (m): that of [`analyse`](super::analyse), without the
+/// fit of the modes.
+///
+/// # Errors
+/// When the recording has no excitation, or gives no response.
+pub fn recorded_frf(
+    recording: &Recording,
+    signals: ReadSignals,
+    plan: &Plan,
+) -> Result<Frf, FrfError> {
+    recorded_data(recording, signals, plan).map(|(frf, _)| frf)
+}
+
+fn recorded_data(
+    recording: &Recording,
+    signals: ReadSignals,
+    plan: &Plan,
+) -> Result<(Frf, Vec<FrfDatum>), FrfError> {
+    match plan.kind {
+        RunKind::Chirp | RunKind::Control => Ok(measured_data(recording, signals, &plan.config)?),
+        RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => {
+            Err(FrfError::Kind(recording.path().display().to_string()))
+        }
     }
 }
 

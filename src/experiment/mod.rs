@@ -87,7 +87,7 @@ pub use external::{
 };
 pub use live_rig::{LiveRig, run};
 pub use loop_check::{MarginError, RatedController, Stage, closed_loop, require_margins};
-pub use measured_frf::{FrfError, MeasuredFrf};
+pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
 pub use motion_model::residuals;
 pub use motor_error::MotorError;

@@ -6,35 +6,34 @@ use std::path::Path;
 use super::analysis_error::AnalysisError;
 use super::plan::{KIND, RunKind};
 use super::signal_builder::{RunSignals, SignalBuilder};
-use crate::recording::{Recording, RecordingError};
+use crate::config::whole;
+use crate::recording::{Preceding, Recording, RecordingError};
 use crate::rt::arming::State;
 use crate::rt::record::{TickRecord, flag};
 
-/// The signals of a run, or why it has none.
-pub struct ReadSignals(Result<RunSignals, AnalysisError>);
+/// The signals of a run, or why it has none. `None` if they are not read, because the configuration does not precede the ticks in the
+/// file.
+pub struct ReadSignals(Option<Result<RunSignals, AnalysisError>>);
 
 impl ReadSignals {
-    pub(super) fn into_result(self) -> Result<RunSignals, AnalysisError> {
+    pub(super) fn into_result(self) -> Option<Result<RunSignals, AnalysisError>> {
         self.0
     }
 }
 
-/// Opens a recording of a loop with this rate and reads the signals of its run. A recording is then decoded once, not twice.
+/// Opens a recording and reads the signals of its run. A recording is then decoded once, not twice.
 ///
 /// # Errors
 /// Those of [`Recording::open`].
-pub fn open_with_signals(
-    path: &Path,
-    rate_hz: f64,
-) -> Result<(Recording, ReadSignals), RecordingError> {
-    let mut signals = None;
-    let recording = Recording::open_with(path, &mut |metadata, record| {
-        let signals = signals.get_or_insert_with(|| Collected::new(metadata, rate_hz));
-        signals.take(record);
+pub fn open_with_signals(path: &Path) -> Result<(Recording, ReadSignals), RecordingError> {
+    let mut collected = None;
+    let recording = Recording::open_with(path, &mut |preceding, record| {
+        if let Some(signals) = collected.get_or_insert_with(|| Collected::new(preceding)) {
+            signals.take(record);
+        }
     })?;
-    let signals = signals.map_or(Err(AnalysisError::NothingRan), |signals: Collected| {
-        signals.finish(recording.tick_count())
-    });
+    let collected: Option<Collected> = collected.flatten();
+    let signals = collected.map(|signals| signals.finish(recording.tick_count()));
     Ok((recording, ReadSignals(signals)))
 }
 
@@ -45,11 +44,18 @@ struct Collected {
 }
 
 impl Collected {
-    fn new(metadata: &BTreeMap<String, String>, rate_hz: f64) -> Collected {
-        Collected {
-            signals: Ok(SignalBuilder::new(metadata, rate_hz)),
-            only_closed: is_closed_loop(metadata),
-        }
+    /// `None` without a configuration.
+    fn new(preceding: &Preceding<'_>) -> Option<Collected> {
+        let config = whole(
+            "the configuration of the recording",
+            preceding.config_toml()?,
+        )
+        .ok()?;
+        let rate_hz = config.servo.rate_hz;
+        Some(Collected {
+            signals: Ok(SignalBuilder::new(preceding.metadata, rate_hz)),
+            only_closed: is_closed_loop(preceding.metadata),
+        })
     }
 
     /// Adds a tick, unless an earlier one has been refused.

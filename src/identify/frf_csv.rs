@@ -22,7 +22,8 @@ pub const RATIO: &str = "magnitude";
 /// The columns of a response from current to displacement, in this order.
 pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
 
-const COLUMNS: usize = 7;
+/// Number of columns of [`HEADER`].
+pub const COLUMNS: usize = 7;
 
 const REPAIR: &str = "repair the line, or write the file again with `bench identify`";
 
@@ -61,14 +62,29 @@ pub fn to_string(frf: &Frf, magnitude: &str) -> String {
 }
 
 fn row(frf: &Frf, k: usize) -> [String; COLUMNS] {
+    let [frequency, magnitude, phase_deg, rest @ ..] = numbers(frf, k);
+    let [coherence, magnitude_sigma, phase_sigma_deg, resolution] = rest;
     [
-        frf.frequency_hz[k].to_string(),
-        format!("{:e}", frf.response[k].norm()),
-        frf.phase_rad(k).to_degrees().to_string(),
-        frf.coherence[k].to_string(),
-        format!("{:e}", frf.magnitude_sigma[k]),
-        frf.phase_sigma_rad[k].to_degrees().to_string(),
-        frf.resolution_hz[k].to_string(),
+        frequency.to_string(),
+        format!("{magnitude:e}"),
+        phase_deg.to_string(),
+        coherence.to_string(),
+        format!("{magnitude_sigma:e}"),
+        phase_sigma_deg.to_string(),
+        resolution.to_string(),
+    ]
+}
+
+/// The numbers of the columns of [`HEADER`] at a frequency.
+pub fn numbers(frf: &Frf, k: usize) -> [f64; COLUMNS] {
+    [
+        frf.frequency_hz[k],
+        frf.response[k].norm(),
+        frf.phase_rad(k).to_degrees(),
+        frf.coherence[k],
+        frf.magnitude_sigma[k],
+        frf.phase_sigma_rad[k].to_degrees(),
+        frf.resolution_hz[k],
     ]
 }
 

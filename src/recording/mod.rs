@@ -31,6 +31,7 @@
 //! * Times in a recording are scheduled times since the loop began: two runs at virtual pace have the same bytes in all
 //!   three channels.
 
+mod attachments;
 mod contents;
 mod continuity;
 mod descriptor;
@@ -54,6 +55,7 @@ mod timing;
 mod walk;
 mod writer;
 
+pub use attachments::{Preceding, StoredAttachment};
 pub use continuity::Gap;
 pub use disk::{
     BYTES_PER_TICK, DiskState, DiskWatch, MIN_FREE_BYTES, Shortage, free_bytes, lacks_space,
@@ -63,7 +65,7 @@ pub use error::{Emptiness, RecordingError};
 pub use event_message::event_text;
 pub use live_encoder::{EncodedMessage, LiveEncoder};
 pub use losses::{Cut, DamagedRange, MissingTicks};
-pub use reader::{Recording, StoredAttachment, TickReceiver};
+pub use reader::{Recording, TickReceiver};
 pub use recover::{Recovered, recover};
 pub use schema::descriptor_set;
 pub use stream::Ticks;

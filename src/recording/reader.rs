@@ -5,6 +5,7 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::attachments::{Preceding, StoredAttachment, attachment, config_toml};
 use super::contents::{Contents, Part};
 use super::continuity::{Continuity, Gap};
 use super::digest::Digest;
@@ -20,19 +21,8 @@ use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic
 use crate::rt::record::{Event, TickRecord};
 use crate::util::input_file;
 
-/// Receives the metadata of a recording so far and a tick.
-pub type TickReceiver<'a> = dyn FnMut(&BTreeMap<String, String>, &TickRecord) + 'a;
-
-/// A file inside the recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct StoredAttachment {
-    /// Its name.
-    pub name: String,
-    /// Its media type.
-    pub media_type: String,
-    /// Its content.
-    pub data: Vec<u8>,
-}
+/// Receives a tick of a recording, and what precedes it.
+pub type TickReceiver<'a> = dyn FnMut(&Preceding<'_>, &TickRecord) + 'a;
 
 /// A recording that was read once from start to end. All checks have passed, everything except the ticks is in
 /// memory, and the ticks can be streamed any number of times.
@@ -77,8 +67,7 @@ impl Recording {
         Recording::open_with(path, &mut |_, _| {})
     }
 
-    /// As [`Recording::open`]. `on_tick` receives every tick in its order with the metadata, before it is known whether the rest
-    /// of the file is intact.
+    /// As [`Recording::open`]. `on_tick` receives every tick in its order, before it is known whether the rest of the file is intact.
     pub fn open_with(
         path: &Path,
         on_tick: &mut TickReceiver<'_>,
@@ -200,9 +189,7 @@ impl Recording {
 
     /// The effective configuration of the run; `None` also if it is empty, because it could not be recovered.
     pub fn config_toml(&self) -> Option<&str> {
-        let attachment = self.attachment(CONFIG_ATTACHMENT)?;
-        let text = std::str::from_utf8(&attachment.data).ok();
-        text.filter(|text| !text.is_empty())
+        config_toml(self.attachments())
     }
 
     /// Version of the program, host, scheduling, `period_ns` and other properties of the run.
@@ -243,7 +230,7 @@ impl Recording {
 
     /// The first attachment of that name.
     pub fn attachment(&self, name: &str) -> Option<&StoredAttachment> {
-        self.found.attachments.iter().find(|a| a.name == name)
+        attachment(self.attachments(), name)
     }
 
     /// All events, in the order in which the loop published them.
@@ -324,7 +311,7 @@ impl RecordingContents {
         match self.decoder.decode(&part)? {
             Some(Decoded::Tick(tick, gap)) => {
                 self.tick(&tick, gap);
-                on_tick(&self.metadata, &tick);
+                on_tick(&self.preceding(), &tick);
             }
             Some(Decoded::Event(event)) => self.events.push(event),
             Some(Decoded::Timing(timing)) => self.timings.push(timing),
@@ -332,6 +319,13 @@ impl RecordingContents {
         }
         self.take_undecoded(part);
         Ok(())
+    }
+
+    fn preceding(&self) -> Preceding<'_> {
+        Preceding {
+            metadata: &self.metadata,
+            attachments: &self.attachments,
+        }
     }
 
     fn take_undecoded(&mut self, part: Part<'_>) {

@@ -64,8 +64,11 @@ pub fn write_new(path: &Path, text: &str) -> std::io::Result<PathBuf> {
     Ok(path)
 }
 
-/// Creates an empty file under the first free name.
-fn create_free(path: &Path) -> std::io::Result<PathBuf> {
+/// Creates an empty file under the first free name: `STEM.EXT`, `STEM-2.EXT`, ...
+///
+/// # Errors
+/// Those of the file system.
+pub fn create_free(path: &Path) -> std::io::Result<PathBuf> {
     for name in numbered_names(path) {
         match File::create_new(&name) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {}

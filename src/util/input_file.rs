@@ -80,6 +80,12 @@ pub fn read_text(path: &Path, max_bytes: u64) -> std::io::Result<String> {
     })
 }
 
+/// What a path is, if it is not a regular file: `a FIFO or a pipe`. `None` also if there is nothing or if it cannot be examined.
+pub fn special_kind(path: &Path) -> Option<&'static str> {
+    let kind = path.metadata().ok()?.file_type();
+    (!kind.is_file()).then(|| name(kind))
+}
+
 fn refused(why: String) -> Error {
     Error::new(ErrorKind::InvalidInput, why)
 }

@@ -93,6 +93,7 @@ fn rejects_a_fifo_and_a_device_as_input() {
         "chirp --shape",
         "identify",
         "identify --input x --output y --rate 1000",
+        "export --format csv",
         "model study --vary plant.secondary_stage_mass_kg=+-2% --draws 10 --file",
         "model study --join",
     ] {
@@ -158,7 +159,7 @@ fn rejects_files_that_are_not_recordings() {
     let bench = Bench::new();
     bench.write("text.mcap", "not a recording");
     bench.write("empty.mcap", "");
-    for command in ["identify", "replay", "recover"] {
+    for command in ["identify", "replay", "recover", "export --format csv"] {
         for file in ["text.mcap", "empty.mcap", "nosuch.mcap", "."] {
             let answer = bench.run(&format!("{command} {file}"));
             assert!(

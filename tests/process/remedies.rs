@@ -9,7 +9,7 @@ const VERBS: [&str; 25] = [
 ];
 
 /// Each command with a word of its remedy.
-const REFUSED: [(&str, &str); 66] = [
+const REFUSED: [(&str, &str); 70] = [
     // Measurements
     ("chirp --amplitude 5s", "100mA"),
     ("chirp --amplitude 5V", "100mA"),
@@ -97,6 +97,10 @@ const REFUSED: [(&str, &str); 66] = [
     ),
     ("replay nosuch.mcap", "recordings/"),
     ("recover text.mcap", "*.mcap"),
+    ("export nosuch.mcap --format csv", "recordings/"),
+    ("export text.mcap --format mat", "*.mcap"),
+    ("export text.mcap --format csv --out data.csv", "--out"),
+    ("export text.mcap --format xls", "--help"),
     ("config check --config nosuch", "stage"),
     ("config init --out data.csv", "--out"),
     ("man --out data.csv", "--help"),

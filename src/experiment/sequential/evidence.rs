@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use std::path::Path;
 
 use crate::config::Config;
-use crate::experiment::analysis::{Analysis, ModalStep, estimated};
+use crate::experiment::analysis::{Analysis, AnalysisPhase, ModalStep, estimated, run_signals_of};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::read_run::open_with_signals;
 use crate::experiment::response_estimate::ResponseEstimate;
@@ -30,8 +30,8 @@ impl Evidence {
         recording: &Path,
         config: &Config,
     ) -> Result<Vec<FrfDatum>, AnalysisError> {
-        let (recording, signals) = open_with_signals(recording, config.servo.rate_hz)?;
-        let signals = signals.into_result()?;
+        let (recording, signals) = open_with_signals(recording)?;
+        let signals = run_signals_of(&recording, signals, config, &mut never_cancels)?;
         self.filled_ticks += signals.filled_ticks;
         let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
         self.frfs.push(estimate.frf);
@@ -56,12 +56,10 @@ impl Evidence {
             config,
             certainty: Certainty::REPEATED_LOOKS,
         };
-        step.of(estimate, self.filled_ticks, &mut |_, _| {
-            ControlFlow::Continue(())
-        })
+        step.of(estimate, self.filled_ticks, &mut never_cancels)
     }
 }
 
-fn never_cancels(_: crate::experiment::AnalysisPhase, _: f64) -> ControlFlow<()> {
+fn never_cancels(_: AnalysisPhase, _: f64) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }

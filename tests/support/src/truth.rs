@@ -57,6 +57,7 @@ pub fn ask_of(script: &str, questions: &[Value]) -> Option<Vec<Value>> {
 
 fn available(python: &str, script: &str) -> Result<(), String> {
     let imports = match script {
+        "export.py" => "import control, mcap_protobuf, pandas, pyarrow.parquet, pyuff, scipy",
         "tables.py" => "import pyarrow.parquet",
         "measured_margins.py" => "import control, numpy, scipy, mpmath, tomllib",
         _ => "import sys, tomllib, numpy, scipy, mpmath; assert numpy.trapezoid",

@@ -1,0 +1,42 @@
+//! A header line, and a line for each tick or frequency. A cell without a measurement is empty; numbers read back to the same double.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::file::Output;
+use super::rows::{self, Rows};
+use super::{ExportError, SIGNALS, Sample};
+use crate::identify::{Frf, frf_csv};
+use crate::recording::Recording;
+use crate::rt::record::TickRecord;
+
+pub(super) fn signals(recording: &Path, out: &mut Output) -> Result<Recording, ExportError> {
+    writeln!(out, "{}", SIGNALS.map(|signal| signal.name).join(","))?;
+    rows::open(recording, &mut Lines(out))
+}
+
+/// The table that `bench identify` writes.
+pub(super) fn response(frf: &Frf, out: &mut Output) -> Result<(), ExportError> {
+    let text = frf_csv::to_string(frf, frf_csv::METRES_PER_AMPERE);
+    Ok(out.write_all(text.as_bytes())?)
+}
+
+/// Writes a line for each tick.
+struct Lines<'a>(&'a mut Output);
+
+impl Rows for Lines<'_> {
+    fn push(&mut self, record: &TickRecord) -> Result<(), ExportError> {
+        let out = &mut self.0;
+        for (index, signal) in SIGNALS.iter().enumerate() {
+            if index > 0 {
+                out.write_all(b",")?;
+            }
+            match (signal.value)(record) {
+                Sample::Real(Some(value)) => write!(out, "{value:e}")?,
+                Sample::Real(None) => {}
+                Sample::Count(count) => write!(out, "{count}")?,
+            }
+        }
+        Ok(out.write_all(b"\n")?)
+    }
+}
