@@ -9,6 +9,7 @@ use bench::recording::{Header, Recorder};
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_hal::Validity;
+use bench_test_support::program::Bench;
 use serde_json::{Value, json};
 
 const TICKS: u64 = 11_000;
@@ -125,7 +126,7 @@ fn record(path: &Path) {
 }
 
 /// The output of Python, or the reason why Python is not available.
-fn read_by_python(path: &Path) -> Result<Value, String> {
+fn read_by_python(path: &Path, options: &[&str]) -> Result<Value, String> {
     let python = std::env::var("BENCH_PYTHON").unwrap_or("python3".into());
     let probe = Command::new(&python)
         .args(["-c", "import mcap, mcap_protobuf"])
@@ -139,7 +140,7 @@ fn read_by_python(path: &Path) -> Result<Value, String> {
     let output = Command::new(&python)
         .arg(script)
         .arg(path)
-        .arg("--values")
+        .args(options)
         .output()
         .expect("has just run");
     assert!(
@@ -150,22 +151,61 @@ fn read_by_python(path: &Path) -> Result<Value, String> {
     Ok(serde_json::from_slice(&output.stdout).expect("one JSON object"))
 }
 
-#[test]
-fn python_reads_every_tick_bit_for_bit_with_the_embedded_schema() {
-    let dir = tempfile::tempdir().expect("temporary directory");
-    let path = dir.path().join("run.mcap");
-    record(&path);
-    let read = match read_by_python(&path) {
-        Ok(read) => read,
+/// As [`read_by_python`]; `None` without Python, if it is not required.
+fn python_reading(path: &Path, options: &[&str]) -> Option<Value> {
+    match read_by_python(path, options) {
+        Ok(read) => Some(read),
         Err(why) => {
             assert!(
                 std::env::var("BENCH_REQUIRE_PYTHON").as_deref() != Ok("1"),
                 "Python is required here: {why}"
             );
-            return eprintln!(
+            eprintln!(
                 "not tested: {why}\npip install mcap mcap-protobuf-support, or set BENCH_PYTHON"
             );
+            None
         }
+    }
+}
+
+#[test]
+fn python_reads_name_note_operator_and_command_of_a_run_also_after_recovery() {
+    let bench = Bench::of(env!("CARGO_BIN_EXE_bench"));
+    let given = [
+        ["--name", "second flexure"],
+        ["--note", "it's <b>\n5 % heavier"],
+        ["--operator", "Jörg"],
+    ];
+    let command = ["control", "--slow", "--duration", "1", "--no-report"];
+    let arguments = command.into_iter().chain(given.into_iter().flatten());
+    let made = bench.run_with(arguments.chain(["--json"])).json();
+    assert_eq!(made["name"], "second flexure");
+    assert_eq!(made["operator"], "Jörg");
+    let recording = made["recording"].as_str().expect("a path");
+    bench.json(&format!("recover {recording} --to copy.mcap"));
+    for file in [recording, "copy.mcap"] {
+        let Some(read) = python_reading(&bench.path(file), &[]) else {
+            return;
+        };
+        let metadata = &read["metadata"]["bench"];
+        for [option, text] in given {
+            assert_eq!(metadata[&option[2..]], text, "{file}");
+        }
+        assert_eq!(
+            metadata["command_line"],
+            "bench control --slow --duration 1 --no-report --name 'second flexure' --note 'it'\\''s <b>\n5 % heavier' --operator Jörg --json"
+        );
+        assert_eq!(metadata["profile"], "stage");
+    }
+}
+
+#[test]
+fn python_reads_every_tick_bit_for_bit_with_the_embedded_schema() {
+    let dir = tempfile::tempdir().expect("temporary directory");
+    let path = dir.path().join("run.mcap");
+    record(&path);
+    let Some(read) = python_reading(&path, &["--values"]) else {
+        return;
     };
     assert_eq!(
         (&read["ticks"], &read["first_tick"], &read["last_tick"]),

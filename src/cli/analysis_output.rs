@@ -49,7 +49,7 @@ pub(super) fn open_analyse_and_write(
 }
 
 /// A receiver of the progress of an analysis that never cancels it.
-fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) -> ControlFlow<()> {
+pub(super) fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) -> ControlFlow<()> {
     move |phase, fraction| {
         let done = (phase.overall(fraction) * STEPS as f64) as u64;
         progress.set(done, STEPS);

@@ -29,7 +29,7 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
-    run: RunOptions,
+    pub run: RunOptions,
     /// Largest current, in both directions
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true,
         help = with_setting("Largest current, in both directions", "calibrate.amplitude_a"))]
@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         print_result(args.bench.json, &report, |_| text)?;
         return Ok(Outcome::Done);
     }
-    let setup = args.run.setup(&config)?;
+    let setup = args.run.setup(&args.bench, &config)?;
     if !args.bench.json {
         print_text(&plan_text(&plan, &config, !args.no_delay))?;
     }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
 use super::campaign_output::Report;
+use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::operator::TerminalOperator;
 use super::options::{BenchOptions, SeedOption};
@@ -36,6 +37,8 @@ pub(super) struct Args {
     bench: BenchOptions,
     #[command(flatten)]
     seed: SeedOption,
+    #[command(flatten)]
+    pub description: DescriptionOptions,
     /// Operating points, FROM and TO with a unit: in % of the beam length (0%:8%:15) or as lengths (0mm:3.8mm:15)
     #[arg(
         long,
@@ -98,6 +101,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         method: args.method(),
     };
     let mut campaign = Campaign::open(&args.out, &grid, &config, options)?;
+    campaign.description = args.description.description(args.bench.profile());
     show_state(&campaign);
     if !campaign.missing().is_empty() {
         measure(args, &mut campaign, &config, tolerances)?;
@@ -194,7 +198,12 @@ fn run_with_progress(
 
 fn show(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<(), CliError> {
     let picture = draw(args, config, evaluation)?;
-    let report = Report::of(evaluation, &picture, args.bench.profile());
+    let report = Report::of(
+        evaluation,
+        &picture,
+        args.bench.profile(),
+        args.description.description(args.bench.profile()),
+    );
     print_result(args.bench.json, &report, Report::text)
 }
 

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use super::run_options::description_text;
 use super::table::{labelled, table, wrap};
+use crate::experiment::Description;
 use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use crate::identify::verdict::Cnmp;
 use crate::util::decimal::Decimal;
@@ -12,6 +14,9 @@ use crate::util::decimal::Decimal;
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
 pub(super) struct Report<'a> {
+    /// Name, note and operator.
+    #[serde(flatten)]
+    description: Description,
     profile: &'a str,
     plot: String,
     points: &'a [ComparedPoint<'a>],
@@ -91,9 +96,15 @@ impl Agreement {
 }
 
 impl<'a> Report<'a> {
-    pub fn of(evaluation: &'a Evaluation<'a>, plot: &Path, profile: &'a str) -> Report<'a> {
+    pub fn of(
+        evaluation: &'a Evaluation<'a>,
+        plot: &Path,
+        profile: &'a str,
+        description: Description,
+    ) -> Report<'a> {
         let totals = Totals::of(evaluation);
         Report {
+            description,
             profile,
             plot: plot.display().to_string(),
             points: &evaluation.points,
@@ -109,9 +120,10 @@ impl<'a> Report<'a> {
     pub fn text(&self) -> String {
         let totals = &self.totals;
         format!(
-            "{}: {} points\n\n{}\n{}{} detected, {} excluded, {} undecided\n{}{}{}{}",
+            "{}: {} points\n{}\n{}\n{}{} detected, {} excluded, {} undecided\n{}{}{}{}",
             self.profile,
             totals.points,
+            description_text(&self.description),
             self.points_table(),
             self.undecided_text(),
             totals.detected,

@@ -145,7 +145,9 @@ fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, 
     if !args.bench.json {
         print_text(&plan_text(config, &expected))?;
     }
-    let mut run = args.run.run(&Plan::chirp(config.clone()), "chirp")?;
+    let mut run = args
+        .run
+        .run(&args.bench, &Plan::chirp(config.clone()), "chirp")?;
     let summary = RunSummary::of(&mut run)?;
     let made = outputs(&summary, &run.path, config)?;
     let report = Report {

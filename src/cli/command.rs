@@ -2,14 +2,14 @@
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use super::connection::operator;
+use super::description_options::DescriptionOptions;
 use super::error::{CliError, ErrorReport};
 use super::help::GLOSSARY;
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
-    calibrate, campaign, chirp, completions, config, control, controller, doctor, emulate, export,
-    identify, linearity, margins, model, recover, remote, replay, report, serve, tune,
+    calibrate, campaign, chirp, compare, completions, config, control, controller, doctor, emulate,
+    export, identify, linearity, margins, model, recover, remote, replay, report, serve, tune,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -54,10 +54,13 @@ enum Command {
     Tune(tune::Args),
     /// Analyse a recording or an external CSV file with the same method as `bench chirp`
     Identify(identify::Args),
-    /// Write a page with the frequency responses and steps of one or several recordings
+    /// Write the page of a recording of any run, or one page with the frequency responses and steps of several recordings
     Report(report::Args),
     /// Write the signals or the frequency response of a recording as CSV, Parquet, MATLAB or UFF 58
     Export(export::Args),
+    /// Compare recordings with the first one: modes, verdict, static compliance and figures of the loop, with the
+    /// significance of each difference
+    Compare(compare::Args),
     /// Feed the recorded probe measurements to the loop code again and compare every command bit for bit
     Replay(replay::Args),
     /// Write a readable copy of a truncated or damaged recording and report what was lost
@@ -73,6 +76,20 @@ enum Command {
     Completions(completions::CompletionArgs),
     /// Print or write the manual pages
     Man(completions::ManArgs),
+}
+
+impl Command {
+    /// Name, note and operator, of a command that makes runs.
+    fn description(&self) -> Option<&DescriptionOptions> {
+        match self {
+            Command::Chirp(args) => Some(&args.run.description),
+            Command::Linearity(args) => Some(&args.run.description),
+            Command::Control(args) => Some(&args.run.description),
+            Command::Calibrate(args) => Some(&args.run.description),
+            Command::Campaign(args) => Some(&args.description),
+            _ => None,
+        }
+    }
 }
 
 /// Parses the arguments of the process, runs the command and reports an error: as text on standard error and, with
@@ -94,7 +111,10 @@ fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
         .map(|argument| argument.to_string_lossy().into_owned())
         .collect();
     match remote::target(&arguments) {
-        Some(target) => remote::carry_out(&target, &arguments, &operator()),
+        Some(target) => {
+            let description = cli.command.description().cloned().unwrap_or_default();
+            remote::carry_out(&target, &arguments, &description)
+        }
         None => run(cli),
     }
 }
@@ -143,6 +163,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Identify(args) => identify::run(&args),
         Command::Report(args) => report::run(&args),
         Command::Export(args) => export::run(&args),
+        Command::Compare(args) => compare::run(&args),
         Command::Replay(args) => replay::run(&args),
         Command::Recover(args) => recover::run(&args),
         Command::Emulate(args) => emulate::run(&args),

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use crate::daemon::client::{DaemonOwner, rig_of, running_daemon};
 use crate::daemon::{Command, OnDisconnect, RunRequest};
@@ -19,7 +20,11 @@ pub(super) struct ConnectOption {
 
 impl ConnectOption {
     /// The daemon that makes the runs; `None` for this process.
-    pub fn owner(&self, stage: Stage) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
+    pub fn owner(
+        &self,
+        stage: Stage,
+        description: &DescriptionOptions,
+    ) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
         let socket = match self.connect.as_deref() {
             Some("none") => return Ok(None),
             // The whole command is carried out there, before it gets here.
@@ -27,7 +32,8 @@ impl ConnectOption {
             Some(path) => Some(required(PathBuf::from(path), stage)?),
             None => running_daemon().filter(|socket| rig_of(socket).ok() == Some(stage)),
         };
-        let owner = socket.map(|socket| DaemonOwner::new(socket, request(), operator()));
+        let owner = socket
+            .map(|socket| DaemonOwner::new(socket, request(description), description.operator()));
         Ok(owner.map(|owner| Arc::new(owner) as Arc<dyn RigOwner>))
     }
 }
@@ -56,7 +62,7 @@ fn name(stage: Stage) -> &'static str {
 }
 
 /// The command line of this process, for the queue of the daemon.
-fn request() -> RunRequest {
+fn request(description: &DescriptionOptions) -> RunRequest {
     let mut words = std::env::args().skip(1);
     let named = words.next().unwrap_or_default();
     let command = Command::ALL
@@ -65,13 +71,8 @@ fn request() -> RunRequest {
     RunRequest {
         command: command.unwrap_or(Command::Chirp),
         args: words.collect(),
-        name: String::new(),
-        note: String::new(),
+        name: description.name().into(),
+        note: description.note().into(),
         on_disconnect: OnDisconnect::Default,
     }
-}
-
-/// The user of this process.
-pub(super) fn operator() -> String {
-    std::env::var("USER").unwrap_or_else(|_| "unknown".into())
 }

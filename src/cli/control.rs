@@ -41,7 +41,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         };
         print_text(&text.to_string())?;
     }
-    let mut run = args.run.run(&plan, "control")?;
+    let mut run = args.run.run(&args.bench, &plan, "control")?;
     let report = report(&mut run, &plan, predicted, evidence, args.no_report)?;
     let text = control_output::text(&report, &config);
     close(run, &report, args.bench.json, &text)?;

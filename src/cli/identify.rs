@@ -11,9 +11,11 @@ use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::progress::ProgressLine;
-use super::run_options::trip_text;
+use super::run_options::{description_text, trip_text};
 use crate::config::Config;
-use crate::experiment::{Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals};
+use crate::experiment::{
+    Description, Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals,
+};
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::util::progress::Progress;
@@ -37,6 +39,9 @@ pub(super) struct Args {
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
 struct Report {
+    /// Name, note and operator.
+    #[serde(flatten)]
+    description: Description,
     /// `completed`, `tripped`, `stopped`, or `cut_off` if the file ends before the run.
     outcome: Ending,
     trip: Option<TripSummary>,
@@ -129,6 +134,7 @@ impl Report {
     fn new(recording: &Recording, path: &Path, made: AnalysisOutputs) -> Report {
         let outcome = Ending::of(recording);
         Report {
+            description: Description::of(recording),
             outcome,
             trip: TripSummary::of(outcome),
             recording: path.display().to_string(),
@@ -156,13 +162,14 @@ impl Report {
             ""
         };
         format!(
-            "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}\n{}{}",
+            "{}: {} ticks ({:.2} s at {} Hz), {} overruns, {} lost records{cut}\n{}{}{}",
             self.outcome.name().replace('_', " "),
             self.ticks,
             self.ticks as f64 * period_s,
             config.servo.rate_hz,
             self.overruns,
             self.lost_records,
+            description_text(&self.description),
             self.trip
                 .as_ref()
                 .map_or(String::new(), |trip| trip_text(trip, period_s)),

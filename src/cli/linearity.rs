@@ -43,7 +43,7 @@ pub(super) struct Args {
     #[command(flatten)]
     bench: BenchOptions,
     #[command(flatten)]
-    run: RunOptions,
+    pub run: RunOptions,
     #[command(flatten)]
     band: ExcitationOptions,
     /// Amplitudes as ratios of the planned amplitude; one run for each ratio
@@ -153,7 +153,7 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let Some(first) = plans.first() else {
         return Ok(Vec::new());
     };
-    let setup = args.run.setup(&first.config)?;
+    let setup = args.run.setup(&args.bench, &first.config)?;
     let progress = Progress::new("linearity");
     let _line = ProgressLine::show(&progress);
     let runner = Runner::with_progress(setup, progress);

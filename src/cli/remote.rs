@@ -7,6 +7,7 @@ use hyper::body::Incoming;
 use serde_json::{Value, json};
 use tokio::time::{Duration, interval};
 
+use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_message, print_text};
@@ -19,19 +20,19 @@ const RENEWAL: Duration = Duration::from_secs(3);
 
 /// The daemon that `--connect` names, if it is at an address.
 pub(super) fn target(arguments: &[String]) -> Option<Target> {
-    let (_, value) = split(arguments);
+    let (_, value) = split(arguments, "--connect");
     value
         .filter(|value| value.starts_with("http://"))
         .map(|value| Target::of(&value))
 }
 
-/// The arguments without `--connect`, and its value.
-fn split(arguments: &[String]) -> (Vec<String>, Option<String>) {
+/// The arguments without an option such as `--connect`, and its value.
+fn split(arguments: &[String], option: &str) -> (Vec<String>, Option<String>) {
     let mut rest = Vec::new();
     let mut value = None;
     let mut all = arguments.iter();
     while let Some(argument) = all.next() {
-        match argument.strip_prefix("--connect") {
+        match argument.strip_prefix(option) {
             Some("") => value = all.next().cloned(),
             Some(given) if given.starts_with('=') => value = Some(given[1..].to_string()),
             _ => rest.push(argument.clone()),
@@ -40,24 +41,32 @@ fn split(arguments: &[String]) -> (Vec<String>, Option<String>) {
     (rest, value)
 }
 
+/// The arguments without the options that the request of the daemon or its arm lease contains.
+fn command_line(arguments: &[String]) -> Vec<String> {
+    let sent_apart = ["--connect", "--name", "--note", "--operator"];
+    sent_apart
+        .iter()
+        .fold(arguments.to_vec(), |rest, option| split(&rest, option).0)
+}
+
 /// Carries out the command line of this process at a daemon.
 pub(super) fn carry_out(
     target: &Target,
     arguments: &[String],
-    operator: &str,
+    description: &DescriptionOptions,
 ) -> Result<Outcome, CliError> {
-    let (arguments, _) = split(arguments);
+    let arguments = command_line(arguments);
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
     let runtime = runtime.map_err(|error| unreachable(target, &error.to_string()))?;
-    runtime.block_on(carried_out(target, &arguments, operator))
+    runtime.block_on(carried_out(target, &arguments, description))
 }
 
 async fn carried_out(
     target: &Target,
     arguments: &[String],
-    operator: &str,
+    description: &DescriptionOptions,
 ) -> Result<Outcome, CliError> {
     let (command, args) = arguments
         .split_first()
@@ -67,11 +76,16 @@ async fn carried_out(
         Method::POST,
         "/api/v1/lease",
         None,
-        Some(json!({ "operator": operator })),
+        Some(json!({ "operator": description.operator() })),
     )
     .await?;
     let lease = lease["lease"].as_str().unwrap_or_default().to_string();
-    let request = json!({ "command": command, "args": args });
+    let request = json!({
+        "command": command,
+        "args": args,
+        "name": description.name(),
+        "note": description.note(),
+    });
     let run = ask(
         target,
         Method::POST,
@@ -199,11 +213,13 @@ mod tests {
             "chirp --connect http://lab:1 --seed 4",
             "chirp --connect=http://lab:1 --seed 4",
         ] {
-            let (rest, value) = split(&words(line));
+            let (rest, value) = split(&words(line), "--connect");
             assert_eq!(rest, words("chirp --seed 4"));
             assert_eq!(value.as_deref(), Some("http://lab:1"));
         }
         assert_eq!(target(&words("chirp --connect none")), None);
+        let line = "chirp --name a --connect=http://lab:1 --note=b --operator c --seed 4";
+        assert_eq!(command_line(&words(line)), words("chirp --seed 4"));
         assert_eq!(target(&words("chirp")), None);
     }
 }

@@ -1,18 +1,27 @@
-//! `bench report`: one page for one or several recordings.
+//! `bench report`: the page of a recording, or one page for several recordings.
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::analysis_output::shown_by;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
-use crate::experiment::{Plan, RunKind, control_run, overview, step_response};
+use super::progress::ProgressLine;
+use crate::experiment::{
+    AnalysisError, BasicResults, Plan, RunKind, analyse_with_progress, control_run, overview,
+    step_response,
+};
 use crate::identify::{Frf, frf_csv};
 use crate::recording::Recording;
 use crate::report::ReportError;
-use crate::report::run_pages::{ComparedRun, ControlReport, comparison_page};
+use crate::report::run_pages::{
+    BasicReport, BenchRun, ComparedRun, ControlReport, comparison_page, page as analysed_page,
+    plots,
+};
 use crate::util::atomic_file::write_atomic;
+use crate::util::progress::Progress;
 
 /// The page on standard output instead of a file.
 const STANDARD_OUTPUT: &str = "-";
@@ -20,7 +29,7 @@ const STANDARD_OUTPUT: &str = "-";
 /// The recordings, and where the page goes.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
-    /// Recordings (MCAP) of `bench chirp` and `bench control`
+    /// A recording (MCAP) of any run, or several of `bench chirp` and `bench control` for the same plots
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Path of the page; `-` prints it [default: the first recording with the ending _plots.html]
@@ -65,35 +74,72 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Done)
 }
 
-/// The page of one closed-loop run, or of one or several recordings in the same plots.
+/// The page of one run, or of several recordings in the same plots.
 fn page(paths: &[PathBuf]) -> Result<String, CliError> {
-    if let [path] = paths
-        && let Some(page) = control_page(path)?
-    {
-        return Ok(page);
+    if let [path] = paths {
+        return run_page(path);
     }
     let runs = paths.iter().map(|path| compared_run(path));
     let runs = runs.collect::<Result<Vec<_>, _>>()?;
-    comparison_page(&runs).map_err(nothing_common)
+    comparison_page(&runs, None).map_err(nothing_common)
 }
 
-/// The report of a closed-loop run; `None` for another run.
-fn control_page(path: &Path) -> Result<Option<String>, CliError> {
+/// The page of one run: its analysis, if it is one of an excitation; its loop; or what else it has found.
+fn run_page(path: &Path) -> Result<String, CliError> {
     let recording = Recording::open(path)?;
     let plan = Plan::of(&recording)?;
-    if plan.kind != RunKind::Control {
-        return Ok(None);
-    }
-    let run = control_run(&recording, &plan)?;
-    let report = ControlReport {
-        recording: &recording,
-        config: &plan.config,
-        run: &run,
+    let page = match (plan.kind, plan.config.control.reference.is_swept()) {
+        (RunKind::Chirp, _) | (RunKind::Control, true) => analysis_page(&recording, &plan)?,
+        (RunKind::Control, false)
+        | (RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck, _) => Err(String::new()),
     };
-    let failed = |error: ReportError| CliError::Failed(error.to_string());
+    match (page, plan.kind) {
+        (Ok(page), _) => Ok(page),
+        (Err(_), RunKind::Control) => control_page(&recording, &plan),
+        (Err(why), _) => basic_page(&recording, &plan, &why),
+    }
+}
+
+/// The page of an analysed excitation, or why it cannot be analysed.
+fn analysis_page(recording: &Recording, plan: &Plan) -> Result<Result<String, String>, CliError> {
+    let progress = Progress::new("analysing");
+    let _line = ProgressLine::show(&progress);
+    let analysis = match analyse_with_progress(recording, &plan.config, &mut shown_by(&progress)) {
+        Ok(analysis) => analysis,
+        Err(AnalysisError::Recording(error)) => return Err(error.into()),
+        Err(error) => return Ok(Err(error.to_string())),
+    };
+    let report = BenchRun::new(recording, &analysis, &plan.config).report();
+    let report = report.map_err(failed)?;
+    let plots = plots(&report).map_err(failed)?;
+    Ok(Ok(analysed_page(&report, &plots)))
+}
+
+/// The report of a closed-loop run.
+fn control_page(recording: &Recording, plan: &Plan) -> Result<String, CliError> {
+    let report = ControlReport {
+        recording,
+        config: &plan.config,
+        run: &control_run(recording, plan)?,
+    };
     let plots = report.plots().map_err(failed)?;
-    let page = report.page(&plots, frf_beside(path)?.as_ref());
-    page.map(Some).map_err(failed)
+    let frf = frf_beside(recording.path())?;
+    report.page(&plots, frf.as_ref()).map_err(failed)
+}
+
+/// The page of a run without a frequency response.
+fn basic_page(recording: &Recording, plan: &Plan, why: &str) -> Result<String, CliError> {
+    let report = BasicReport {
+        recording,
+        config: &plan.config,
+        results: &BasicResults::of(recording, plan, why),
+        overview: &overview(recording)?,
+    };
+    report.page().map_err(failed)
+}
+
+fn failed(error: ReportError) -> CliError {
+    CliError::Failed(error.to_string())
 }
 
 fn nothing_common(error: ReportError) -> CliError {
@@ -126,7 +172,6 @@ fn compared_run(path: &Path) -> Result<ComparedRun, CliError> {
         name: stem.to_string_lossy().into_owned(),
         frf: frf_beside(path)?,
         step,
-        overview: overview(&recording)?,
     })
 }
 

@@ -6,16 +6,17 @@ use std::sync::Arc;
 use serde::Serialize;
 
 use super::connection::ConnectOption;
+use super::description_options::DescriptionOptions;
 use super::error::CliError;
-use super::options::SeedOption;
+use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
 use crate::config::Config;
 use crate::experiment::{
-    self, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run, RunSummary,
-    Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
+    self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
+    RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
@@ -45,6 +46,8 @@ pub(super) struct RunOptions {
     /// Folder for the recording and the files computed from it
     #[arg(long, value_name = "DIR", default_value = "recordings")]
     pub out: PathBuf,
+    #[command(flatten)]
+    pub description: DescriptionOptions,
     #[command(flatten)]
     connect: ConnectOption,
 }
@@ -76,7 +79,7 @@ impl RunOptions {
     }
 
     /// Rig, pace and folder of a run.
-    pub fn setup(&self, config: &Config) -> Result<Setup, CliError> {
+    pub fn setup(&self, bench: &BenchOptions, config: &Config) -> Result<Setup, CliError> {
         if !self.is_simulated(config) {
             self.seed.refuse_on_devices()?;
         }
@@ -87,6 +90,7 @@ impl RunOptions {
             motor: self.motor(config)?,
             now: Moment::now,
             folder: self.out.clone(),
+            description: self.description.description(bench.profile()),
             owner: self.owner(config)?,
         })
     }
@@ -95,7 +99,7 @@ impl RunOptions {
     fn owner(&self, config: &Config) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
         match self.simulate {
             true => Ok(None),
-            false => self.connect.owner(self.stage(config)),
+            false => self.connect.owner(self.stage(config), &self.description),
         }
     }
 
@@ -141,8 +145,14 @@ impl RunOptions {
     }
 
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
-    pub fn run(&self, plan: &Plan, phase: &'static str) -> Result<Run, CliError> {
-        let (setup, progress) = (self.setup(&plan.config)?, Progress::new(phase));
+    pub fn run(
+        &self,
+        bench: &BenchOptions,
+        plan: &Plan,
+        phase: &'static str,
+    ) -> Result<Run, CliError> {
+        let setup = self.setup(bench, &plan.config)?;
+        let progress = Progress::new(phase);
         let _line = ProgressLine::show(&progress);
         Ok(Runner::with_progress(setup, progress).run(plan, phase)?)
     }
@@ -197,10 +207,23 @@ pub(super) fn run_text(summary: &RunSummary, config: &Config) -> String {
         summary.lost_records,
     );
     wrap(&ending, 0)
+        + &description_text(&summary.description)
         + &recording_text(summary)
         + &timing_text(&summary.timing)
         + &trip.unwrap_or_default()
         + &labelled("recording", &summary.recording)
+}
+
+/// A line each for name, operator and note.
+pub(super) fn description_text(description: &Description) -> String {
+    let lines = [
+        ("name", &description.name),
+        ("operator", &description.operator),
+        ("note", &description.note),
+    ];
+    let given = lines.into_iter();
+    let given = given.filter_map(|(label, text)| Some((label, text.as_ref()?)));
+    given.map(|(label, text)| labelled(label, text)).collect()
 }
 
 /// Why the run was stopped if nobody stopped it, or why it went on without a recording.

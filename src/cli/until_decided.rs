@@ -72,7 +72,7 @@ struct Report {
 
 /// Makes the shots and writes the results of all of them beside the last recording.
 pub(super) fn measure(args: &Args, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
-    let setup = args.run.setup(base)?;
+    let setup = args.run.setup(&args.bench, base)?;
     let json = args.bench.json;
     let sequence = stop_on_signal(|stop| {
         let limits = SequenceLimits { max_motion_s, stop };

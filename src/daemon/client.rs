@@ -36,6 +36,11 @@ pub fn running_daemon() -> Option<PathBuf> {
         .find(|path| BlockingStream::connect(path).is_ok())
 }
 
+/// Whether the daemon started this process to carry out a command.
+pub fn is_started_by_daemon() -> bool {
+    std::env::var_os(TICKET_VARIABLE).is_some()
+}
+
 /// The kind of rig that the daemon of a socket has.
 ///
 /// # Errors

@@ -12,8 +12,8 @@ use super::same_rig::require_same_rig;
 use super::warnings::copy_warnings;
 use crate::config::Config;
 use crate::experiment::{
-    DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening, RecordingDefect,
-    Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause,
+    Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
+    RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause,
 };
 use crate::rig::motor::Moment;
 use crate::rt::supervision::StopFlags;
@@ -284,6 +284,7 @@ impl OwnerThread {
             },
             now: Moment::now,
             folder: order.folder.clone(),
+            description: Description::default(),
             owner: None,
         }
     }

@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::secret::Secret;
+use crate::experiment::{Description, operator_name, run_name, run_note};
 use crate::rt::supervision::StopFlags;
 use crate::util::progress::Progress;
 
@@ -202,6 +203,16 @@ pub struct RunEntry {
 }
 
 impl RunEntry {
+    /// Name, note and operator for the recording.
+    pub fn description(&self) -> Description {
+        Description {
+            name: run_name(&self.request.name).ok(),
+            note: run_note(&self.request.note).ok(),
+            operator: operator_name(&self.operator).ok(),
+            invocation: None,
+        }
+    }
+
     /// Whether its turn has begun and not ended.
     pub fn is_current(&self) -> bool {
         match self.phase {

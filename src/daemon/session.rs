@@ -214,12 +214,13 @@ impl Session {
             let entry = schedule.open_entry(self.id)?;
             entry.phase = Phase::Running;
             entry.progress = Some(progress.clone());
-            Ok::<_, ScheduleError>(entry.stop.clone())
+            Ok::<_, ScheduleError>((entry.stop.clone(), entry.description()))
         });
-        let stop = match begun {
-            Ok(stop) => stop,
+        let (stop, description) = match begun {
+            Ok(begun) => begun,
             Err(error) => return self.connection.send(&refused(error.to_string())).await,
         };
+        order.description = order.description.or(description);
         self.daemon.set_plan(plan);
         self.daemon.live.set_run(live_run);
         self.daemon.owner.run(OwnerOrder {
@@ -366,9 +367,9 @@ impl Session {
         };
         let info = RecordingInfo {
             command: entry.request.command.name().into(),
-            operator: entry.operator,
-            name: entry.request.name,
-            note: entry.request.note,
+            operator: run.description.operator.clone().unwrap_or_default(),
+            name: run.description.name.clone().unwrap_or_default(),
+            note: run.description.note.clone().unwrap_or_default(),
             outcome: Some(Ending::from(&run.ended).name().into()),
             verdict: verdict(results),
         };

@@ -219,6 +219,7 @@ impl PreparedRun<'_> {
         ended.lost_records += health.discarded();
         Ok(Run {
             path,
+            description: self.plan.description.clone(),
             pace: rig.pace,
             scheduling: rig.live.scheduling().clone(),
             stop_cause: supervisor

@@ -11,6 +11,7 @@
 mod amplitude_plan;
 mod analysis;
 mod analysis_error;
+mod basic_results;
 pub mod calibration;
 pub mod campaign;
 pub mod certificate;
@@ -19,6 +20,7 @@ mod closed_signals;
 mod command_plan;
 mod connections;
 mod control_run;
+mod description;
 mod ending;
 mod error;
 mod error_kind;
@@ -31,6 +33,7 @@ mod live_rig;
 mod loop_check;
 mod measured_frf;
 mod measured_margins;
+mod mode_pairs;
 mod motion_model;
 mod motor_error;
 mod motor_forecast;
@@ -49,6 +52,7 @@ mod replay;
 mod response_estimate;
 mod response_points;
 mod run;
+pub mod run_comparison;
 mod run_error;
 mod run_figures;
 mod run_hooks;
@@ -75,8 +79,12 @@ pub use analysis::{
     Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_opened, analyse_with_progress,
 };
 pub use analysis_error::{AnalysisError, ClosedLoopError};
+pub use basic_results::BasicResults;
 pub use command_plan::{CommandSummary, ShapedMode};
 pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
+pub use description::{
+    Description, DescriptionError, Invocation, operator_name, run_name, run_note,
+};
 pub use ending::Ending;
 pub use error::ExperimentError;
 pub use error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
 use super::command_plan::{self, CommandPlan, CommandSummary};
+use super::description::Description;
 use super::loop_check::closed_loop_of;
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
@@ -96,6 +97,8 @@ pub struct Plan {
     pub config: Config,
     /// The controller, for a closed loop.
     pub controller: Option<ControllerText>,
+    /// Name, note and operator of the run.
+    pub description: Description,
     /// The calibration in use.
     pub calibration: Option<Calibration>,
     /// Descriptions of the devices, for the metadata of the recording.
@@ -140,6 +143,7 @@ impl Plan {
             kind,
             config,
             controller: None,
+            description: Description::default(),
             calibration: None,
             devices: Vec::new(),
             motor: MotorStart::default(),
@@ -187,6 +191,7 @@ impl Plan {
     /// The check of the stage before this plan, with the same rig, calibration and evidence.
     pub(super) fn stage_check(&self, settings: StageCheckSettings) -> Plan {
         Plan {
+            description: self.description.clone(),
             calibration: self.calibration.clone(),
             devices: self.devices.clone(),
             certificate: self.certificate.clone(),
@@ -222,6 +227,7 @@ impl Plan {
             calibration.map(|text| config::typed("the calibration of the recording", &text));
         Ok(Plan {
             controller,
+            description: Description::of(recording),
             calibration: calibration.transpose()?,
             reference: attached_text(recording, REFERENCE),
             command,

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
+use super::description::Description;
 use super::motor_start::MotorStart;
 use crate::recording::{Recorder, RecordingError, Shortage, Totals};
 use crate::rt::record::Origin;
@@ -14,6 +15,8 @@ use crate::rt::thread::{Pace, Scheduling};
 pub struct Run {
     /// Path of the recording.
     pub path: PathBuf,
+    /// Its name, note and operator.
+    pub description: Description,
     /// How it ended.
     pub ended: RunOutcome,
     /// Pace of the loop.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
+use super::description::Description;
 use super::error::ExperimentError;
 use super::motor_start::MotorStart;
 use super::plan::{Plan, RunKind};
@@ -51,6 +52,9 @@ pub struct RunOrder {
     pub motor: MotorHandling,
     /// Folder for the recording, as an absolute path.
     pub folder: PathBuf,
+    /// Name, note and operator of the run.
+    #[serde(default)]
+    pub description: Description,
 }
 
 /// What a run needs besides its plan.
@@ -91,6 +95,7 @@ impl RunOrder {
             clear_fault: conditions.clear_fault,
             motor: conditions.motor,
             folder: absolute(conditions.folder)?,
+            description: plan.description,
         })
     }
 
@@ -111,6 +116,7 @@ impl RunOrder {
         );
         plan.certificate.clone_from(&self.certificate);
         plan.override_reason.clone_from(&self.override_reason);
+        plan.description.clone_from(&self.description);
         Ok(plan)
     }
 
@@ -138,6 +144,8 @@ fn absolute(path: &Path) -> Result<PathBuf, ExperimentError> {
 /// A run that has ended in the process that owns the rig. Its recording is still open for results.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunReport {
+    #[serde(default)]
+    description: Description,
     ended: RunOutcome,
     pace: Pace,
     scheduling: Scheduling,
@@ -155,6 +163,7 @@ impl RunReport {
     pub fn of(run: &mut Run) -> Result<RunReport, ExperimentError> {
         Ok(RunReport {
             totals: run.totals()?,
+            description: run.description.clone(),
             ended: run.ended.clone(),
             pace: run.pace,
             scheduling: run.scheduling.clone(),
@@ -174,6 +183,7 @@ impl RunReport {
         let name = self.totals.path.file_name().unwrap_or_default();
         Run {
             path: folder.join(name),
+            description: self.description,
             ended: self.ended,
             pace: self.pace,
             scheduling: self.scheduling,

@@ -82,7 +82,8 @@ pub(super) fn metadata(
     let devices = devices.chain(reason);
     let pairs = pairs.into_iter().chain(of_scheduling(scheduling));
     let pairs = pairs.chain(devices);
-    pairs.map(|(key, value)| (key.to_string(), value)).collect()
+    let pairs = pairs.map(|(key, value)| (key.to_string(), value));
+    pairs.chain(plan.description.metadata()).collect()
 }
 
 fn of_scheduling(scheduling: &Scheduling) -> [(&'static str, String); 5] {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::description::Description;
 use super::ending::Ending;
 use super::run::{Run, StopCause};
 use crate::recording::{Quantiles, RecordingError};
@@ -11,6 +12,9 @@ use crate::rt::thread::{Pace, Scheduling};
 /// Counts, timing and ending of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct RunSummary {
+    /// Name, note and operator.
+    #[serde(flatten)]
+    pub description: Description,
     /// How the run ended.
     pub outcome: Ending,
     /// Why it was stopped early.
@@ -97,6 +101,7 @@ impl RunSummary {
         let totals = run.totals()?;
         let ending = Ending::from(&run.ended);
         Ok(RunSummary {
+            description: run.description.clone(),
             outcome: ending,
             stop_cause: run.stop_cause,
             unrecorded: run.unrecorded,

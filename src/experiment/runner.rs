@@ -8,6 +8,7 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use super::certificate::{OpenRig, require_evidence, require_evidence_or_warn};
+use super::description::Description;
 use super::ending::Ending;
 use super::error::ExperimentError;
 use super::live_rig::LiveRig;
@@ -43,6 +44,8 @@ pub struct Setup {
     pub now: fn() -> Moment,
     /// Folder for the recordings.
     pub folder: PathBuf,
+    /// Name, note and operator of the runs; those of each plan if they are not given here.
+    pub description: Description,
     /// The process that owns the rig; `None` if this process opens it.
     pub owner: Option<Arc<dyn RigOwner>>,
 }
@@ -57,6 +60,7 @@ impl Setup {
             motor: MotorHandling::WaitUntilCool,
             now: Moment::now,
             folder,
+            description: Description::default(),
             owner: None,
         }
     }
@@ -70,6 +74,7 @@ impl Setup {
             motor: MotorHandling::Simulated,
             now: Moment::now,
             folder,
+            description: Description::default(),
             owner: None,
         }
     }
@@ -164,6 +169,7 @@ impl Runner {
         phase: &'static str,
         calibration: Option<Calibration>,
     ) -> Result<Run, ExperimentError> {
+        let plan = &self.described(plan);
         let stage = self.setup.stage(&plan.config);
         require_stable_loop(plan, stage)?;
         require_evidence(plan, stage, None)?;
@@ -189,6 +195,13 @@ impl Runner {
             self.open.replace(Some(bench));
         }
         Ok(ended)
+    }
+
+    /// The plan with name, note and operator.
+    fn described(&self, plan: &Plan) -> Plan {
+        let mut plan = plan.clone();
+        plan.description = self.setup.description.clone().or(plan.description);
+        plan
     }
 
     /// Checks the stage of a closed loop that has a certificate.

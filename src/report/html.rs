@@ -4,7 +4,7 @@ use super::chart::dark_style;
 
 const STYLE: &str = "\
 :root{color-scheme:light dark;--ink:#222;--quiet:#5f5f5f;--paper:#fff;--line:#d0d0d0;--code:#f3f3f1;--link:#00588a;--bad:#b04a00;--good:#1f7a4d}
-@media (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--quiet:#a8a8a8;--paper:#16181b;--line:#3c4046;--code:#22262b;--link:#7cc0ee;--bad:#ffb066;--good:#6fd3a2}}
+@media screen and (prefers-color-scheme:dark){:root{--ink:#e6e6e6;--quiet:#a8a8a8;--paper:#16181b;--line:#3c4046;--code:#22262b;--link:#7cc0ee;--bad:#ffb066;--good:#6fd3a2}}
 *{box-sizing:border-box}
 body{margin:0 auto;max-width:1080px;padding:1.5rem;background:var(--paper);color:var(--ink);font:16px/1.5 system-ui,sans-serif}
 h1,h2,h3{line-height:1.25}
@@ -39,7 +39,23 @@ dd{margin-bottom:.5rem}
 figure{overflow-x:auto}
 figure svg{min-width:640px}
 }
-@media print{section{break-inside:avoid-page}}
+@page{margin:14mm}
+@media print{
+:root{color-scheme:light}
+body{max-width:none;padding:0;font-size:10.5pt}
+h1,h2,h3,.quiet{break-after:avoid}
+h2{margin-top:1.5rem}
+figure,tr,dt,.verdict{break-inside:avoid}
+dd{break-before:avoid}
+thead{display:table-header-group}
+figure{overflow:visible}
+figure svg{min-width:0;max-height:225mm}
+.wide{overflow:visible}
+table{font-size:9pt}
+pre{font-size:7.5pt;background:none;overflow:visible}
+details:not([open]),.readout,[role=status]{display:none}
+section:has(>details:not([open])){display:none}
+}
 ";
 
 /// Cursor readout and zoom of the plots: `attachPlots(root)` attaches to all plots below an element.

@@ -2,6 +2,7 @@
 mod asks;
 mod common;
 mod crash;
+mod descriptions;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod full_disk;

@@ -1,5 +1,6 @@
 //! Plots and pages of a record. The plots of these tests are kept in `target/tmp` for inspection.
 
+mod asked;
 mod attributes;
 mod bode;
 mod comparison;

@@ -2,6 +2,7 @@
 //!
 //! It takes minutes of processor time: `cargo test --features statistical --test statistical`. `.ci/run` runs it.
 
+mod comparisons;
 mod coverage;
 mod estimators;
 mod fit_intervals;

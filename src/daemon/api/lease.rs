@@ -15,10 +15,7 @@ use super::views::Operator;
 use crate::daemon::lease::LEASE;
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::Daemon;
-use crate::experiment::ErrorKind;
-
-/// Longest name of an operator in characters.
-const MAX_NAME: usize = 100;
+use crate::experiment::{ErrorKind, operator_name};
 
 /// A lease that was given.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -41,14 +38,11 @@ pub async fn take(
     State(daemon): State<Arc<Daemon>>,
     Body(operator): Body<Operator>,
 ) -> Result<Created<GivenLease>, ApiError> {
-    let name = operator.operator.trim();
-    if name.is_empty() || name.chars().count() > MAX_NAME {
-        return Err(ApiError::bad_request(format!(
-            "the name of the operator is empty or has more than {MAX_NAME} characters; give the name of a person"
-        )));
-    }
+    let name = operator_name(&operator.operator).map_err(|error| {
+        ApiError::bad_request(format!("operator: {error}; give the name of a person"))
+    })?;
     let secret = random()?;
-    daemon.change(|schedule, now| schedule.take_lease(name, secret.clone(), now))?;
+    daemon.change(|schedule, now| schedule.take_lease(&name, secret.clone(), now))?;
     tracing::info!(operator = name, "the arm lease was taken");
     let given = GivenLease {
         lease: secret.reveal().into(),

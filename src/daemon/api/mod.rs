@@ -10,6 +10,7 @@ mod recordings;
 mod reply;
 mod routes;
 mod runs;
+mod texts;
 mod tools;
 pub mod views;
 

@@ -13,14 +13,13 @@ use tower_http::services::ServeFile;
 
 use super::error::ApiError;
 use super::extract::{Body, InPath, InQuery};
+use super::texts::check_texts;
 use crate::daemon::catalogue::{ListedRecording, RecordingInfo};
 use crate::daemon::shared::Daemon;
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
 use crate::recording::Recording;
 
-/// Longest name and note in bytes.
-const MAX_TEXT: usize = 10_000;
 /// Most recordings on one page: the curves of more cannot be distinguished.
 const MAX_COMPARED: usize = 12;
 /// The script of a report gets no access to the token of the page.
@@ -184,11 +183,7 @@ pub async fn note(
     InPath(FileName { file }): InPath<FileName>,
     Body(note): Body<Note>,
 ) -> Result<NoContent, ApiError> {
-    if note.name.len().max(note.note.len()) > MAX_TEXT {
-        return Err(ApiError::bad_request(format!(
-            "name or note has more than {MAX_TEXT} bytes; shorten it"
-        )));
-    }
+    check_texts(&note.name, &note.note)?;
     require(&daemon, &file)?;
     on_files(move || {
         let catalogue = daemon.catalogue();

@@ -17,6 +17,7 @@ use super::error::ApiError;
 use super::extract::{Body, InPath, LeaseHeader, StopBody};
 use super::lease::random;
 use super::reply::{Accepted, Reply};
+use super::texts::check_texts;
 use super::views::RunView;
 use crate::daemon::output::{OutputPiece, RunOutput};
 use crate::daemon::run_entry::{Carrier, Command, Phase, RunRequest};
@@ -26,9 +27,6 @@ use crate::daemon::shared::{Daemon, now};
 use crate::daemon::worker::{self, check_args};
 use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
 use crate::rt::tuning::{Factors, Tune};
-
-/// Longest name and note of a run in bytes.
-const MAX_TEXT: usize = 10_000;
 
 /// The part of a path that names a command.
 #[derive(Debug, Deserialize, JsonSchema)]
@@ -72,11 +70,7 @@ pub async fn start(
     LeaseHeader(lease): LeaseHeader,
     Body(request): Body<RunRequest>,
 ) -> Result<Accepted<RunView>, ApiError> {
-    if request.name.len().max(request.note.len()) > MAX_TEXT {
-        return Err(ApiError::bad_request(format!(
-            "name or note has more than {MAX_TEXT} bytes; shorten it"
-        )));
-    }
+    check_texts(&request.name, &request.note)?;
     let operator = daemon.read(|schedule| {
         let lease = schedule.require_lease(&lease, now())?;
         Ok::<_, ApiError>(lease.operator.clone())

@@ -4,5 +4,5 @@
 mod run;
 mod staircase_fit;
 
-pub use run::{CalibrationPlan, CalibrationRun, check, run, settings};
+pub use run::{CalibrationPlan, CalibrationRun, StaircaseResult, check, run, settings, staircase};
 pub use staircase_fit::{StaircaseError, StaircaseFit, fit};

@@ -117,6 +117,27 @@ fn static_steps(
     Ok((summary, calibration))
 }
 
+/// The fit of recorded static steps beside the model.
+#[derive(Clone, Copy, Debug)]
+pub struct StaircaseResult {
+    /// The fit.
+    pub fit: StaircaseFit,
+    /// Static compliance of the model, from current to displacement, in metres per ampere.
+    pub model_m_per_a: f64,
+}
+
+/// Fits the static steps in a recording.
+///
+/// # Errors
+/// With the reason why they give no calibration.
+pub fn staircase(recording: &Recording, config: &Config) -> Result<StaircaseResult, String> {
+    let fit = fit(recording, &config.calibrate, config.servo.period_s());
+    Ok(StaircaseResult {
+        fit: fit.map_err(|error| error.to_string())?,
+        model_m_per_a: compliance_m_per_a(config).map_err(|error| error.to_string())?,
+    })
+}
+
 /// The measured calibration, if a run may use it.
 fn checked(calibration: Calibration, config: &Config) -> Result<Calibration, String> {
     let (settings, current_error_a) = (&config.calibration, config.interlock.current_error_a);

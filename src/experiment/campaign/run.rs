@@ -1,6 +1,6 @@
 //! Runs a campaign: opens its folder, measures the missing points, stores each result, and evaluates all of them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::error::CampaignError;
@@ -15,6 +15,7 @@ use super::rest_position::RestPosition;
 use super::store::{OpenedStore, Store};
 use super::visit_order::visit_order;
 use crate::config::Config;
+use crate::experiment::description::Description;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
@@ -44,6 +45,8 @@ pub struct Campaign<'a> {
     grid: &'a Grid,
     store: Store,
     options: CampaignOptions,
+    /// Name, note and operator of its runs.
+    pub description: Description,
     done: Vec<(GridPoint, PointResult)>,
     /// Files of points that are ignored, with the reason.
     pub rejected: Vec<String>,
@@ -70,6 +73,7 @@ impl<'a> Campaign<'a> {
             grid,
             store,
             options,
+            description: Description::default(),
             done,
             rejected,
             unverified,
@@ -98,10 +102,13 @@ impl<'a> Campaign<'a> {
         let missing = self.missing();
         progress.begin("campaign", missing.len() as u64);
         let (config, grid, store) = (self.config, self.grid, &self.store);
-        let options = self.options;
+        let (options, description) = (self.options, &self.description);
         let measure = |point| {
             let folder = store.recordings(point);
-            let runner = Runner::new(Setup::simulated(folder.clone()));
+            let runner = Runner::new(Setup {
+                description: description.clone(),
+                ..Setup::simulated(folder.clone())
+            });
             let point = PointMeasurement {
                 config: &grid.config_at(config, point)?,
                 folder: &folder,
@@ -150,6 +157,14 @@ impl<'a> Campaign<'a> {
         outcome
     }
 
+    /// The devices, with a folder for recordings.
+    fn on_devices(&self, folder: PathBuf) -> Setup {
+        Setup {
+            description: self.description.clone(),
+            ..Setup::on_devices(folder)
+        }
+    }
+
     /// Evaluates the finished points.
     pub fn evaluate(&self, tolerances: Tolerances) -> Result<Evaluation<'_>, CampaignError> {
         Evaluation::of(self.config, self.grid, &self.done, tolerances)
@@ -166,7 +181,8 @@ struct DeviceRig<'r, 'a, 'f> {
 impl LoadedRig for DeviceRig<'_, '_, '_> {
     /// Recorded in the folder `rest` of the campaign. A trip is an error: no point can be measured on such a bench.
     fn rest_position(&mut self) -> Result<Option<RestPosition>, CampaignError> {
-        let setup = Setup::on_devices(self.campaign.store.folder().join("rest"));
+        let folder = self.campaign.store.folder().join("rest");
+        let setup = self.campaign.on_devices(folder);
         let plan = Plan::quiet(self.campaign.config.clone());
         let run = (self.run)(setup, &plan, "rest")?;
         if let Some((trip, tick)) = run.ended.trip {
@@ -185,7 +201,7 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         let campaign = &*self.campaign;
         let config = campaign.grid.config_at(campaign.config, point)?;
         let folder = campaign.store.recordings(point);
-        let setup = Setup::on_devices(folder.clone());
+        let setup = campaign.on_devices(folder.clone());
         let run = &mut self.run;
         let point = PointMeasurement {
             config: &config,

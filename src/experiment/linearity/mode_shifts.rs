@@ -2,11 +2,9 @@
 
 use serde::Serialize;
 
+use crate::experiment::mode_pairs::{probability_of_difference, same_mode};
 use crate::identify::modal::{Estimate, FittedMode};
 
-/// Two modes are the same if they differ by no more than this ratio of their frequency, and by no more than half the distance to
-/// the next mode.
-const SAME_MODE_RATIO: f64 = 0.05;
 /// Probability that noise alone makes any of the compared parameters shift.
 const FALSE_ALARM: f64 = 0.01;
 /// Compared parameters of a mode.
@@ -77,7 +75,10 @@ pub fn modes_over_amplitude(runs: &[Vec<FittedMode>]) -> Vec<ModeOverAmplitude> 
 
 /// Mode `k` of the first run in all runs.
 fn in_runs(first: &[FittedMode], k: usize, others: &[Vec<FittedMode>]) -> Vec<Option<FittedMode>> {
-    let others = others.iter().map(|modes| nearest(first, k, modes));
+    let others = others.iter().map(|modes| {
+        let found = same_mode(first, k, modes)?;
+        modes.get(found).copied()
+    });
     std::iter::once(Some(first[k])).chain(others).collect()
 }
 
@@ -95,30 +96,6 @@ fn shifts(by_run: &[Option<FittedMode>], limit: f64, of: fn(&FittedMode) -> Esti
         return false;
     };
     estimates.any(|other| probability_of_difference(first, other) < limit)
-}
-
-/// The probability that two estimates of the same value differ this much.
-fn probability_of_difference(a: Estimate, b: Estimate) -> f64 {
-    let z = (a.value - b.value).abs() / libm::hypot(a.sigma, b.sigma);
-    // 0/0: both without error, and equal.
-    if z.is_nan() {
-        return 1.0;
-    }
-    libm::erfc(z * std::f64::consts::FRAC_1_SQRT_2)
-}
-
-/// The mode of another run that is mode `k` of the first.
-fn nearest(first: &[FittedMode], k: usize, modes: &[FittedMode]) -> Option<FittedMode> {
-    let here = first[k].omega_rad_s.value;
-    let distance = |mode: &FittedMode| (mode.omega_rad_s.value - here).abs();
-    let distances = first.iter().map(distance).filter(|away| *away > 0.0);
-    let to_next = distances.fold(f64::INFINITY, f64::min);
-    let found = modes
-        .iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-    // A rigid-body mode is at 0 in each run.
-    let limit = (0.5 * to_next).min(SAME_MODE_RATIO * here);
-    (distance(found) <= limit).then_some(*found)
 }
 
 #[cfg(test)]

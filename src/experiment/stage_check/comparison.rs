@@ -16,13 +16,14 @@
 //! another stage is refused as inconclusive.
 
 use nalgebra::Complex;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::error::StageCheckError;
 use super::estimate::{Measured, ShotResponse, estimate};
 use super::figures::{PhaseComparison, StaticComparison};
 use super::shot::{Expected, Shot};
 use crate::identify::Signals;
+use crate::recording::Recording;
 
 /// Allowed difference in standard deviations.
 const SIGMAS: f64 = 3.0;
@@ -34,7 +35,7 @@ const MAX_LIMIT_RATIO: f64 = 0.5;
 const MAX_LIMIT_DEG: f64 = 75.0;
 
 /// The result of a stage check. The names in JSON must not change.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StageCheck {
     /// Static compliance.
     pub compliance: StaticComparison,
@@ -48,6 +49,12 @@ impl StageCheck {
     /// Compares the signals of a shot with the certificate; `None` if they allow no estimate.
     pub(in crate::experiment) fn of(shot: &Shot, signals: &Signals) -> Option<StageCheck> {
         Some(StageCheck::compare(shot, &estimate(shot, signals)?))
+    }
+
+    /// The result that the run of a check has added to its recording; `None` if there is none.
+    pub fn recorded(recording: &Recording) -> Option<StageCheck> {
+        let results = recording.attachment("results.json")?;
+        serde_json::from_slice(&results.data).ok()
     }
 
     fn compare(shot: &Shot, response: &ShotResponse) -> StageCheck {

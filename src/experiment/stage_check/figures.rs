@@ -1,9 +1,9 @@
 //! The compared figures of a stage check. The names in JSON must not change.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Static compliance by shot and certificate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StaticComparison {
     /// By the shot, in metres per ampere.
     pub measured_m_per_a: f64,
@@ -14,7 +14,7 @@ pub struct StaticComparison {
 }
 
 /// Phase of the response at a tone by shot and certificate.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PhaseComparison {
     /// Frequency of the tone in hertz.
     pub frequency_hz: f64,

@@ -1,6 +1,6 @@
 //! The result of a modal fit: modes, delay, poles and response.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
@@ -97,6 +97,29 @@ impl ModalFit {
     /// The delay beyond that of the measurement chain, in seconds.
     pub fn delay_s(&self) -> Estimate {
         self.estimate(self.parameters.delay_s, Parameter::Delay)
+    }
+
+    /// The static compliance C = sum of r_k/w_k^2 + R in m/N, extrapolated by the fit to zero frequency. Its variance is g' P g, with
+    /// the gradient g of C and the covariance P of the parameters. `None` for a free body, which has none.
+    pub fn static_compliance_m_per_n(&self) -> Option<Estimate> {
+        let modes = &self.parameters.modes;
+        if modes.iter().any(|term| term.omega_rad_s == 0.0) {
+            return None;
+        }
+        let compliance = |term: &ModalTerm| term.residue_per_kg / term.omega_rad_s.powi(2);
+        let free = self.parameters.free();
+        let gradient = free.iter().map(|parameter| match *parameter {
+            Parameter::Frequency(k) => -2.0 * compliance(&modes[k]) / modes[k].omega_rad_s,
+            Parameter::Residue(k) => modes[k].omega_rad_s.powi(-2),
+            Parameter::Remainder => 1.0,
+            Parameter::Damping(_) | Parameter::Delay => 0.0,
+        });
+        let gradient = DVector::from_iterator(free.len(), gradient);
+        let variance = (&self.covariance * &gradient).dot(&gradient);
+        Some(Estimate {
+            value: modes.iter().map(compliance).sum::<f64>() + self.parameters.remainder_m_per_n,
+            sigma: variance.max(0.0).sqrt(),
+        })
     }
 
     /// A parameter's value with its standard deviation, 0 if it is not free.

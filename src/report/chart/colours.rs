@@ -47,7 +47,7 @@ const DARK: [(Colour, Colour); 8] = [
 /// A style element that changes the colours of the picture where the viewer prefers dark mode.
 pub(in crate::report) fn dark_style() -> String {
     let rules: String = DARK.iter().map(dark_rule).collect();
-    format!("<style>@media (prefers-color-scheme:dark){{{rules}}}</style>")
+    format!("<style>@media screen and (prefers-color-scheme:dark){{{rules}}}</style>")
 }
 
 fn dark_rule((light, dark): &(Colour, Colour)) -> String {

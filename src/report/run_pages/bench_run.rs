@@ -6,7 +6,7 @@ use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
-use crate::experiment::{Analysis, ClosedResponses};
+use crate::experiment::{Analysis, ClosedResponses, Description};
 use crate::identify::modal::MeasurementChain;
 use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
@@ -77,6 +77,7 @@ impl<'a> BenchRun<'a> {
     pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
         let analysis = self.analysis;
         Ok(RecordReport {
+            name: Description::of(self.recording).name,
             title: self.title.clone(),
             subtitle: self
                 .subtitle("current set-point to displacement, with hold, amplifier and delay"),
@@ -92,8 +93,11 @@ impl<'a> BenchRun<'a> {
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: evidence(analysis),
             further_plots: self.further_plots()?,
+            asked: run_facts::asked(self.recording, self.config),
             before_plots: analysis.closed.as_ref().map_or_else(String::new, margins),
-            after_plots: self.scheduling() + &run_facts::configuration(self.recording, &self.title),
+            after_plots: run_facts::events(self.recording)
+                + &self.scheduling()
+                + &run_facts::configuration(self.recording, &self.title),
         })
     }
 

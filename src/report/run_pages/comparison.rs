@@ -1,5 +1,7 @@
-//! One page for one or several recordings: their frequency responses and their steps.
+//! One page for several recordings: their differences, their frequency responses and their steps.
 
+use super::run_differences::differences;
+use crate::experiment::run_comparison::{Comparison, RunResult};
 use crate::experiment::{Extent, Overview, StepResponse, TrackingMetrics};
 use crate::identify::{Frf, Unit};
 use crate::report::html::{document_with_plots, escaped, note, picture, row, section, table};
@@ -28,24 +30,33 @@ pub struct ComparedRun {
     pub frf: Option<Frf>,
     /// The step of a closed loop.
     pub step: Option<StepResponse>,
-    /// Its signals.
-    pub overview: Overview,
 }
 
-/// The page of recordings as an HTML document.
+impl From<&RunResult> for ComparedRun {
+    fn from(run: &RunResult) -> ComparedRun {
+        let control = run.control.as_ref();
+        ComparedRun {
+            name: run.label.clone(),
+            frf: run.analysis.as_ref().map(|analysis| analysis.frf.clone()),
+            step: control.and_then(|control| control.step.clone()),
+        }
+    }
+}
+
+/// The page of recordings as an HTML document, with the tables of their differences if they were compared.
 ///
 /// # Errors
 /// When there is nothing to draw, or drawing fails.
-pub fn comparison_page(runs: &[ComparedRun]) -> Result<String, ReportError> {
-    let parts = [responses(runs)?, steps(runs)?, signals(runs)?].concat();
+pub fn comparison_page(
+    runs: &[ComparedRun],
+    comparison: Option<&Comparison>,
+) -> Result<String, ReportError> {
+    let plots = [responses(runs)?, steps(runs)?].concat();
+    let parts = comparison.map_or_else(String::new, differences) + &plots;
     if parts.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    let names: Vec<&str> = runs.iter().map(|run| run.name.as_str()).collect();
-    let title = match names[..] {
-        [name] => name.to_string(),
-        _ => format!("Comparison of {} recordings", names.len()),
-    };
+    let title = format!("Comparison of {} recordings", runs.len());
     let heading = format!("<h1>{}</h1>\n", escaped(&title));
     Ok(document_with_plots(&title, &(heading + &parts)))
 }
@@ -138,12 +149,8 @@ fn drawn_s(step: &StepResponse) -> f64 {
     wanted_s.clamp(DRAWN_S.0, DRAWN_S.1).min(whole_s)
 }
 
-/// The signals of a single run. Several runs would hide each other.
-fn signals(runs: &[ComparedRun]) -> Result<String, ReportError> {
-    let [run] = runs else {
-        return Ok(String::new());
-    };
-    let overview = &run.overview;
+/// Reference, position and current of a whole run.
+pub(super) fn signals_section(overview: &Overview) -> Result<String, ReportError> {
     let envelope = |extents: &[Extent]| -> Vec<(f64, f64, f64)> {
         let extents = extents.iter();
         extents.map(|e| (e.time_s, e.min, e.max)).collect()

@@ -6,10 +6,10 @@ use super::comparison::{responses_section, step_picture};
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
 use crate::config::Config;
-use crate::experiment::{ControlRun, Ending, Extent, SineResponse, StepResponse, TrackingMetrics};
+use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use crate::identify::{Frf, SIGMAS_95};
 use crate::recording::Recording;
-use crate::report::html::{document_with_plots, escaped, facts, note, picture, row, section};
+use crate::report::html::{facts, note, picture, row, section};
 use crate::report::number::{angular_frequency, interval, plain};
 use crate::report::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
@@ -79,15 +79,17 @@ impl ControlReport<'_> {
         let title = &self.config.title;
         let body = [
             self.heading(),
-            self.ending(),
+            run_facts::ending(self.recording),
+            run_facts::asked(self.recording, self.config),
             self.figures(),
             self.whole_run(),
             responses.unwrap_or_default(),
             plots.iter().map(plot_section).collect(),
+            run_facts::events(self.recording),
             run_facts::scheduling(self.recording, &[]),
             run_facts::configuration(self.recording, title),
         ];
-        Ok(document_with_plots(&name, &body.concat()))
+        Ok(run_facts::document(self.recording, &name, &body.concat()))
     }
 
     /// The name of the recording without its ending.
@@ -116,26 +118,7 @@ impl ControlReport<'_> {
     }
 
     fn heading(&self) -> String {
-        let (title, subtitle) = (escaped(&self.config.title), escaped(&self.subtitle()));
-        let record = escaped(&run_facts::file_name(self.recording));
-        format!("<h1>{title}</h1>\n<p class=\"quiet\">{subtitle}<br>Recording {record}</p>\n")
-    }
-
-    /// Why the run ended, unless it was completed.
-    fn ending(&self) -> String {
-        let text = match (&self.run.trip, self.run.ending) {
-            (Some(trip), _) => {
-                let time_s = self.trip_s().unwrap_or_default();
-                let (why, remedy) = (escaped(&trip.text), escaped(trip.remedy));
-                format!("<strong>tripped</strong><br>After {time_s:.4} s: {why}<br>{remedy}")
-            }
-            (None, Ending::Completed) => return String::new(),
-            (None, ending) => format!(
-                "<strong>{}</strong><br>The run did not come to its end.",
-                escaped(ending.name())
-            ),
-        };
-        format!("<p class=\"verdict detected\">{text}</p>\n")
+        run_facts::heading(self.recording, &self.config.title, &self.subtitle())
     }
 
     /// Time of the trip in seconds since the run began.

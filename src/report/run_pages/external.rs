@@ -42,6 +42,8 @@ impl<'a> ExternalRecord<'a> {
         let plot =
             linearity.map(|linearity| distortion_plot(linearity, output, self.file, &subtitle));
         Ok(RecordReport {
+            name: None,
+            asked: String::new(),
             title: self.file.to_string(),
             subtitle,
             record: format!("{} samples at {} Hz", self.samples, self.rate_hz),

@@ -5,9 +5,11 @@
 //!                                       > RecordReport -> plots (SVG) -> page (HTML)
 //! ExternalRecord (a CSV) --------------'
 //! ControlReport (a closed-loop run) -> plots (SVG), control_page (HTML)
-//! ComparedRun (one or several runs) -> comparison (HTML)
+//! BasicReport (a run without a frequency response) -> basic_page (HTML)
+//! ComparedRun (several runs) -> comparison (HTML)
 //! ```
 
+mod basic_page;
 mod bench_run;
 mod comparison;
 mod control_page;
@@ -17,6 +19,7 @@ mod measured_loop;
 mod outputs;
 mod page;
 mod plots;
+mod run_differences;
 mod run_facts;
 
 use nalgebra::Complex;
@@ -26,6 +29,7 @@ use crate::identify::modal::{MeasurementChain, ModalFit};
 use crate::identify::verdict::Verdict;
 use crate::identify::{Frf, Unit};
 
+pub use basic_page::BasicReport;
 pub use bench_run::BenchRun;
 pub use comparison::{ComparedRun, comparison_page};
 pub use control_page::ControlReport;
@@ -41,7 +45,9 @@ pub use plots::{Plot, PlotKind, plots};
 /// The content of a report on an analysed record.
 #[derive(Clone, Debug)]
 pub struct RecordReport<'a> {
-    /// Title of the page and of the plots.
+    /// Name of the run, which is the title of the page.
+    pub name: Option<String>,
+    /// Title of the plots, and of the page of a run without a name.
     pub title: String,
     /// Input and output, excitation and time.
     pub subtitle: String,
@@ -69,6 +75,8 @@ pub struct RecordReport<'a> {
     pub evidence: Vec<(String, String)>,
     /// Plots after those that every record has.
     pub further_plots: Vec<Plot>,
+    /// HTML section about what was asked for.
+    pub asked: String,
     /// HTML sections before the plots.
     pub before_plots: String,
     /// HTML sections after the plots.

@@ -18,19 +18,25 @@ pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
         heading(report),
         other_signs(report),
         verdict(report),
+        report.asked.clone(),
         modes(report),
         zeros(report),
         report.before_plots.clone(),
         plots,
         report.after_plots.clone(),
     ];
-    document_with_plots(&report.title, &body.concat())
+    let title = report.name.as_ref().unwrap_or(&report.title);
+    document_with_plots(title, &body.concat())
 }
 
 fn heading(report: &RecordReport<'_>) -> String {
     let (title, subtitle) = (escaped(&report.title), escaped(&report.subtitle));
     let record = escaped(&report.record);
-    format!("<h1>{title}</h1>\n<p class=\"quiet\">{subtitle}<br>{record}</p>\n")
+    let (heading, title) = match &report.name {
+        Some(name) => (escaped(name), format!("{title}<br>")),
+        None => (title, String::new()),
+    };
+    format!("<h1>{heading}</h1>\n<p class=\"quiet\">{title}{subtitle}<br>{record}</p>\n")
 }
 
 fn plot(plot: &Plot) -> String {

@@ -1,8 +1,10 @@
 //! Sections of a page about the run itself: its scheduling and its configuration.
 
 use super::page::named;
-use crate::recording::Recording;
-use crate::report::html::{escaped, facts, section};
+use crate::config::{Config, SettingDifference, changed_settings};
+use crate::experiment::{Description, Ending, TripSummary};
+use crate::recording::{Recording, event_text};
+use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 
 /// Entries of the recording's metadata that the page shows.
 const METADATA: [&str; 11] = [
@@ -19,6 +21,11 @@ const METADATA: [&str; 11] = [
     "probe",
 ];
 
+/// Most events that a page lists.
+const MOST_EVENTS: usize = 200;
+/// Most characters of a value in the table of changed settings.
+const LONGEST_VALUE: usize = 80;
+
 /// An entry of the recording's metadata; empty if it is missing.
 pub(super) fn metadata<'a>(recording: &'a Recording, name: &str) -> &'a str {
     recording.metadata().get(name).map_or("", String::as_str)
@@ -28,6 +35,130 @@ pub(super) fn metadata<'a>(recording: &'a Recording, name: &str) -> &'a str {
 pub(super) fn file_name(recording: &Recording) -> String {
     let file = recording.path().file_name().unwrap_or_default();
     file.to_string_lossy().into_owned()
+}
+
+/// The page of a recording, with the name of the run as its title; `title` if it has none.
+pub(super) fn document(recording: &Recording, title: &str, body: &str) -> String {
+    let name = Description::of(recording).name;
+    document_with_plots(name.as_deref().unwrap_or(title), body)
+}
+
+/// The heading: the name of the run, if it has one, then the title of the configuration, with `subtitle` and file.
+pub(super) fn heading(recording: &Recording, title: &str, subtitle: &str) -> String {
+    let name = Description::of(recording).name;
+    let (heading, below) = match &name {
+        Some(name) => (name.as_str(), format!("{}<br>", escaped(title))),
+        None => (title, String::new()),
+    };
+    let (heading, subtitle) = (escaped(heading), escaped(subtitle));
+    let file = escaped(&file_name(recording));
+    format!("<h1>{heading}</h1>\n<p class=\"quiet\">{below}{subtitle}<br>Recording {file}</p>\n")
+}
+
+/// What was asked: the command, its description, and the settings that differ from the profile.
+pub(super) fn asked(recording: &Recording, config: &Config) -> String {
+    let description = Description::of(recording);
+    let invocation = description.invocation.as_ref();
+    let profile = invocation.map(|made| made.profile.clone());
+    let text = |name: &str| Some(metadata(recording, name).to_string());
+    let text = |name: &str| text(name).filter(|text| !text.is_empty());
+    let pairs = named([
+        ("Kind of run", text("run")),
+        ("Command", invocation.map(|made| made.command_line.clone())),
+        ("Name", description.name.clone()),
+        ("Note", description.note.clone()),
+        ("Operator", description.operator.clone()),
+        ("Started", text("started")),
+        ("Override", text("override")),
+        ("Profile", profile.clone()),
+    ]);
+    let settings = profile.map(|profile| changed(&profile, config));
+    section(
+        "What was asked",
+        &(facts(&pairs) + &settings.unwrap_or_default()),
+    )
+}
+
+/// A table of the settings that differ from the profile.
+fn changed(profile: &str, config: &Config) -> String {
+    let Ok(changed) = changed_settings(profile, config) else {
+        return note(&format!(
+            "The profile {profile} cannot be read here, so that the settings that differ from it are not known."
+        ));
+    };
+    if changed.is_empty() {
+        return note("All settings are those of the profile.");
+    }
+    let rows: String = changed.iter().map(setting_row).collect();
+    let header = ["Setting", "Value", "In the profile"];
+    note("Settings that differ from the profile:") + &table(&header, &rows)
+}
+
+fn setting_row(setting: &SettingDifference) -> String {
+    let shown = |value: &Option<String>| match value {
+        Some(value) => shortened(value),
+        None => "not set".into(),
+    };
+    row(&[
+        setting.key.clone(),
+        shown(&setting.value),
+        shown(&setting.other),
+    ])
+}
+
+/// The beginning of a long value, for example of a table of measured points. The configuration has all of it.
+fn shortened(value: &str) -> String {
+    match value.char_indices().nth(LONGEST_VALUE) {
+        Some((end, _)) => format!("{} …", &value[..end]),
+        None => value.into(),
+    }
+}
+
+/// Why the run ended, unless it was completed.
+pub(super) fn ending(recording: &Recording) -> String {
+    let ending = Ending::of(recording);
+    let text = match TripSummary::of(ending) {
+        Some(trip) => {
+            let time_s = trip.tick as f64 * recording.period_s().unwrap_or_default();
+            let (why, remedy) = (escaped(&trip.text), escaped(trip.remedy));
+            format!("<strong>tripped</strong><br>After {time_s:.4} s: {why}<br>{remedy}")
+        }
+        None if ending == Ending::Completed => return String::new(),
+        None => format!(
+            "<strong>{}</strong><br>The run did not come to its end.",
+            escaped(&ending.name().replace('_', " "))
+        ),
+    };
+    format!("<p class=\"verdict detected\">{text}</p>\n")
+}
+
+/// The events of the run in their order.
+pub(super) fn events(recording: &Recording) -> String {
+    let events = recording.events();
+    if events.is_empty() {
+        return String::new();
+    }
+    let period_s = recording.period_s().unwrap_or_default();
+    let shown = events.iter().take(MOST_EVENTS);
+    let rows: String = shown
+        .map(|event| {
+            let time_s = event.tick as f64 * period_s;
+            row(&[
+                format!("{time_s:.4}"),
+                event.tick.to_string(),
+                event_text(event),
+            ])
+        })
+        .collect();
+    let left = events.len().saturating_sub(MOST_EVENTS);
+    let left = match left {
+        0 => String::new(),
+        left => note(&format!("{left} further events are in the recording.")),
+    };
+    section(
+        "Events",
+        &(table(&["Time (s)", "Tick", "Event"], &rows) + &left),
+    )
 }
 
 /// How the loop was scheduled, and what it recorded. `more` are further counts.

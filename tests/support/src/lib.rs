@@ -1,6 +1,7 @@
 //! Shared code of the integration tests: running the program, independent references in Python, rigs, recordings.
 
 pub mod chirp_source;
+pub mod compared;
 pub mod faulty_rig;
 pub mod feedback_loop;
 pub mod gain_in_noise;

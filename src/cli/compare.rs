@@ -1,0 +1,92 @@
+//! `bench compare`: recorded runs beside a reference run, with the significance of their differences.
+
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use super::analysis_output::shown_by;
+use super::compare_output::text;
+use super::error::CliError;
+use super::identify::warn_of_unchecked;
+use super::outcome::Outcome;
+use super::output::print_result;
+use super::progress::ProgressLine;
+use crate::experiment::run_comparison::{Comparison, RunResult, distinguish};
+use crate::recording::Recording;
+use crate::report::ReportError;
+use crate::report::run_pages::{ComparedRun, comparison_page};
+use crate::util::atomic_file::write_atomic;
+use crate::util::progress::Progress;
+
+/// Most recordings: the curves of more cannot be distinguished.
+const MAX_RECORDINGS: usize = 12;
+
+/// The recordings, and where the page goes.
+#[derive(Clone, Debug, clap::Args)]
+pub(super) struct Args {
+    /// Recordings (MCAP) of `bench chirp` or `bench control`; the others are compared with the first
+    #[arg(required = true, num_args = 2..=MAX_RECORDINGS)]
+    recordings: Vec<PathBuf>,
+    /// Write a page with plots and tables
+    #[arg(long, value_name = "PAGE")]
+    out: Option<PathBuf>,
+    /// Print one JSON object on standard output and nothing else
+    #[arg(long)]
+    json: bool,
+}
+
+/// The JSON object of the command.
+#[derive(Debug, Serialize)]
+struct Report {
+    #[serde(flatten)]
+    comparison: Comparison,
+    page: Option<String>,
+}
+
+pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let mut runs = results(&args.recordings)?;
+    distinguish(&mut runs);
+    let comparison = Comparison::of(&runs).map_err(|error| CliError::Usage(error.to_string()))?;
+    let page = args.out.as_deref();
+    let page = page.map(|path| write_page(path, &runs, &comparison));
+    let report = Report {
+        page: page.transpose()?,
+        comparison,
+    };
+    print_result(args.json, &report, |report| {
+        text(&report.comparison, report.page.as_deref())
+    })?;
+    Ok(Outcome::Done)
+}
+
+/// Reads and analyses the recordings, with progress on a terminal.
+fn results(paths: &[PathBuf]) -> Result<Vec<RunResult>, CliError> {
+    let progress = Progress::new("analysing");
+    let _line = ProgressLine::show(&progress);
+    let results = paths.iter().map(|path| result(path, &progress));
+    results.collect()
+}
+
+fn result(path: &Path, progress: &Progress) -> Result<RunResult, CliError> {
+    let recording = Recording::open(path)?;
+    warn_of_unchecked(&recording);
+    Ok(RunResult::of(&recording, &mut shown_by(progress))?)
+}
+
+/// Writes the page and returns its path.
+fn write_page(
+    path: &Path,
+    runs: &[RunResult],
+    comparison: &Comparison,
+) -> Result<String, CliError> {
+    let failed = |error: ReportError| CliError::Failed(error.to_string());
+    let compared: Vec<ComparedRun> = runs.iter().map(ComparedRun::from).collect();
+    let page = comparison_page(&compared, Some(comparison)).map_err(failed)?;
+    let shown = path.display().to_string();
+    write_atomic(path, &page).map_err(|error| {
+        CliError::Failed(format!(
+            "cannot write {shown}: {error}; choose another file with --out"
+        ))
+    })?;
+    Ok(shown)
+}

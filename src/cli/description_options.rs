@@ -1,0 +1,61 @@
+//! `--name`, `--note` and `--operator`: what the operator says about a run.
+
+use crate::daemon::client::is_started_by_daemon;
+use crate::experiment::{Description, Invocation, operator_name, run_name, run_note};
+
+/// Name, note and operator of a run.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct DescriptionOptions {
+    /// Name of the run, kept in its recording and shown on its page (at most 200 characters)
+    #[arg(long, value_name = "TEXT", value_parser = run_name, allow_hyphen_values = true)]
+    name: Option<String>,
+    /// Note on the run, kept in its recording (at most 2000 characters)
+    #[arg(long, value_name = "TEXT", value_parser = run_note, allow_hyphen_values = true)]
+    note: Option<String>,
+    /// Who makes the run (at most 100 characters) [default: the user; at a daemon the holder of the arm lease]
+    #[arg(long, value_name = "NAME", value_parser = operator_name, allow_hyphen_values = true)]
+    operator: Option<String>,
+}
+
+impl DescriptionOptions {
+    /// What the recording contains; `profile` is the profile or the file of the configuration. In a process that the daemon started, the daemon adds the operator of the lease.
+    pub fn description(&self, profile: &str) -> Description {
+        Description {
+            name: self.name.clone(),
+            note: self.note.clone(),
+            operator: match is_started_by_daemon() {
+                true => self.operator.clone(),
+                false => Some(self.operator()),
+            },
+            invocation: Some(Invocation::new(arguments(), profile)),
+        }
+    }
+
+    /// The name; empty if it is not given.
+    pub fn name(&self) -> &str {
+        self.name.as_deref().unwrap_or_default()
+    }
+
+    /// The note; empty if it is not given.
+    pub fn note(&self) -> &str {
+        self.note.as_deref().unwrap_or_default()
+    }
+
+    /// The operator, by default the user of this process.
+    pub fn operator(&self) -> String {
+        self.operator.clone().unwrap_or_else(user)
+    }
+}
+
+/// The arguments of this process.
+fn arguments() -> impl Iterator<Item = String> {
+    let arguments = std::env::args_os().skip(1);
+    arguments.map(|argument| argument.to_string_lossy().into_owned())
+}
+
+/// The user of this process.
+fn user() -> String {
+    let user = std::env::var("USER").ok();
+    let user = user.and_then(|user| operator_name(&user).ok());
+    user.unwrap_or_else(|| "unknown".into())
+}

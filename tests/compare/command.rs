@@ -1,0 +1,82 @@
+//! The command: figures of closed loops, page, and what cannot be compared.
+
+use serde_json::Value;
+
+use crate::program::{Bench, number};
+
+fn control(bench: &Bench, arguments: &str) -> (String, Value) {
+    let run = bench.json(&format!("control {arguments} --duration 1.5s --no-report"));
+    let recording = run["recording"].as_str().expect("a path").to_string();
+    (recording, run)
+}
+
+fn figure<'a>(comparison: &'a Value, name: &str) -> &'a Value {
+    let figures = comparison["others"][0]["figures"]
+        .as_array()
+        .expect("a list");
+    let found = figures.iter().find(|figure| figure["figure"] == name);
+    found.unwrap_or_else(|| panic!("{name}: {figures:?}"))
+}
+
+#[test]
+fn figures_of_two_loops_are_those_of_the_runs() {
+    let bench = Bench::new();
+    let (slow, slow_run) = control(&bench, "--slow --name slow");
+    let (fast, fast_run) = control(&bench, "--fast --name fast");
+    let comparison = bench.json(&format!("compare {slow} {fast} --out page.html"));
+    assert_eq!(comparison["reference"]["label"], "slow");
+    assert_eq!(comparison["others"][0]["label"], "fast");
+    for (name, place, key) in [
+        ("settling_time_s", "measured", "settling_time_s"),
+        ("overshoot_percent", "measured", "overshoot_percent"),
+        ("rms_error_m", "whole_run", "rms_error_m"),
+        ("peak_current_a", "whole_run", "peak_current_a"),
+        ("rms_current_a", "whole_run", "rms_current_a"),
+    ] {
+        let found = figure(&comparison, name);
+        let (first, second) = (number(&slow_run[place][key]), number(&fast_run[place][key]));
+        assert_eq!(number(&found["reference"]), first, "{name}");
+        assert_eq!(number(&found["other"]), second, "{name}");
+        assert_eq!(number(&found["difference"]), second - first, "{name}");
+    }
+    assert_eq!(figure(&comparison, "overruns")["difference"], 0.0);
+    assert_eq!(
+        (&comparison["tested"], &comparison["correction"]),
+        (&0.into(), &"holm".into())
+    );
+    let page = bench.read("page.html");
+    for part in [
+        "fast compared with slow",
+        "Settings that differ",
+        "control.controller",
+        "Step response",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    let text = bench.run(&format!("compare {slow} {fast}"));
+    assert_eq!(text.code, 0, "{}", text.err);
+    assert!(
+        text.out.lines().all(|line| line.chars().count() <= 80),
+        "{}",
+        text.out
+    );
+}
+
+#[test]
+fn refuses_runs_with_nothing_in_common_and_single_recordings() {
+    let bench = Bench::new();
+    let (control, _) = control(&bench, "--slow");
+    let chirp = bench.json("chirp --duration 10 --start 5 --stop 100");
+    let chirp = chirp["recording"].as_str().expect("a path");
+    let answer = bench.run(&format!("compare {control} {chirp}"));
+    assert_eq!(answer.code, 2, "{}", answer.err);
+    for word in ["nothing in common", "control-slow-step", "_chirp"] {
+        assert!(answer.err.contains(word), "{word}: {}", answer.err);
+    }
+    assert_eq!(bench.run(&format!("compare {control}")).code, 2);
+    let missing = bench.run(&format!("compare {control} missing.mcap"));
+    assert!(
+        missing.code == 1 && missing.err.contains("missing.mcap"),
+        "{missing:?}"
+    );
+}
