@@ -10,6 +10,7 @@ use crate::config::Config;
 use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use crate::experiment::{AnalysisPhase, ReadSignals, analyse_opened, open_with_signals};
 use crate::recording::Recording;
+use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use crate::util::decimal::Decimal;
 use crate::util::progress::Progress;
@@ -29,11 +30,12 @@ pub(super) fn analyse_and_write(
     signals: ReadSignals,
     config: &Config,
     results: ResultFiles<'_>,
+    magnitude_axis: MagnitudeAxis,
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
     let analysis = analyse_opened(recording, signals, config, &mut shown_by(progress))?;
-    let run = BenchRun::new(recording, &analysis, config);
+    let run = BenchRun::new(recording, &analysis, config).with_magnitude_axis(magnitude_axis);
     Ok(AnalysisOutputs::write(&run, results)?)
 }
 
@@ -42,10 +44,18 @@ pub(super) fn open_analyse_and_write(
     path: &Path,
     config: &Config,
     results: ResultFiles<'_>,
+    magnitude_axis: MagnitudeAxis,
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     let (recording, signals) = open_with_signals(path)?;
-    analyse_and_write(&recording, signals, config, results, progress)
+    analyse_and_write(
+        &recording,
+        signals,
+        config,
+        results,
+        magnitude_axis,
+        progress,
+    )
 }
 
 /// A receiver of the progress of an analysis that never cancels it.

@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::analysis_output::{self, open_analyse_and_write};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
+use super::figure_options::ResponseFigureOptions;
 use super::help::with_setting;
 use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
@@ -23,6 +24,7 @@ use crate::experiment::sequential::first_shot_config;
 use crate::experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
+use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
 use crate::util::progress::Progress;
@@ -35,6 +37,8 @@ pub(super) struct Args {
     pub(super) bench: BenchOptions,
     #[command(flatten)]
     pub(super) run: RunOptions,
+    #[command(flatten)]
+    pub(super) figures: ResponseFigureOptions,
     /// Kind of excitation
     #[arg(long, value_name = "KIND", help = with_setting("Kind of excitation", "excitation.kind"))]
     excitation: Option<ExcitationKind>,
@@ -149,7 +153,7 @@ fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, 
         .run
         .run(&args.bench, &Plan::chirp(config.clone()), "chirp")?;
     let summary = RunSummary::of(&mut run)?;
-    let made = outputs(&summary, &run.path, config)?;
+    let made = outputs(&summary, &run.path, config, args.figures.magnitude_axis())?;
     let report = Report {
         run: summary,
         expected_travel_m: expected.travel_m,
@@ -174,15 +178,20 @@ pub(super) fn outputs(
     run: &RunSummary,
     path: &Path,
     config: &Config,
+    magnitude_axis: MagnitudeAxis,
 ) -> Result<AnalysisOutputs, CliError> {
     match run.is_completed() {
-        true => analysed(path, config),
+        true => analysed(path, config, magnitude_axis),
         false => Ok(AnalysisOutputs::run_incomplete()),
     }
 }
 
 /// The analysis, which Ctrl-C cancels; the recording stays complete.
-fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
+fn analysed(
+    path: &Path,
+    config: &Config,
+    magnitude_axis: MagnitudeAxis,
+) -> Result<AnalysisOutputs, CliError> {
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
     let (recording, config) = (path.to_path_buf(), config.clone());
@@ -191,7 +200,7 @@ fn analysed(path: &Path, config: &Config) -> Result<AnalysisOutputs, CliError> {
             beside: &recording,
             existing: ExistingFile::Replace,
         };
-        open_analyse_and_write(&recording, &config, results, &progress)
+        open_analyse_and_write(&recording, &config, results, magnitude_axis, &progress)
     };
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));

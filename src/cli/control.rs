@@ -18,6 +18,7 @@ use crate::experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
 };
+use crate::report::MagnitudeAxis;
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;
@@ -124,7 +125,7 @@ fn report(
     let mut result = ControlResult::default();
     let mut made = None;
     if plan.config.control.reference.is_swept() {
-        let mut outputs = outputs(&summary, &run.path, &plan.config)?;
+        let mut outputs = outputs(&summary, &run.path, &plan.config, MagnitudeAxis::default())?;
         if !is_completed {
             let files = control_output::result(&run.path, is_completed, no_report)?.files;
             outputs.pages.extend(files);

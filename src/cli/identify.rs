@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
+use super::figure_options::ResponseFigureOptions;
 use super::help::GLOSSARY;
 use super::identify_external::{self, ExternalOptions};
 use super::outcome::Outcome;
@@ -31,6 +32,8 @@ pub(super) struct Args {
     /// Output folder [default: the folder of the input file]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    figures: ResponseFigureOptions,
     /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     json: bool,
@@ -60,6 +63,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             &args.recording,
             args.out.as_deref(),
             &args.table,
+            args.figures.magnitude_axis(),
             args.json,
         );
     }
@@ -119,7 +123,14 @@ fn analysed(
     };
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
-    analyse_and_write(recording, signals, config, results, &progress)
+    analyse_and_write(
+        recording,
+        signals,
+        config,
+        results,
+        args.figures.magnitude_axis(),
+        &progress,
+    )
 }
 
 /// Beside the recording, existing results are its own. In another folder they may be those of a file of the same name.

@@ -19,6 +19,7 @@ use crate::identify::modal::InputPath;
 use crate::identify::periodic::Repetition;
 use crate::identify::settling::settling_periods;
 use crate::identify::{IdentifyError, Signals};
+use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
 };
@@ -271,6 +272,7 @@ pub(super) fn run(
     path: &Path,
     out: Option<&Path>,
     options: &ExternalOptions,
+    magnitude_axis: MagnitudeAxis,
     json: bool,
 ) -> Result<Outcome, CliError> {
     let columns = options.columns(path)?;
@@ -289,6 +291,7 @@ pub(super) fn run(
         output: &columns.output,
         rate_hz: signals.rate_hz,
         samples: signals.len(),
+        magnitude_axis,
     };
     let results = ResultFiles {
         beside: &in_folder(out, path)?,

@@ -1,6 +1,7 @@
 //! `bench linearity`: the same multisine at several amplitudes.
 
 use std::ops::RangeInclusive;
+use std::path::Path;
 
 use serde::Serialize;
 
@@ -8,6 +9,7 @@ use super::analysis_output;
 use super::chirp::{outcome, outputs};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
+use super::figure_options::ResponseFigureOptions;
 use super::linearity_output;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
@@ -23,7 +25,8 @@ use crate::experiment::linearity::{
 use crate::experiment::{self, Run, RunSummary, Runner};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::number::interval;
-use crate::report::run_pages::AnalysisOutputs;
+use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
+use crate::report::{AmplitudeOverview, MagnitudeAxis, plant_conditions};
 use crate::util::progress::Progress;
 use crate::util::quantity::Ratio;
 
@@ -46,6 +49,8 @@ pub(super) struct Args {
     pub run: RunOptions,
     #[command(flatten)]
     band: ExcitationOptions,
+    #[command(flatten)]
+    figures: ResponseFigureOptions,
     /// Amplitudes as ratios of the planned amplitude; one run for each ratio
     #[arg(
         long,
@@ -92,6 +97,8 @@ struct Report {
     /// without modes, or if no parameter differs but a run was not completed.
     shifted: Option<bool>,
     why: String,
+    /// Picture and page of modes and distortion over the amplitude; null if no run was completed.
+    overview: Option<AmplitudeFiles>,
 }
 
 #[derive(Debug, Serialize)]
@@ -117,7 +124,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     let runs = measure(args, &plans)?;
     let outcome = overall(&runs);
-    let report = report(runs, outcome != Outcome::Failed);
+    let mut report = report(runs, outcome != Outcome::Failed);
+    report.overview = overview(&report, &plans)?;
     print_result(args.bench.json, &report, |report| text(report, &plans))?;
     Ok(outcome)
 }
@@ -159,7 +167,7 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let runner = Runner::with_progress(setup, progress);
     let mut runs = Vec::new();
     linearity::run(&runner, plans, &mut |plan, run| {
-        let finished = finish(plan, run)?;
+        let finished = finish(plan, run, args.figures.magnitude_axis())?;
         let is_failed = finished.outcome() == Outcome::Failed;
         runs.push(finished);
         Ok::<bool, CliError>(!is_failed)
@@ -168,9 +176,13 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
 }
 
 /// Analyses a run and adds the result to its recording.
-fn finish(plan: &AmplitudePlan, mut run: Run) -> Result<AmplitudeRun, CliError> {
+fn finish(
+    plan: &AmplitudePlan,
+    mut run: Run,
+    magnitude_axis: MagnitudeAxis,
+) -> Result<AmplitudeRun, CliError> {
     let summary = RunSummary::of(&mut run)?;
-    let outputs = outputs(&summary, &run.path, &plan.config)?;
+    let outputs = outputs(&summary, &run.path, &plan.config, magnitude_axis)?;
     let finished = AmplitudeRun {
         scale: plan.scale,
         expected: plan.predicted,
@@ -207,7 +219,32 @@ fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
         modes,
         shifted,
         why,
+        overview: None,
     }
+}
+
+/// Draws the modes and the distortion over the amplitude, beside the recording of the first run.
+fn overview(report: &Report, plans: &[AmplitudePlan]) -> Result<Option<AmplitudeFiles>, CliError> {
+    let (Some(first), Some(plan)) = (report.runs.first(), plans.first()) else {
+        return Ok(None);
+    };
+    let linearity = report.runs.iter().map(|run| run.outputs.linearity.as_ref());
+    let linearity: Vec<_> = linearity.collect();
+    let drawn = AmplitudeOverview {
+        scales: &report.scales,
+        modes: &report.modes,
+        linearity: &linearity,
+    };
+    let config = &plan.config;
+    let title = format!("{}: {} amplitudes", config.title, report.scales.len());
+    let conditions = plant_conditions(&config.plant, &[]);
+    let subtitle = format!("{}; {conditions}", config.chosen_excitation().describe());
+    let results = ResultFiles {
+        beside: Path::new(&first.run.recording),
+        existing: ExistingFile::Replace,
+    };
+    let files = AmplitudeFiles::write(&drawn, &title, &subtitle, results)?;
+    Ok(Some(files))
 }
 
 fn text(report: &Report, plans: &[AmplitudePlan]) -> String {
@@ -215,8 +252,10 @@ fn text(report: &Report, plans: &[AmplitudePlan]) -> String {
     let runs: String = runs
         .map(|(run, plan)| amplitude_text(run, &plan.config))
         .collect();
+    let overview = report.overview.as_ref();
+    let overview = overview.map_or(String::new(), |files| labelled("overview", &files.report));
     format!(
-        "{runs}{}\n{}",
+        "{runs}{}\n{}{overview}",
         mode_table(&report.scales, &report.modes),
         wrap(
             &format!("modes over amplitude (* shifts): {}", report.why),

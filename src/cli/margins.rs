@@ -7,6 +7,7 @@ use serde_json::Value;
 
 use super::controller_choice::ControllerChoice;
 use super::error::CliError;
+use super::figure_options::PictureOptions;
 use super::help::GLOSSARY;
 use super::measured_margins::{self, Measured};
 use super::options::BenchOptions;
@@ -14,9 +15,10 @@ use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::table::{table, wrap};
 use crate::config::{Config, ProbeSettings, Purpose};
-use crate::control::{Margins, Pole, listed_poles};
-use crate::experiment::{Stage, check_calibration, closed_loop};
+use crate::control::{ClosedLoop, Margins, Pole, listed_poles};
+use crate::experiment::{LoopModel, Stage, check_calibration, closed_loop};
 use crate::report::number::angular_frequency;
+use crate::report::{LoopPlot, Picture, ReportError, loop_svg, plant_conditions};
 use crate::util::decimal::Decimal;
 
 /// The bench and the controller.
@@ -38,6 +40,8 @@ pub(super) struct Args {
     /// With --frf: folder for L, S, T, C S and P S as CSV and for Bode plot, Nyquist plot and sensitivities as SVG
     #[arg(long, value_name = "FOLDER", requires = "frf")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 /// The JSON object of the command. An unstable loop has no margins: they are `null`.
@@ -65,6 +69,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         ),
         false => (closed_loop.margins(), closed_loop.poles()),
     };
+    args.picture
+        .write(|| drawn(args, &config, &closed_loop, &margins))?;
     let frf = args.frf.as_deref();
     let measured = frf
         .map(|frf| measured_margins::measured(frf, args.out.as_deref(), &closed_loop, &config))
@@ -83,11 +89,40 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     print_result(args.bench.json, &report, |report| {
         let measured = report.measured.as_ref().map(measured_margins::text);
-        text(&config, &margins, &report.poles) + &measured.unwrap_or_default()
+        text(&config, &margins, &report.poles)
+            + &measured.unwrap_or_default()
+            + &args.picture.files_text()
     })?;
     Ok(match is_stable {
         true => Outcome::Done,
         false => Outcome::Failed,
+    })
+}
+
+/// The loop of the model: Bode plot, Nyquist plot and sensitivities.
+fn drawn(
+    args: &Args,
+    config: &Config,
+    closed_loop: &ClosedLoop,
+    margins: &Margins,
+) -> Result<Picture, ReportError> {
+    let model = match args.continuous {
+        true => LoopModel::continuous(closed_loop, config, margins.clone()),
+        false => LoopModel::of(closed_loop, config),
+    };
+    let plot = LoopPlot {
+        frequency_hz: &model.frequency_hz,
+        loop_gain: &model.loop_gain,
+        margins: &model.margins,
+        min_modulus_margin: model.min_modulus_margin,
+    };
+    let time = time_text(config, margins);
+    let title = format!("{}: {} controller", config.title, config.control.controller);
+    let subtitle = format!("{}; {time}", plant_conditions(&config.plant, &[]));
+    Ok(Picture {
+        svg: loop_svg(&plot, &title, &subtitle)?,
+        caption: "L = P C by the model with its margins, as Bode plot and in the complex plane with -1; S from reference to error and T from reference to displacement.".into(),
+        title,
     })
 }
 
@@ -153,16 +188,20 @@ fn probe_text(probe: &ProbeSettings) -> String {
 
 /// The loop and its margins; of an unstable one the unstable poles.
 pub(super) fn text(config: &Config, margins: &Margins, poles: &[Pole]) -> String {
-    let time = match margins.continuous {
-        true => "continuous time, without delay and amplifier".to_string(),
-        false => chain_text(config),
-    };
+    let time = time_text(config, margins);
     let title = format!("{} controller, {time}", config.control.controller);
     let rest = match margins.stable {
         true => margin_lines(margins),
         false => unstable_text(poles),
     };
     wrap(&title, 0) + &rest
+}
+
+fn time_text(config: &Config, margins: &Margins) -> String {
+    match margins.continuous {
+        true => "continuous time, without delay and amplifier".to_string(),
+        false => chain_text(config),
+    }
 }
 
 fn unstable_text(poles: &[Pole]) -> String {

@@ -77,6 +77,7 @@ fn write(
         ),
         curves: &LoopCurves::of(&measured.frf, closed_loop, config),
         margins: result.margins.as_ref(),
+        min_modulus_margin: config.control.min_modulus_margin,
         model: closed_loop,
     };
     let beside = in_folder(Some(folder), path)?;

@@ -23,6 +23,7 @@ mod emulate;
 mod error;
 mod excitation_options;
 mod export;
+mod figure_options;
 mod help;
 mod identify;
 mod identify_external;

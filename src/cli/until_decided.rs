@@ -19,6 +19,7 @@ use crate::experiment::sequential::{
 };
 use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use crate::recording::Recording;
+use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 use crate::util::progress::Progress;
 use crate::util::quantity::Time;
@@ -82,7 +83,8 @@ pub(super) fn measure(args: &Args, base: &Config, max_motion_s: f64) -> Result<O
         sequence.map_err(|error: RunError| CliError::Failed(error.to_string()))??;
     let summary = RunSummary::of(&mut sequence.last)?;
     let path = sequence.last.path.clone();
-    let made = outputs(&sequence, &path).map_err(|error| analysis_failed(&error, &path))?;
+    let made = outputs(&sequence, &path, args.figures.magnitude_axis())
+        .map_err(|error| analysis_failed(&error, &path))?;
     let report = Report {
         run: summary,
         motion_s: sequence.motion_s(),
@@ -123,14 +125,20 @@ fn shots(
 }
 
 /// Analysis, plots and page of all shots.
-fn outputs(sequence: &Sequence, path: &Path) -> Result<AnalysisOutputs, CliError> {
+fn outputs(
+    sequence: &Sequence,
+    path: &Path,
+    magnitude_axis: MagnitudeAxis,
+) -> Result<AnalysisOutputs, CliError> {
     let Some(analysis) = &sequence.analysis else {
         return Ok(AnalysisOutputs::run_incomplete());
     };
     let recording = Recording::open(path)?;
     let shots: Vec<Shot> = sequence.shots.iter().map(|shot| shot.shot).collect();
     let run = BenchRun::new(&recording, analysis, &sequence.config);
-    let run = run.of_shots(excitation_text(&shots));
+    let run = run
+        .of_shots(excitation_text(&shots))
+        .with_magnitude_axis(magnitude_axis);
     let results = ResultFiles {
         beside: path,
         existing: ExistingFile::Replace,

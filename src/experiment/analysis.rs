@@ -9,6 +9,7 @@ use super::analysis_error::AnalysisError;
 use super::certificate::SignCheck;
 use super::closed_loop;
 use super::ending::Ending;
+use super::model_response::ModelResponse;
 use super::read_run::{ReadSignals, is_closed_loop, is_of_run};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
@@ -19,7 +20,7 @@ use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use crate::identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
-use crate::model::plant::{self, LoopPlant, ModalModel, Mode, Sign};
+use crate::model::plant::{self, ModalModel, Mode, Sign};
 use crate::recording::Recording;
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
@@ -35,6 +36,8 @@ pub struct Analysis {
     pub frf: Frf,
     /// The response of the model at the same frequencies, for readings of the mean age.
     pub model: Vec<Complex<f64>>,
+    /// The model at other frequencies.
+    pub model_response: ModelResponse,
     /// Mean time in seconds from a command to the position in the reading, by the model.
     pub delay_s: f64,
     /// Excess delay over the model in seconds, from the phases up to the last mode of the model.
@@ -251,16 +254,17 @@ impl ModalStep<'_> {
         let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
         let scope = VerdictScope::of_model(&modal, self.certainty);
         let verdict = judge(&fit, &estimate.frf_data, &chain, scope)?;
-        let plant = LoopPlant::with_mean_age(config, &modal.modes);
+        let model_response = ModelResponse::new(config, &modal);
         let frf = estimate.frf;
         let fitted = fit.as_ref().ok();
         let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, response_band_hz(&frf)));
-        let model = model_response(&plant, &frf.frequency_hz);
+        let model = model_response.at(&frf.frequency_hz);
         Ok(Analysis {
             excess_delay: excess_delay(&frf, &model, scope.up_to_rad_s / TAU),
-            delay_s: plant.delay_s(),
+            delay_s: model_response.delay_s(),
             frf,
             model,
+            model_response,
             filled_ticks,
             fit,
             signs,
@@ -295,11 +299,6 @@ pub(super) fn response_band_hz(frf: &Frf) -> (f64, f64) {
 fn highest_mode_rad_s(modal: &ModalModel) -> f64 {
     let frequencies_rad_s = modal.modes.iter().map(|mode| mode.omega_rad_s);
     frequencies_rad_s.fold(0.0, f64::max)
-}
-
-fn model_response(plant: &LoopPlant, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
-    let response = frequency_hz.iter().map(|f| plant.response(TAU * f));
-    response.collect()
 }
 
 impl Analysis {

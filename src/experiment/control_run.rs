@@ -127,8 +127,26 @@ pub fn control_run(recording: &Recording, plan: &Plan) -> Result<ControlRun, Exp
 }
 
 impl LoopModel {
-    fn of(closed_loop: &ClosedLoop, config: &Config) -> LoopModel {
+    /// The sampled loop, with hold, delay and amplifier.
+    pub fn of(closed_loop: &ClosedLoop, config: &Config) -> LoopModel {
         let margins = closed_loop.margins();
+        let response = |w: f64| closed_loop.sampled_loop(w);
+        LoopModel::new(closed_loop, config, margins, response)
+    }
+
+    /// The loop in continuous time, without delay and amplifier, with its margins. A controller without a continuous response gives no numbers.
+    pub fn continuous(closed_loop: &ClosedLoop, config: &Config, margins: Margins) -> LoopModel {
+        let unknown = Complex::from(f64::NAN);
+        let response = |w: f64| closed_loop.continuous_loop(w).unwrap_or(unknown);
+        LoopModel::new(closed_loop, config, margins, response)
+    }
+
+    fn new(
+        closed_loop: &ClosedLoop,
+        config: &Config,
+        margins: Margins,
+        response: impl Fn(f64) -> Complex<f64>,
+    ) -> LoopModel {
         let nyquist_rad_s = std::f64::consts::PI * config.servo.rate_hz;
         let lowest_rad_s = lowest_rad_s(closed_loop, &margins);
         let frequencies = closed_loop.frequencies(lowest_rad_s, nyquist_rad_s);
@@ -138,7 +156,7 @@ impl LoopModel {
         let frequencies = frequency_hz.iter();
         LoopModel {
             loop_gain: frequencies
-                .map(|frequency_hz| closed_loop.sampled_loop(rad_s(*frequency_hz)))
+                .map(|frequency_hz| response(rad_s(*frequency_hz)))
                 .collect(),
             frequency_hz,
             margins,

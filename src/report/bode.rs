@@ -2,11 +2,16 @@
 
 use super::ReportError;
 use super::chart::{Chart, Mark, Row, Scale, SeriesPoint, sheet_svg};
+use super::magnitude::{MagnitudeAxis, MagnitudeScale};
 use super::trace::{self, Line, Trace};
 use crate::identify::Unit;
 
 /// Heights of the panels for magnitude, phase and coherence in pixels.
-const HEIGHTS: [f64; 3] = [320.0, 243.0, 132.0];
+pub(super) const MAGNITUDE_HEIGHT: f64 = 320.0;
+pub(super) const PHASE_HEIGHT: f64 = 243.0;
+pub(super) const COHERENCE_HEIGHT: f64 = 132.0;
+/// Heading of a phase that is not unwrapped.
+pub(super) const WRAPPED: &str = "Phase between ±180°, not unwrapped: neighbouring points differ by more than 120°, or are too noisy";
 /// Part of an axis left free above and below the curves.
 const MARGIN: f64 = 0.06;
 /// Smallest height of the magnitude axis in decades.
@@ -18,7 +23,8 @@ const MIN_DEGREES: f64 = 180.0;
 ///
 /// Magnitude in `unit` on a logarithmic axis, phase in degrees, unwrapped from the lowest frequency on, and the coherence of
 /// measured traces, if there are any. Measured curves have a band of two sigma; where it reaches zero magnitude the curve
-/// is drawn faint and does not widen the axes. Models are drawn on top, dashed over measured curves.
+/// is drawn faint and does not widen the axes. Models are drawn on top, dashed over measured curves. Phases are not unwrapped where
+/// this would be a guess: see [`has_ambiguous_phase`](super::has_ambiguous_phase).
 ///
 /// ```
 /// use bench::identify::Unit;
@@ -53,63 +59,64 @@ pub(super) fn sheet(
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
-    let mut charts = vec![magnitude(unit, lines)?, phase(lines)];
-    charts.extend(coherence(lines));
-    stacked(charts, lines, title, subtitle)
+    let scale = MagnitudeScale::new(unit, MagnitudeAxis::Logarithmic);
+    let charts = [
+        (MAGNITUDE_HEIGHT, magnitude(scale, lines)?),
+        (PHASE_HEIGHT, phase(lines)),
+    ];
+    let coherence = coherence(lines).map(|chart| (COHERENCE_HEIGHT, chart));
+    stacked(charts.into_iter().chain(coherence), lines, title, subtitle)
 }
 
-/// Charts below each other over the frequencies of lines.
+/// Charts with their heights, below each other over the frequencies of lines, which are numbered below the last chart.
 pub(super) fn stacked(
-    charts: Vec<Chart>,
+    charts: impl IntoIterator<Item = (f64, Chart)>,
     lines: &[Line],
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
-    let x = Scale::frequency(frequency_range(lines));
-    sheet_svg(title, subtitle, &rows(charts, &x))
-}
-
-/// The charts below each other over one axis, numbered below the last chart.
-fn rows(charts: Vec<Chart>, x: &Scale) -> Vec<Row> {
+    let numbered = Scale::frequency(frequency_range(lines));
     let mut rows = Vec::new();
-    for (chart, height) in charts.into_iter().zip(HEIGHTS) {
-        let x = x.clone().unnumbered();
+    for (height, chart) in charts {
+        let x = numbered.clone().unnumbered();
         rows.push(Row::new(height, vec![Chart { x, ..chart }]));
     }
     if let Some(last) = rows.last_mut() {
-        last.charts[0].x = x.clone();
+        last.charts[0].x = numbered;
     }
-    rows
+    sheet_svg(title, subtitle, &rows)
 }
 
-fn panel(y: Scale) -> Chart {
+/// A chart whose horizontal axis is that of its sheet.
+pub(super) fn panel(y: Scale) -> Chart {
     Chart::new("", Scale::logarithmic(""), y)
 }
 
 /// The magnitudes of lines.
-pub(super) fn magnitude(unit: Unit, lines: &[Line]) -> Result<Chart, ReportError> {
-    let label = match unit {
-        Unit::MetresPerAmpere => "Magnitude (m/A)",
-        Unit::Bare => "Magnitude",
-    };
-    let (low, high) = magnitude_range(lines).ok_or(ReportError::NoMagnitude)?;
-    let chart = panel(Scale::logarithmic(label).within(low, high));
+pub(super) fn magnitude(scale: MagnitudeScale, lines: &[Line]) -> Result<Chart, ReportError> {
+    let range = magnitude_range(lines).ok_or(ReportError::NoMagnitude)?;
+    let chart = panel(scale.axis("Magnitude", range));
     Ok(lines.iter().fold(chart, |chart, line| {
-        chart.mark(series(legend_name(line), line, line.magnitude_points()))
+        let points = line.magnitude_points().into_iter();
+        let points = points.map(|point| scale.point(point)).collect();
+        chart.mark(series(legend_name(line), line, points))
     }))
 }
 
 /// The phases of lines.
 pub(super) fn phase(lines: &[Line]) -> Chart {
     let (low, high) = phase_range(lines);
-    let chart = panel(Scale::degrees("Phase (deg)").within(low, high)).without_legend();
+    let mut chart = panel(Scale::degrees("Phase (deg)").within(low, high)).without_legend();
+    if lines.iter().any(|line| line.is_wrapped) {
+        chart.heading = WRAPPED.into();
+    }
     lines.iter().fold(chart, |chart, line| {
         chart.mark(series(line.name.to_owned(), line, line.phase_points()))
     })
 }
 
 /// The coherence of measured responses, if there are any.
-fn coherence(lines: &[Line]) -> Option<Chart> {
+pub(super) fn coherence(lines: &[Line]) -> Option<Chart> {
     lines.iter().find(|line| line.measured.is_some())?;
     let chart = panel(Scale::linear("Coherence").within(0.0, 1.05)).without_legend();
     Some(lines.iter().fold(chart, |chart, line| match line.measured {
@@ -178,6 +185,9 @@ fn magnitude_range(lines: &[Line]) -> Option<(f64, f64)> {
 
 /// The range of the phases, likewise: at least half a turn.
 fn phase_range(lines: &[Line]) -> (f64, f64) {
+    if lines.iter().any(|line| line.is_wrapped) {
+        return with_margin((-180.0, 180.0), MIN_DEGREES);
+    }
     let phases = [false, true].into_iter().find_map(|all| {
         range(
             lines

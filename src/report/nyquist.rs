@@ -6,6 +6,7 @@ use super::ReportError;
 use super::chart::colours::INK;
 use super::chart::{Chart, Row, Scale, Symbol, sheet_svg};
 use super::ellipse::{self, SIGMAS_95_PLANE};
+use super::labels::{ResponsePoint, frequency_text, spread};
 use super::trace::{self, BAND_SIGMAS, Line, Trace, has_gap_before};
 use crate::identify::{Frf, Unit};
 
@@ -16,9 +17,14 @@ const VISIBLE: f64 = 0.004;
 /// Opacity of a circle.
 const OPACITY: f64 = 0.13;
 const MICRO: f64 = 1e6;
+/// Number of labelled frequencies, their least distance as a ratio of the largest magnitude, and the place of the text in pixels.
+const LABELS: usize = 10;
+const LABEL_DISTANCE: f64 = 0.3;
+const LABEL_OFFSET: (f64, f64) = (30.0, 8.0);
 
 /// The Nyquist plot as an SVG document: all frequencies, in µm/A or in the unit of the columns, and beside them a part of
-/// the frequencies in hertz. Circles are 95 % confidence regions. Magnitudes below two sigma are left out, as their
+/// the frequencies in hertz. Arrows show the direction of rising frequency on the last model or fit, or on the measured curve without
+/// one, and some frequencies are written beside it. Circles are 95 % confidence regions. Magnitudes below two sigma are left out, as their
 /// direction is unknown.
 ///
 /// # Errors
@@ -53,9 +59,42 @@ fn nyquist(unit: Unit, heading: &str, lines: &[Line], band_hz: (f64, f64)) -> Ch
         if let Some(frf) = line.measured {
             chart = circles(chart, line, frf, &indices, factor);
         }
-        chart = chart.line(line.name, line.pen, points(line, &indices, factor));
+        let curve = points(line, &indices, factor);
+        chart = match std::ptr::eq(line, finest(lines)) {
+            true => chart.directed(line.name, line.pen, curve),
+            false => chart.line(line.name, line.pen, curve),
+        };
     }
+    chart = with_frequencies(chart, finest(lines), band_hz, factor);
     chart.points("origin", INK, Symbol::Cross, vec![(0.0, 0.0)])
+}
+
+/// The curve with arrows and frequencies: the last model or fit, which is smooth, or else the measured one.
+fn finest<'a, 'b>(lines: &'a [Line<'b>]) -> &'a Line<'b> {
+    let smooth = lines.iter().rev().find(|line| line.measured.is_none());
+    smooth.unwrap_or(&lines[0])
+}
+
+/// Frequencies at some points of a curve, those of large magnitude first.
+fn with_frequencies(mut chart: Chart, line: &Line, band_hz: (f64, f64), factor: f64) -> Chart {
+    let indices = within(line, band_hz);
+    let mut points: Vec<ResponsePoint> = indices
+        .iter()
+        .filter(|k| line.measured.is_none_or(|frf| is_known(frf, **k)))
+        .map(|k| (line.frequency_hz[*k], line.response[*k]))
+        .collect();
+    points.sort_by(|(_, a), (_, b)| b.norm().total_cmp(&a.norm()));
+    let distance = points
+        .first()
+        .map_or(0.0, |(_, h)| LABEL_DISTANCE * h.norm());
+    for (frequency_hz, h) in spread(points, distance, LABELS) {
+        let (at, text) = ((factor * h.re, factor * h.im), frequency_text(frequency_hz));
+        let side = if h.re < 0.0 { -1.0 } else { 1.0 };
+        chart = chart
+            .points("", line.pen.colour, Symbol::Dot, vec![at])
+            .text(at, (side * LABEL_OFFSET.0, LABEL_OFFSET.1), &text);
+    }
+    chart
 }
 
 /// Indices of the frequencies of a band.

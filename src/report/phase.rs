@@ -4,6 +4,27 @@ const TURN_DEG: f64 = 360.0;
 /// Offsets are determined within this ratio of the lowest common frequency.
 const COMPARED_RATIO: f64 = 10.0;
 
+/// Largest difference of two neighbouring phases in degrees at which the direction of the turn is certain.
+const MAX_CHANGE_DEG: f64 = 120.0;
+
+/// Whether an unwrapped phase would be a guess: two neighbouring valid phases differ by more than 120 degrees, so that a turn to
+/// the other side is as likely, or less than half of the phases between the first and the last valid one are valid.
+///
+/// Few frequencies around a lightly damped mode, or much noise, have this effect. Whole turns are irrelevant.
+pub fn is_ambiguous(phase_deg: &[f64], valid: &[bool]) -> bool {
+    let phases = phase_deg.iter().zip(valid).enumerate();
+    let known: Vec<(usize, f64)> = phases
+        .filter(|(_, (_, valid))| **valid)
+        .map(|(k, (phase, _))| (k, *phase))
+        .collect();
+    let ([(first, _), ..], [.., (last, _)]) = (&known[..], &known[..]) else {
+        return !phase_deg.is_empty();
+    };
+    let changes = known.windows(2).map(|pair| (pair[0].1, pair[1].1));
+    let is_large = |(before, after)| f64::abs(closest(after, before) - before) > MAX_CHANGE_DEG;
+    2 * known.len() < last - first + 1 || changes.into_iter().any(is_large)
+}
+
 /// Unwrapped phases in degrees: each the value closest to the valid one before it, plus whole turns.
 ///
 /// A phase that is not valid (too noisy) is placed near its neighbours, but those after it do not follow it: noise in

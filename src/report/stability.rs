@@ -3,6 +3,7 @@
 use super::ReportError;
 use super::chart::colours::{BLUE, Colour, GREY, ORANGE, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::identify::{Frf, Unit};
 
 /// Largest relative changes of the frequency and of the damping of a mode that persists.
 const FREQUENCY_CHANGE: f64 = 0.01;
@@ -72,29 +73,49 @@ fn is_close(a: f64, b: f64, ratio: f64) -> bool {
     (a - b).abs() <= ratio * b.abs()
 }
 
-/// The chart as an SVG document: the modes of each order over frequency, and vertical lines at the modes of the fit.
+/// The modes that a fit found at each order, and the response that it was fitted to.
+#[derive(Clone, Copy, Debug)]
+pub struct StabilityChart<'a> {
+    /// The modes of each order.
+    pub orders: &'a [Vec<OrderedMode>],
+    /// Frequencies of the modes of the fit in hertz.
+    pub fit_hz: &'a [f64],
+    /// Lowest and highest frequency of the fit in hertz.
+    pub band_hz: (f64, f64),
+    /// The measured response.
+    pub measured: &'a Frf,
+    /// Unit of the response.
+    pub unit: Unit,
+}
+
+/// The chart as an SVG document: the modes of each order over frequency, vertical lines at the modes of the fit, and behind them the
+/// measured magnitude on a logarithmic scale.
 ///
 /// # Errors
 /// When there is no order.
 pub fn stability_svg(
-    orders: &[Vec<OrderedMode>],
-    fit_hz: &[f64],
-    band_hz: (f64, f64),
+    plot: &StabilityChart<'_>,
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
-    if orders.is_empty() {
+    if plot.orders.is_empty() {
         return Err(ReportError::NoTrace);
     }
-    let chart = chart(orders, fit_hz, band_hz);
-    sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart])])
+    sheet_svg(title, subtitle, &[Row::new(420.0, vec![chart(plot)])])
 }
 
-fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Chart {
+fn chart(plot: &StabilityChart<'_>) -> Chart {
+    let StabilityChart {
+        orders,
+        fit_hz,
+        band_hz,
+        ..
+    } = *plot;
     let highest = orders.len().max(9) as f64 + 1.0;
-    let x = Scale::logarithmic("Frequency (Hz)").within(low_end_hz(orders, band_hz), band_hz.1);
+    let low_hz = low_end_hz(orders, band_hz);
+    let x = Scale::logarithmic("Frequency (Hz)").within(low_hz, band_hz.1);
     let y = Scale::linear("Order (number of modes)").within(0.0, highest);
-    let mut chart = Chart::new("", x, y);
+    let mut chart = with_magnitude(Chart::new("", x, y), plot, (low_hz, band_hz.1), highest);
     let mut name = format!("the {} modes of the fit", fit_hz.len());
     for f in fit_hz {
         let line = vec![(*f, 0.0), (*f, highest)];
@@ -105,6 +126,44 @@ fn chart(orders: &[Vec<OrderedMode>], fit_hz: &[f64], band_hz: (f64, f64)) -> Ch
         chart = chart.points(name, colour, symbol, places(orders, kind));
     }
     chart
+}
+
+/// The magnitude between the lower and the upper end of the chart, and its range as a heading.
+fn with_magnitude(
+    mut chart: Chart,
+    plot: &StabilityChart<'_>,
+    (low_hz, high_hz): (f64, f64),
+    highest: f64,
+) -> Chart {
+    let points = plot
+        .measured
+        .frequency_hz
+        .iter()
+        .zip(&plot.measured.response);
+    let magnitudes: Vec<(f64, f64)> = points
+        .map(|(f, h)| (*f, h.norm()))
+        .filter(|(f, magnitude)| (low_hz..=high_hz).contains(f) && *magnitude > 0.0)
+        .collect();
+    let values = magnitudes.iter().map(|(_, magnitude)| *magnitude);
+    let ends = (values.clone().reduce(f64::min), values.reduce(f64::max));
+    let (Some(low), Some(high)) = ends else {
+        return chart;
+    };
+    if low < high {
+        let unit = match plot.unit {
+            Unit::MetresPerAmpere => " m/A",
+            Unit::Bare => "",
+        };
+        chart.heading = format!(
+            "Grey: measured magnitude, logarithmic, from {low:.1e} at the bottom to {high:.1e}{unit} at the top"
+        );
+    }
+    let decades = libm::log10(high / low).max(f64::MIN_POSITIVE);
+    let height = |magnitude: f64| highest * libm::log10(magnitude / low) / decades;
+    let line = magnitudes
+        .iter()
+        .map(|(f, magnitude)| (*f, height(*magnitude)));
+    chart.line("", Pen::solid(GREY).width(1.2), line.collect())
 }
 
 /// Half of the lowest oscillating mode, or the lower end of the band where that is higher.

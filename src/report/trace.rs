@@ -14,10 +14,16 @@ const VALID_PHASE_SIGMAS: f64 = 4.0;
 const GAP_RESOLUTIONS: f64 = 2.0;
 /// Colours of measured responses, and of models.
 const MEASURED: [Colour; 4] = [BLUE, GREEN, PURPLE, SKY];
-const MODEL: [Colour; 3] = [VERMILION, INK, ORANGE];
+const MODEL: [Colour; 2] = [VERMILION, ORANGE];
 /// Strokes of models over measured responses.
 const STROKES: [Stroke; 2] = [Stroke::Dashed, Stroke::Dotted];
 const LINE_WIDTH: f64 = 1.4;
+const HALF_TURN_DEG: f64 = 180.0;
+/// A measured response below others is wide, and a fit over it thin, so that both are visible where they agree.
+const WIDTH_BELOW: f64 = 3.6;
+const FIT: Pen = Pen::solid(INK).width(0.9);
+/// An ambiguous response of fewer points than this is drawn as points: a line between them would show what is not known.
+const FEW_POINTS: usize = 150;
 
 /// A response with its name in the legend.
 #[derive(Clone, Debug)]
@@ -44,18 +50,34 @@ impl<'a> Trace<'a> {
         Self { name, curve }
     }
 
+    /// The response of a fit to a measured response.
+    pub fn fit(name: &'a str, frequency_hz: &'a [f64], response: &'a [Complex<f64>]) -> Self {
+        let curve = Curve::Fit {
+            frequency_hz,
+            response,
+        };
+        Self { name, curve }
+    }
+
     pub(super) fn is_measured(&self) -> bool {
         self.curve.measured().is_some()
     }
 }
 
-/// A response, measured or of a model.
+/// A response: measured, of a model or of a fit.
 #[derive(Clone, Debug)]
 pub enum Curve<'a> {
     /// Measured: a line with its band of two sigma, and its coherence.
     Measured(&'a Frf),
     /// Response of a model: a line.
     Model {
+        /// Frequencies in hertz.
+        frequency_hz: &'a [f64],
+        /// Response in the unit of the plot.
+        response: &'a [Complex<f64>],
+    },
+    /// Response of a fit: a thin line.
+    Fit {
         /// Frequencies in hertz.
         frequency_hz: &'a [f64],
         /// Response in the unit of the plot.
@@ -68,7 +90,7 @@ impl<'a> Curve<'a> {
     fn measured(&self) -> Option<&'a Frf> {
         match *self {
             Curve::Measured(frf) => Some(frf),
-            Curve::Model { .. } => None,
+            Curve::Model { .. } | Curve::Fit { .. } => None,
         }
     }
 
@@ -77,6 +99,10 @@ impl<'a> Curve<'a> {
         match *self {
             Curve::Measured(frf) => (&frf.frequency_hz, &frf.response),
             Curve::Model {
+                frequency_hz,
+                response,
+            }
+            | Curve::Fit {
                 frequency_hz,
                 response,
             } => (frequency_hz, response),
@@ -91,23 +117,31 @@ pub(super) struct Line<'a> {
     pub frequency_hz: &'a [f64],
     pub response: &'a [Complex<f64>],
     pub magnitude: Vec<f64>,
-    /// Unwrapped.
+    /// Unwrapped, or in (-180, 180].
     pub phase_deg: Vec<f64>,
+    /// Whether the phases are not unwrapped, because some of them are ambiguous.
+    pub is_wrapped: bool,
     /// Whether the band of the magnitude excludes 0.
     pub certain: Vec<bool>,
+    /// Whether no line joins the points.
+    is_points: bool,
     /// Whether the phase is known well enough to be used for unwrapping.
     valid: Vec<bool>,
     pub measured: Option<&'a Frf>,
 }
 
-/// The responses with their pens, phases on the same turn where they overlap.
+/// The responses with their pens, phases on the same turn where they overlap. If the phase of one is ambiguous, none is
+/// unwrapped, so that they can be compared.
 pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportError> {
     let pens = pens(traces);
     let with_pens = traces.iter().zip(pens);
     let mut lines = with_pens
         .map(|(trace, pen)| Line::new(trace, pen))
         .collect::<Result<Vec<_>, _>>()?;
-    align_phases(&mut lines);
+    match lines.iter().any(Line::is_ambiguous) {
+        true => lines.iter_mut().for_each(Line::wrap),
+        false => align_phases(&mut lines),
+    }
     if lines.is_empty() {
         Err(ReportError::NoTrace)
     } else {
@@ -115,26 +149,32 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
     }
 }
 
-/// A pen for each trace. Models are dashed where something measured lies below them.
+/// A pen for each trace.
 fn pens(traces: &[Trace]) -> Vec<Pen> {
-    let any_measured = traces.iter().any(Trace::is_measured);
     let mut pens = Vec::new();
     for (k, trace) in traces.iter().enumerate() {
-        let measured = trace.is_measured();
-        let before = traces[..k].iter();
-        let index = before.filter(|other| other.is_measured() == measured);
-        pens.push(numbered_pen(measured, index.count(), any_measured));
+        let is_same_kind = |other: &&Trace| {
+            std::mem::discriminant(&other.curve) == std::mem::discriminant(&trace.curve)
+        };
+        let index = traces[..k].iter().filter(is_same_kind).count();
+        pens.push(match trace.curve {
+            Curve::Measured(_) => measured_pen(index, traces),
+            Curve::Model { .. } => model_pen(index, traces),
+            Curve::Fit { .. } => FIT,
+        });
     }
     pens
 }
 
-fn numbered_pen(measured: bool, index: usize, any_measured: bool) -> Pen {
-    let colour = if measured {
-        MEASURED[index % MEASURED.len()]
-    } else {
-        MODEL[index % MODEL.len()]
-    };
-    let over_measured = any_measured && !measured;
+fn measured_pen(index: usize, traces: &[Trace]) -> Pen {
+    let is_alone = traces.iter().all(Trace::is_measured);
+    let width = if is_alone { LINE_WIDTH } else { WIDTH_BELOW };
+    Pen::solid(MEASURED[index % MEASURED.len()]).width(width)
+}
+
+/// Models are dashed where something measured lies below them.
+fn model_pen(index: usize, traces: &[Trace]) -> Pen {
+    let over_measured = traces.iter().any(Trace::is_measured);
     let stroke = if over_measured {
         STROKES[index % STROKES.len()]
     } else {
@@ -142,7 +182,7 @@ fn numbered_pen(measured: bool, index: usize, any_measured: bool) -> Pen {
     };
     Pen {
         stroke,
-        ..Pen::solid(colour).width(LINE_WIDTH)
+        ..Pen::solid(MODEL[index % MODEL.len()]).width(LINE_WIDTH)
     }
 }
 
@@ -153,8 +193,7 @@ impl<'a> Line<'a> {
         let (frequency_hz, response) = trace.curve.columns();
         let magnitude: Vec<f64> = response.iter().map(|h| h.norm()).collect();
         let valid = above_sigmas(&magnitude, measured, VALID_PHASE_SIGMAS);
-        let phases = response.iter().map(|h| wrapped_phase_rad(*h).to_degrees());
-        let wrapped: Vec<f64> = phases.collect();
+        let wrapped = wrapped_deg(response);
         Ok(Self {
             name: trace.name,
             pen,
@@ -162,10 +201,23 @@ impl<'a> Line<'a> {
             response,
             certain: above_sigmas(&magnitude, measured, BAND_SIGMAS),
             phase_deg: phase::unwrapped_deg(&wrapped, &valid),
+            is_wrapped: false,
+            is_points: false,
             magnitude,
             valid,
             measured,
         })
+    }
+
+    /// Whether the phase is measured and cannot be unwrapped with certainty.
+    fn is_ambiguous(&self) -> bool {
+        self.measured.is_some() && phase::is_ambiguous(&self.phase_deg, &self.valid)
+    }
+
+    fn wrap(&mut self) {
+        self.is_points = self.is_ambiguous() && self.frequency_hz.len() < FEW_POINTS;
+        self.phase_deg = wrapped_deg(self.response);
+        self.is_wrapped = true;
     }
 
     /// The magnitude with its band.
@@ -173,11 +225,15 @@ impl<'a> Line<'a> {
         self.points(&self.magnitude, |frf, k| frf.magnitude_sigma[k])
     }
 
-    /// The phase in degrees with its band.
+    /// The phase in degrees with its band. No stroke joins phases at both ends of a turn.
     pub fn phase_points(&self) -> Vec<SeriesPoint> {
-        self.points(&self.phase_deg, |frf, k| {
+        let mut points = self.points(&self.phase_deg, |frf, k| {
             frf.phase_sigma_rad[k].to_degrees()
-        })
+        });
+        for k in (1..points.len()).filter(|_| self.is_wrapped) {
+            points[k].starts |= (points[k].y - points[k - 1].y).abs() > HALF_TURN_DEG;
+        }
+        points
     }
 
     fn points(&self, values: &[f64], sigma: fn(&Frf, usize) -> f64) -> Vec<SeriesPoint> {
@@ -197,7 +253,9 @@ impl<'a> Line<'a> {
             y,
             band: (y - half_width, y + half_width),
             faint: !self.certain[k],
-            starts: k == 0 || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
+            starts: k == 0
+                || self.is_points
+                || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
         }
     }
 
@@ -211,6 +269,19 @@ impl<'a> Line<'a> {
         let valid = points.zip(&self.valid).filter(|(_, valid)| **valid);
         valid.map(|(point, _)| point).collect()
     }
+}
+
+/// Whether the phase of a measured response cannot be unwrapped with certainty: see [`phase::is_ambiguous`].
+pub fn has_ambiguous_phase(frf: &Frf) -> bool {
+    let magnitude: Vec<f64> = frf.response.iter().map(|h| h.norm()).collect();
+    let valid = above_sigmas(&magnitude, Some(frf), VALID_PHASE_SIGMAS);
+    phase::is_ambiguous(&wrapped_deg(&frf.response), &valid)
+}
+
+/// The phases in degrees, in (-180, 180].
+fn wrapped_deg(response: &[Complex<f64>]) -> Vec<f64> {
+    let phases = response.iter().map(|h| wrapped_phase_rad(*h).to_degrees());
+    phases.collect()
 }
 
 /// Which magnitudes are above a multiple of their sigmas; all magnitudes of a model are.

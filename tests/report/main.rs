@@ -5,6 +5,7 @@ mod attributes;
 mod bode;
 mod comparison;
 mod control;
+mod model_pictures;
 mod nyquist;
 mod overlay;
 mod phase;

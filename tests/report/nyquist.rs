@@ -63,7 +63,8 @@ fn lines_between_gaps_are_drawn_as_dots() {
     }];
     let nyquist = nyquist_svg(Unit::MetresPerAmpere, &measured, None, "Nyquist", "").unwrap();
     let coherence = coherence_svg(&apart, "Coherence", "").unwrap();
-    let dots = |svg: &str| svg.matches("<circle").count();
+    // Dots of labelled frequencies are larger.
+    let dots = |svg: &str| svg.matches(" r=\"20\"").count();
     assert_eq!(dots(&nyquist), 100);
     // A coherence of 1 has no place in the logarithmic panel of 1 - coherence.
     assert_eq!(dots(&coherence), 100);

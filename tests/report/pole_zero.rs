@@ -1,9 +1,12 @@
 //! The map of poles and zeros.
 
-use bench::report::{PoleZeroMap, ReportError, UncertainPoint, pole_zero_svg, stability_svg};
+use bench::identify::Unit;
+use bench::report::{
+    PoleZeroMap, ReportError, StabilityChart, UncertainPoint, pole_zero_svg, stability_svg,
+};
 use nalgebra::Complex;
 
-use crate::pictures::keep;
+use crate::pictures::{flat, keep};
 use crate::svg;
 
 const BLUE: &str = "#0072B2";
@@ -113,8 +116,12 @@ fn draws_an_empty_map_and_rejects_a_chart_without_orders() {
             .unwrap()
             .contains("imaginary axis")
     );
-    assert_eq!(
-        stability_svg(&[], &[], (1.0, 2.0), "", ""),
-        Err(ReportError::NoTrace)
-    );
+    let chart = StabilityChart {
+        orders: &[],
+        fit_hz: &[],
+        band_hz: (1.0, 2.0),
+        measured: &flat(),
+        unit: Unit::MetresPerAmpere,
+    };
+    assert_eq!(stability_svg(&chart, "", ""), Err(ReportError::NoTrace));
 }

@@ -5,14 +5,17 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::figure_options::PictureOptions;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::evenly_spread_rows;
 use super::sweep::SweepArgs;
+use crate::config::{Config, Purpose};
 use crate::model::plant::ModalModel;
 use crate::model::zeros::{
     ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
+use crate::report::{Picture, ReportError, locus_svg, plant_conditions};
 use crate::util::decimal::Decimal;
 
 /// The setting that varies, and the zeros to follow.
@@ -25,6 +28,8 @@ pub(super) struct Args {
     damped: bool,
     #[command(flatten)]
     table: TableOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -78,9 +83,28 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         let rows = (0..values.len()).map(|k| row(&locus, k));
         Column::of_rows(names(args, &locus), rows)
     })?;
+    let config = args.sweep.bench.load(Purpose::Model, &[])?;
+    args.picture.write(|| drawn(args, &config, &locus))?;
     let report = report(args, locus)?;
     print_result(args.sweep.bench.json, &report, |report| {
-        text(report) + &args.table.files_text("tracks")
+        text(report) + &args.table.files_text("tracks") + &args.picture.files_text()
+    })
+}
+
+fn drawn(args: &Args, config: &Config, locus: &Locus) -> Result<Picture, ReportError> {
+    let vary = &args.sweep.vary;
+    let which = match args.damped {
+        true => "zeros with damping",
+        false => "zeros without damping, one of each pair s, -s",
+    };
+    let title = format!("{}: {which}", config.title);
+    let conditions = plant_conditions(&config.plant, &[vary]);
+    Ok(Picture {
+        svg: locus_svg(locus, vary, &title, &conditions)?,
+        caption: format!(
+            "The zeros in the complex plane as {vary} varies, and their parts over it. Arrows point to the last value."
+        ),
+        title,
     })
 }
 

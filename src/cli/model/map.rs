@@ -4,12 +4,14 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::figure_options::PictureOptions;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
 use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
+use crate::report::{CnmpMap, Picture, ReportError, map_svg};
 use crate::util::decimal::Decimal;
 use crate::util::quantity::{OperatingPoint, Ratio};
 
@@ -43,6 +45,8 @@ pub(super) struct Args {
     asymmetries: ValueRange<Ratio>,
     #[command(flatten)]
     table: TableOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -68,7 +72,24 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     };
     args.table.write(|| columns(&report))?;
     let profile = args.bench.profile();
-    print_result(args.bench.json, &report, |report| text(report, profile))
+    args.picture.write(|| drawn(&report, profile))?;
+    print_result(args.bench.json, &report, |report| {
+        text(report, profile) + &args.picture.files_text()
+    })
+}
+
+fn drawn(report: &Report, profile: &str) -> Result<Picture, ReportError> {
+    let title = format!("CNMP map of the configuration {profile}");
+    let map = CnmpMap {
+        operating_points: report.operating_points,
+        asymmetries: report.asymmetries,
+        pairs: &report.cnmp_pairs,
+    };
+    Ok(Picture {
+        svg: map_svg(&map, &title, &format!("without damping: {}", summary(report)))?,
+        caption: "Number of pairs of CNMP zeros without damping, over operating point and mass asymmetry. Each cell is a point of the grid.".into(),
+        title,
+    })
 }
 
 const FIXED: &str = "--operating-point and --asymmetry cannot be fixed here, because a map varies both; leave them out, or use `bench model modes`";

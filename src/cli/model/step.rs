@@ -4,14 +4,16 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::figure_options::PictureOptions;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
-use crate::config::Purpose;
+use crate::config::{Config, Purpose};
 use crate::model::plant::{self, ModalModel};
 use crate::model::zeros::{
     ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
 };
+use crate::report::{Picture, ReportError, model_step_svg, plant_conditions};
 use crate::util::decimal::Decimal;
 use crate::util::numeric::linspace;
 use crate::util::quantity::{OfTime, si};
@@ -30,6 +32,8 @@ pub(super) struct Args {
     /// Rows of the file
     #[arg(long, value_name = "N", default_value_t = 2000, value_parser = clap::value_parser!(u32).range(2..=1_000_000))]
     count: u32,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -61,9 +65,28 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let end_s = args.duration.unwrap_or(features.window_s);
     args.table
         .write(|| columns(&sum, &response, end_s, args.count as usize))?;
+    args.picture
+        .write(|| picture(&config, &response, &features, end_s))?;
     let report = report(args, &sum, &response, features)?;
     print_result(args.bench.json, &report, |report| {
-        text(report) + &args.table.files_text("  response           ")
+        text(report) + &args.table.files_text("  response           ") + &args.picture.files_text()
+    })
+}
+
+fn picture(
+    config: &Config,
+    response: &StepResponse,
+    features: &StepFeatures,
+    end_s: f64,
+) -> Result<Picture, ReportError> {
+    let title = format!("{}: step response", config.title);
+    let conditions = plant_conditions(&config.plant, &[]);
+    Ok(Picture {
+        svg: model_step_svg(response, features, end_s, &title, &conditions)?,
+        caption:
+            "Displacement after a step of force of 1 N at the actuator, and the part of each mode."
+                .into(),
+        title,
     })
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::figure_options::PictureOptions;
 use super::super::options::{BenchOptions, SeedOption};
 use super::super::outcome::Outcome;
 use super::super::output::{print_note, print_result};
@@ -14,6 +15,7 @@ use crate::experiment::stop_on_signal;
 use crate::model::study::{
     Answer, Block, Opened, Plan, Results, Shard, StudyFile, Tolerance, complete, joined,
 };
+use crate::report::{Picture, ReportError, plant_conditions, study_svg};
 use crate::util::progress::Progress;
 
 /// The settings that vary, and the number of draws.
@@ -55,6 +57,8 @@ pub(super) struct Args {
     join: Vec<PathBuf>,
     #[command(flatten)]
     table: TableOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -70,10 +74,23 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     args.table.write(|| columns(&results))?;
     let answer = Answer::of(&results);
+    args.picture.write(|| picture(&answer, &results))?;
     print_result(args.bench.json, &answer, |answer| {
-        text(answer) + &args.table.files_text("draws")
+        text(answer) + &args.table.files_text("draws") + &args.picture.files_text()
     })?;
     Ok(Outcome::Done)
+}
+
+fn picture(answer: &Answer, results: &Results) -> Result<Picture, ReportError> {
+    let (model, draws, seed) = (answer.model, answer.draws, answer.seed);
+    let title = format!("Tolerance study of the model {model}: CNMP zeros");
+    let conditions = plant_conditions(&results.plan.plant, &[]);
+    let subtitle = format!("{draws} draws, seed {seed}; {conditions}");
+    Ok(Picture {
+        svg: study_svg(answer, &title, &subtitle)?,
+        caption: "Probability of each number of pairs of CNMP zeros, and the share of the variance of \"has CNMP zeros\" that the settings explain.".into(),
+        title,
+    })
 }
 
 /// The results of the draws that this process has to do; incomplete if it is stopped.

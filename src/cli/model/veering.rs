@@ -4,14 +4,16 @@ use serde::Serialize;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::figure_options::PictureOptions;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::sweep::CloseModesArgs;
 use super::{evenly_spread_rows, meeting_text};
-use crate::config::Purpose;
+use crate::config::{Config, Purpose};
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
+use crate::report::{Picture, ReportError, plant_conditions, veering_svg};
 use crate::util::decimal::Decimal;
 use crate::util::units::hz;
 
@@ -23,6 +25,8 @@ pub(super) struct Args {
     modes: CloseModesArgs,
     #[command(flatten)]
     table: TableOptions,
+    #[command(flatten)]
+    picture: PictureOptions,
 }
 
 #[derive(Debug, Serialize)]
@@ -46,8 +50,21 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
         coordinates,
         csv: args.table.csv(),
     };
+    let config = sweep.bench.load(Purpose::Model, &[])?;
+    args.picture.write(|| drawn(&report, &config))?;
     print_result(sweep.bench.json, &report, |report| {
-        text(report) + &args.table.files_text("loci and shapes")
+        text(report) + &args.table.files_text("loci and shapes") + &args.picture.files_text()
+    })
+}
+
+fn drawn(report: &Report, config: &Config) -> Result<Picture, ReportError> {
+    let (vary, [u, v]) = (report.vary, report.veering.point.modes);
+    let title = format!("{}: modes {u} and {v} over {vary}", config.title);
+    let conditions = plant_conditions(&config.plant, &[vary]);
+    Ok(Picture {
+        svg: veering_svg(&report.veering, vary, &title, &conditions)?,
+        caption: meeting_text(&report.veering.point),
+        title,
     })
 }
 

@@ -23,6 +23,9 @@ pub const GREY: Colour = Colour(140, 140, 140);
 /// The background.
 pub const PAPER: Colour = Colour(255, 255, 255);
 
+/// Areas without a mark, such as the cells of a map in which there is nothing.
+pub const UNMARKED: Colour = FINE_GRID;
+
 /// Text of secondary importance.
 pub(super) const SECONDARY_INK: Colour = Colour(95, 95, 95);
 /// The frame of a chart.

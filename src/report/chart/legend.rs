@@ -7,7 +7,7 @@ use super::Points;
 use super::canvas::{Canvas, TextStyle, rectangle};
 use super::colours::{Colour, INK};
 use super::header::{CHARACTER, TEXT_SIZE};
-use super::mark::{Mark, Pen, Symbol};
+use super::mark::{Mark, Pen, SeriesPoint, Symbol};
 use super::plot_area::{BAND, draw_arrow, draw_symbol};
 use super::series::dashes;
 use crate::report::ReportError;
@@ -74,7 +74,9 @@ fn entries(mark: &Mark) -> Vec<Entry> {
 /// A sample for each name of a mark.
 fn samples(mark: &Mark) -> Vec<Sample> {
     let sample = match mark {
-        Mark::Series { pen, dots, .. } if *dots => Sample::Band(*pen),
+        Mark::Series { pen, points, .. } if points.iter().any(SeriesPoint::has_band) => {
+            Sample::Band(*pen)
+        }
         Mark::Line { pen, .. } | Mark::Series { pen, .. } => Sample::Line(*pen),
         Mark::Arrow { pen, .. } => Sample::Arrow(*pen),
         Mark::Points { colour, symbol, .. } => Sample::Point(*colour, *symbol),

@@ -85,6 +85,13 @@ pub struct SeriesPoint {
     pub starts: bool,
 }
 
+impl SeriesPoint {
+    /// Whether the band has a width.
+    pub(super) fn has_band(&self) -> bool {
+        self.band.0 < self.band.1
+    }
+}
+
 /// One mark of a chart. Marks with an empty name have no entry in the legend.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Mark {

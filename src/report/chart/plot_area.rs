@@ -24,6 +24,8 @@ const TEXT: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Center, VPos::Center);
 /// Opacity of a band, and of the faint part of a series.
 pub(super) const BAND: f64 = 0.22;
 const FAINT: f64 = 0.3;
+/// Opacity of the band of a single point.
+const ISOLATED_BAND: f64 = 0.5;
 /// A series with dots and fewer points than this has a dot at each.
 const FEW_POINTS: usize = 150;
 /// Radius of these dots, and of a symbol.
@@ -190,8 +192,9 @@ impl PlotArea {
         for piece in series::pieces(&columns) {
             draw_stroke(canvas, pen, opacity(piece.faint), &piece.points)?;
         }
+        draw_isolated_bands(canvas, pen.colour, &samples)?;
         let all = dots && samples.len() < FEW_POINTS;
-        draw_dots(canvas, pen.colour, &samples, all)
+        draw_dots(canvas, pen, &samples, all)
     }
 
     fn sample(&self, point: &SeriesPoint) -> Sample {
@@ -323,17 +326,33 @@ fn draw_stroke(
         .try_for_each(|dash| canvas.line(dash, pen.colour.mix(opacity), pen.width))
 }
 
-/// Dots at all points, or at single points between gaps.
-fn draw_dots(
+/// The bands of single points between gaps, whose outline has no area.
+fn draw_isolated_bands(
     canvas: &Canvas,
     colour: Colour,
     samples: &[Sample],
-    all: bool,
 ) -> Result<(), ReportError> {
     for (k, sample) in samples.iter().enumerate() {
-        let next_starts = samples.get(k + 1).is_none_or(|next| next.starts);
-        if all || (sample.starts && next_starts) {
-            canvas.dot(sample.at, DOT, colour.mix(opacity(sample.faint)))?;
+        let (upper, lower) = sample.band;
+        if is_isolated(samples, k) && upper < lower {
+            let ends = [(sample.at.0, upper), (sample.at.0, lower)];
+            canvas.line(&ends, colour.mix(ISOLATED_BAND), DOT)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a gap lies on either side of a point.
+fn is_isolated(samples: &[Sample], k: usize) -> bool {
+    samples[k].starts && samples.get(k + 1).is_none_or(|next| next.starts)
+}
+
+/// Dots at all points, or at single points between gaps.
+fn draw_dots(canvas: &Canvas, pen: Pen, samples: &[Sample], all: bool) -> Result<(), ReportError> {
+    for (k, sample) in samples.iter().enumerate() {
+        if all || is_isolated(samples, k) {
+            let radius = DOT.max(if all { pen.width } else { 0.5 * pen.width });
+            canvas.dot(sample.at, radius, pen.colour.mix(opacity(sample.faint)))?;
         }
     }
     Ok(())

@@ -5,10 +5,12 @@ use nalgebra::Complex;
 use super::plane::{self, CRITICAL, plane, with_critical_point, with_unit_circle};
 use crate::identify::{Frf, Unit};
 use crate::report::ReportError;
-use crate::report::bode::{magnitude, phase, stacked};
+use crate::report::bode::{MAGNITUDE_HEIGHT, PHASE_HEIGHT, magnitude, phase, stacked};
 use crate::report::chart::colours::{Colour, GREY, PURPLE};
 use crate::report::chart::{Chart, Pen, Row, Symbol, sheet_svg};
 use crate::report::ellipse::{self, SIGMAS_95_PLANE};
+use crate::report::labels::{ResponsePoint, frequency_text, spread};
+use crate::report::magnitude::{MagnitudeAxis, MagnitudeScale};
 use crate::report::trace::{self, Line, Trace};
 
 /// Ends of the axes of the Nyquist plot: the surroundings of -1 and of the unit circle.
@@ -23,6 +25,8 @@ const CIRCLES: usize = 60;
 const LABEL_DISTANCE: f64 = 0.27;
 /// Opacity of a circle.
 const OPACITY: f64 = 0.15;
+/// Scale of L, S and T.
+const SCALE: MagnitudeScale = MagnitudeScale::new(Unit::Bare, MagnitudeAxis::Logarithmic);
 /// Colour of the margins.
 const MARK: Colour = PURPLE;
 /// Symbols of the margins, in their order.
@@ -73,7 +77,7 @@ impl MeasuredLoopPlot<'_> {
 /// When a response is invalid, or drawing fails.
 pub fn measured_bode_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
-    let mut gains = level(magnitude(Unit::Bare, &lines)?, &lines, 1.0);
+    let mut gains = level(magnitude(SCALE, &lines)?, &lines, 1.0);
     let mut phases = level(phase(&lines), &lines, -180.0);
     for (mark, symbol) in plot.marks.iter().zip(SYMBOLS) {
         let gain = (mark.frequency_hz, mark.loop_gain.norm());
@@ -81,7 +85,8 @@ pub fn measured_bode_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportEr
         gains = gains.points(&mark.label, MARK, symbol, vec![gain]);
         phases = phases.points(&mark.label, MARK, symbol, vec![phase]);
     }
-    stacked(vec![gains, phases], &lines, plot.title, plot.subtitle)
+    let charts = [(MAGNITUDE_HEIGHT, gains), (PHASE_HEIGHT, phases)];
+    stacked(charts, &lines, plot.title, plot.subtitle)
 }
 
 /// The phase of a mark on the turn of the curve.
@@ -149,51 +154,67 @@ fn confidence_circles(mut chart: Chart, line: &Line, frf: &Frf) -> Chart {
 }
 
 /// Frequencies whose points are far enough from each other for labels; those nearest to -1 first.
-fn labelled(frf: &Frf) -> Vec<(f64, Complex<f64>)> {
+fn labelled(frf: &Frf) -> Vec<ResponsePoint> {
     let points = frf
         .frequency_hz
         .iter()
         .copied()
         .zip(frf.response.iter().copied());
-    let mut candidates: Vec<(f64, Complex<f64>)> = points.filter(|(_, l)| is_inside(l)).collect();
+    let mut candidates: Vec<ResponsePoint> = points.filter(|(_, l)| is_inside(l)).collect();
     candidates.sort_by(|(_, a), (_, b)| (a + 1.0).norm().total_cmp(&(b + 1.0).norm()));
-    let mut labelled: Vec<(f64, Complex<f64>)> = Vec::new();
-    for (f, l) in candidates {
-        let is_free = |(_, other): &(f64, Complex<f64>)| (l - other).norm() > LABEL_DISTANCE;
-        if labelled.len() < FREQUENCIES && labelled.iter().all(is_free) {
-            labelled.push((f, l));
-        }
-    }
-    labelled
+    spread(candidates, LABEL_DISTANCE, FREQUENCIES)
 }
 
-fn frequency_text(frequency_hz: f64) -> String {
-    match frequency_hz < 10.0 {
-        true => format!("{frequency_hz:.2} Hz"),
-        false => format!("{frequency_hz:.1} Hz"),
-    }
+/// Measured S and T with those of the model.
+#[derive(Clone, Debug)]
+pub struct MeasuredSensitivityPlot<'a> {
+    /// Measured S.
+    pub sensitivity: &'a Frf,
+    /// Measured T.
+    pub complementary: &'a Frf,
+    /// L of the model at the frequencies of S.
+    pub model_loop: &'a [Complex<f64>],
+    /// The peak of |S|.
+    pub peak: Option<&'a MeasuredMark>,
+    /// Least allowed modulus margin; 0 for none.
+    pub min_modulus_margin: f64,
+    /// Title of the plot.
+    pub title: &'a str,
+    /// Line below the title.
+    pub subtitle: &'a str,
 }
 
-/// |S| and |T| over frequency as an SVG document, each with a band of two sigma, and the peak of |S|.
+/// |S| and |T| over frequency as an SVG document, each with a band of two sigma and beside that of the model, the peak of |S| and its
+/// limit.
 ///
 /// # Errors
 /// When a response is invalid, or drawing fails.
-pub fn measured_sensitivity_svg(
-    sensitivity: &Frf,
-    complementary: &Frf,
-    peak: Option<&MeasuredMark>,
-    title: &str,
-    subtitle: &str,
-) -> Result<String, ReportError> {
+pub fn measured_sensitivity_svg(plot: &MeasuredSensitivityPlot<'_>) -> Result<String, ReportError> {
+    let frequency_hz = &plot.sensitivity.frequency_hz;
+    let model_loop = plot.model_loop.iter();
+    let (sensitivity, complementary): (Vec<_>, Vec<_>) =
+        model_loop.map(|l| ((l + 1.0).inv(), l / (l + 1.0))).unzip();
     let lines = trace::lines(&[
-        Trace::measured("S", sensitivity),
-        Trace::measured("T", complementary),
+        Trace::measured("S", plot.sensitivity),
+        Trace::measured("T", plot.complementary),
+        Trace::model("S by the model", frequency_hz, &sensitivity),
+        Trace::model("T by the model", frequency_hz, &complementary),
     ])?;
-    let mut chart = level(magnitude(Unit::Bare, &lines)?, &lines, 1.0);
-    if let Some(mark) = peak {
+    let mut chart = level(magnitude(SCALE, &lines)?, &lines, 1.0);
+    if plot.min_modulus_margin > 0.0 {
+        let name = format!("limit of |S|: 1/{}", plot.min_modulus_margin);
+        let limit = plane::level(frequency_hz, 1.0 / plot.min_modulus_margin);
+        chart = chart.line(&name, Pen::dashed(GREY), limit);
+    }
+    if let Some(mark) = plot.peak {
         let size = (mark.loop_gain + 1.0).inv().norm();
         let at = vec![(mark.frequency_hz, size)];
-        chart = level(chart, &lines, size).points(&mark.label, MARK, Symbol::Dot, at);
+        chart = chart.points(&mark.label, MARK, Symbol::Dot, at);
     }
-    stacked(vec![chart], &lines, title, subtitle)
+    stacked(
+        [(MAGNITUDE_HEIGHT, chart)],
+        &lines,
+        plot.title,
+        plot.subtitle,
+    )
 }

@@ -14,7 +14,7 @@ mod plane;
 
 pub use design::{DesignLimits, design_loop_svg, design_nyquist_svg};
 pub use measured::{
-    MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
-    measured_sensitivity_svg,
+    MeasuredLoopPlot, MeasuredMark, MeasuredSensitivityPlot, measured_bode_svg,
+    measured_nyquist_svg, measured_sensitivity_svg,
 };
-pub use model::{LoopPlot, loop_bode_svg, loop_nyquist_svg, sensitivity_svg};
+pub use model::{LoopPlot, loop_bode_svg, loop_nyquist_svg, loop_svg, sensitivity_svg};

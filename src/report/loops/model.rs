@@ -104,15 +104,29 @@ pub fn loop_bode_svg(
     title: &str,
     subtitle: &str,
 ) -> Result<String, ReportError> {
+    sheet_svg(title, subtitle, &bode_rows(plot)?)
+}
+
+fn bode_rows(plot: &LoopPlot<'_>) -> Result<[Row; 2], ReportError> {
     let traces = [Trace::model("L", plot.frequency_hz, plot.loop_gain)];
     let lines = trace::lines(&traces)?;
     let [line] = &lines[..] else {
         return Err(ReportError::NoTrace);
     };
-    let rows = [
+    Ok([
         Row::new(MAGNITUDE_HEIGHT, vec![magnitude(plot, line)]),
         Row::new(PHASE_HEIGHT, vec![phase(plot, line)]),
-    ];
+    ])
+}
+
+/// Bode plot, Nyquist plot and sensitivities of a loop below each other, as an SVG document.
+///
+/// # Errors
+/// When there is nothing to draw, or a value is not finite.
+pub fn loop_svg(plot: &LoopPlot<'_>, title: &str, subtitle: &str) -> Result<String, ReportError> {
+    let mut rows = bode_rows(plot)?.to_vec();
+    rows.push(nyquist_row(plot));
+    rows.push(Row::new(SENSITIVITY_HEIGHT, vec![sensitivities(plot)]));
     sheet_svg(title, subtitle, &rows)
 }
 
@@ -230,12 +244,16 @@ pub fn loop_nyquist_svg(
     if plot.loop_gain.is_empty() {
         return Err(ReportError::NoTrace);
     }
+    sheet_svg(title, subtitle, &[nyquist_row(plot)])
+}
+
+fn nyquist_row(plot: &LoopPlot<'_>) -> Row {
     let far = far_half_width(plot);
     let charts = vec![
         nyquist(plot, "Around -1", NEAR_MIDDLE, NEAR),
         nyquist(plot, "Resonances", 0.0, far).without_legend(),
     ];
-    sheet_svg(title, subtitle, &[Row::new(NYQUIST_HEIGHT, charts)])
+    Row::new(NYQUIST_HEIGHT, charts)
 }
 
 /// Half the width that shows the largest |L| beyond the crossover.

@@ -1,21 +1,27 @@
 //! The report of a run of the bench: with its model, its loop, its scheduling and its configuration.
 
-use nalgebra::Complex;
-
 use super::distortion_plot::distortion_plot;
+use super::loop_marks::{marks, peak_mark};
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
 use crate::experiment::{Analysis, ClosedResponses, Description};
+use crate::identify::Unit;
 use crate::identify::modal::MeasurementChain;
-use crate::identify::{Frf, Unit};
 use crate::recording::Recording;
 use crate::report::html::row;
 use crate::report::number::angular_frequency;
-use crate::report::{ReportError, Trace, bode_svg};
+use crate::report::{
+    MagnitudeAxis, MeasuredLoopPlot, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
+    measured_nyquist_svg, measured_sensitivity_svg,
+};
 
+const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a band of two sigma, and by the model. Dotted: |L| = 1 \
+    and -180 degrees.";
+const LOOP_NYQUIST_CAPTION: &str = "L in the complex plane around -1, with frequencies. The distance of the curve from -1 is 1/|S|; \
+    circles are 95 % confidence regions.";
 const SENSITIVITY_CAPTION: &str = "S from reference to error and T from reference to displacement. The peak of S is the inverse \
-    of the modulus margin.";
+    of the modulus margin; dashed: its limit, the inverse of the least allowed modulus margin.";
 const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, the predicted one the smallest of all \
     crossings. ± is the 95 % confidence interval.";
 
@@ -37,6 +43,7 @@ pub struct BenchRun<'a> {
     rate_hz: f64,
     /// Whether the analysis is that of this recording alone, so that it can certify the stage.
     pub(super) is_one_recording: bool,
+    magnitude_axis: MagnitudeAxis,
 }
 
 impl<'a> BenchRun<'a> {
@@ -58,6 +65,7 @@ impl<'a> BenchRun<'a> {
             },
             rate_hz: config.servo.rate_hz,
             is_one_recording: true,
+            magnitude_axis: MagnitudeAxis::default(),
         }
     }
 
@@ -66,6 +74,14 @@ impl<'a> BenchRun<'a> {
         BenchRun {
             excitation,
             is_one_recording: false,
+            ..self
+        }
+    }
+
+    /// The same run, with this axis for the magnitudes of its responses.
+    pub fn with_magnitude_axis(self, magnitude_axis: MagnitudeAxis) -> BenchRun<'a> {
+        BenchRun {
+            magnitude_axis,
             ..self
         }
     }
@@ -85,7 +101,8 @@ impl<'a> BenchRun<'a> {
             unit: Unit::MetresPerAmpere,
             residue_unit: "1/kg".into(),
             frf: &analysis.frf,
-            model: Some(&analysis.model),
+            model: Some(&analysis.model_response),
+            magnitude_axis: self.magnitude_axis,
             chain: self.chain.clone(),
             fit: analysis.fit.as_ref().ok(),
             signs: analysis.signs.as_ref(),
@@ -101,20 +118,33 @@ impl<'a> BenchRun<'a> {
         })
     }
 
-    /// The content of a plot, the excitation and the time, in two lines.
+    /// The content of a plot, the excitation with its amplitude, and the conditions of the run.
     fn subtitle(&self, shown: &str) -> String {
         let (excitation, rate_hz) = (&self.excitation, self.rate_hz);
-        format!(
-            "{shown};\n{excitation} at {rate_hz} Hz; {}",
-            run_facts::metadata(self.recording, "started")
-        )
+        let amplitude = self.amplitude().unwrap_or_default();
+        let conditions = run_facts::conditions(self.recording, self.config);
+        format!("{shown};\n{excitation} at {rate_hz} Hz{amplitude};\n{conditions}")
+    }
+
+    /// The amplitude of an excitation in open loop: one, or the smallest and the largest over frequency.
+    fn amplitude(&self) -> Option<String> {
+        let chosen = self.config.chosen_excitation();
+        if self.analysis.closed.is_some() || !chosen.design.has_amplitude_curve() {
+            return None;
+        }
+        let currents_a = self.config.chirp.amplitude.iter().map(|p| p.current_a);
+        let low_a = currents_a.clone().reduce(f64::min)?;
+        let high_a = currents_a.reduce(f64::max)?;
+        Some(match low_a < high_a {
+            true => format!(", {low_a:.3} to {high_a:.3} A"),
+            false => format!(", {high_a:.3} A"),
+        })
     }
 
     fn further_plots(&self) -> Result<Vec<Plot>, ReportError> {
         let mut plots = Vec::new();
         if let Some(closed) = &self.analysis.closed {
-            plots.push(self.loop_plot(closed)?);
-            plots.push(self.sensitivity_plot(closed)?);
+            plots.extend(self.loop_plots(closed)?);
         }
         if let Some(linearity) = &self.analysis.linearity {
             let subtitle = self.subtitle("displacement by frequency");
@@ -124,38 +154,53 @@ impl<'a> BenchRun<'a> {
         Ok(plots)
     }
 
-    fn loop_plot(&self, closed: &ClosedResponses) -> Result<Plot, ReportError> {
-        let measured = Trace::measured("L measured", &closed.loop_gain);
-        let model = model_trace("L by the model", &closed.loop_gain, &closed.model_loop);
-        Ok(Plot {
-            kind: PlotKind::Loop,
-            heading: "Loop",
-            caption: "L = P C from error to displacement: measured, with a band of two sigma, and by the model.".into(),
-            svg: self.loop_bode(&[measured, model])?,
-        })
-    }
-
-    fn sensitivity_plot(&self, closed: &ClosedResponses) -> Result<Plot, ReportError> {
-        let model_loop = closed.model_loop.iter();
-        let (sensitivity, complementary): (Vec<_>, Vec<_>) =
-            model_loop.map(|l| ((l + 1.0).inv(), l / (l + 1.0))).unzip();
-        let traces = [
-            Trace::measured("S measured", &closed.sensitivity),
-            Trace::measured("T measured", &closed.complementary),
-            model_trace("S by the model", &closed.loop_gain, &sensitivity),
-            model_trace("T by the model", &closed.loop_gain, &complementary),
-        ];
-        Ok(Plot {
-            kind: PlotKind::Sensitivity,
-            heading: "Sensitivities",
-            caption: SENSITIVITY_CAPTION.into(),
-            svg: self.loop_bode(&traces)?,
-        })
-    }
-
-    fn loop_bode(&self, traces: &[Trace]) -> Result<String, ReportError> {
+    /// L as Bode plot and Nyquist plot, S and T.
+    fn loop_plots(&self, closed: &ClosedResponses) -> Result<[Plot; 3], ReportError> {
         let subtitle = self.subtitle("the sampled loop, with hold, amplifier and delay");
-        bode_svg(Unit::Bare, traces, &self.title, &subtitle)
+        let (title, margins) = (&self.title, &closed.margins);
+        let plot = MeasuredLoopPlot {
+            loop_gain: &closed.loop_gain,
+            model: &closed.model_loop,
+            marks: &marks(margins, &closed.loop_gain),
+            modulus_margin: Some(margins.modulus_margin.value),
+            title,
+            subtitle: &subtitle,
+        };
+        let sensitivities = MeasuredSensitivityPlot {
+            sensitivity: &closed.sensitivity,
+            complementary: &closed.complementary,
+            model_loop: &closed.model_loop,
+            peak: Some(&peak_mark(margins, &closed.loop_gain)),
+            min_modulus_margin: self.config.control.min_modulus_margin,
+            title,
+            subtitle: &subtitle,
+        };
+        let drawn = |kind, heading, caption: &str, svg| Plot {
+            kind,
+            heading,
+            caption: caption.into(),
+            svg,
+        };
+        Ok([
+            drawn(
+                PlotKind::Loop,
+                "Loop",
+                LOOP_CAPTION,
+                measured_bode_svg(&plot)?,
+            ),
+            drawn(
+                PlotKind::LoopNyquist,
+                "Nyquist plot of the loop",
+                LOOP_NYQUIST_CAPTION,
+                measured_nyquist_svg(&plot)?,
+            ),
+            drawn(
+                PlotKind::Sensitivity,
+                "Sensitivities",
+                SENSITIVITY_CAPTION,
+                measured_sensitivity_svg(&sensitivities)?,
+            ),
+        ])
     }
 
     fn scheduling(&self) -> String {
@@ -165,10 +210,6 @@ impl<'a> BenchRun<'a> {
             &[("Missing ticks filled in".into(), filled)],
         )
     }
-}
-
-fn model_trace<'a>(name: &'a str, frf: &'a Frf, response: &'a [Complex<f64>]) -> Trace<'a> {
-    Trace::model(name, &frf.frequency_hz, response)
 }
 
 fn evidence(analysis: &Analysis) -> Vec<(String, String)> {

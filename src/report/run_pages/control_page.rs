@@ -1,7 +1,5 @@
 //! The report of a closed-loop run: its figures, its signals, its error spectrum and the loop by the model.
 
-use std::fmt::Write as _;
-
 use super::comparison::{responses_section, step_picture};
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
@@ -98,23 +96,16 @@ impl ControlReport<'_> {
         stem.to_string_lossy().into_owned()
     }
 
-    /// Controller, reference and operating point, and the time.
+    /// Controller, reference, and the conditions of the run.
     fn subtitle(&self) -> String {
         let (config, control) = (self.config, &self.config.control);
-        let mut text = format!(
-            "{} controller at {} Hz; {}",
+        format!(
+            "{} controller at {} Hz; {};\n{}",
             control.controller,
             config.servo.rate_hz,
-            control.reference.design().describe()
-        );
-        // Writing to a text does not fail.
-        if let Some(point_m) = config.plant.operating_point_m() {
-            let _ = write!(text, ";\noperating point {:.3} mm", point_m * 1e3);
-        }
-        if let Some(asymmetry) = config.plant.mass_asymmetry() {
-            let _ = write!(text, ", mass asymmetry {:.1} %", asymmetry * 100.0);
-        }
-        text + "; " + run_facts::metadata(self.recording, "started")
+            control.reference.design().describe(),
+            run_facts::conditions(self.recording, config)
+        )
     }
 
     fn heading(&self) -> String {

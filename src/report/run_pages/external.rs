@@ -6,8 +6,8 @@ use super::page::{delay_ms, named};
 use crate::experiment::ExternalAnalysis;
 use crate::identify::Unit;
 use crate::identify::modal::MeasurementChain;
-use crate::report::ReportError;
 use crate::report::html::{facts, section};
+use crate::report::{MagnitudeAxis, ReportError};
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +24,8 @@ pub struct ExternalRecord<'a> {
     pub rate_hz: f64,
     /// Number of samples.
     pub samples: usize,
+    /// Axis of the magnitudes.
+    pub magnitude_axis: MagnitudeAxis,
 }
 
 impl<'a> ExternalRecord<'a> {
@@ -51,6 +53,7 @@ impl<'a> ExternalRecord<'a> {
             residue_unit: format!("{output} per {input} and s^2"),
             frf: &analysis.frf,
             model: None,
+            magnitude_axis: self.magnitude_axis,
             chain: MeasurementChain::Input(analysis.input_path),
             fit,
             signs: None,

@@ -5,17 +5,16 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
+use super::loop_marks::{marks, peak_mark};
 use super::outputs::{OutputError, ResultFiles};
-use super::page::with_interval;
 use crate::control::ClosedLoop;
 use crate::control::measured::MeasuredMargins;
 use crate::experiment::LoopCurves;
 use crate::identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
 use crate::report::{
-    MeasuredLoopPlot, MeasuredMark, measured_bode_svg, measured_nyquist_svg,
+    MeasuredLoopPlot, MeasuredSensitivityPlot, measured_bode_svg, measured_nyquist_svg,
     measured_sensitivity_svg,
 };
-use crate::util::units::hz;
 
 /// A loop with a measured plant.
 #[derive(Clone)]
@@ -28,6 +27,8 @@ pub struct MeasuredLoopReport<'a> {
     pub curves: &'a LoopCurves,
     /// The margins of a stable loop.
     pub margins: Option<&'a MeasuredMargins>,
+    /// Least allowed modulus margin; 0 for none.
+    pub min_modulus_margin: f64,
     /// The loop of the model.
     pub model: &'a ClosedLoop,
 }
@@ -67,10 +68,11 @@ impl MeasuredLoopFiles {
         let model: Vec<Complex<f64>> = frequencies
             .map(|f| report.model.sampled_loop(TAU * f))
             .collect();
-        let marks = report.margins.map_or(Vec::new(), |m| marks(m, curves));
-        let peak = report.margins.map(|margins| peak_mark(margins, curves));
+        let loop_gain = &curves.loop_gain;
+        let marks = report.margins.map_or(Vec::new(), |m| marks(m, loop_gain));
+        let peak = report.margins.map(|margins| peak_mark(margins, loop_gain));
         let plot = MeasuredLoopPlot {
-            loop_gain: &curves.loop_gain,
+            loop_gain,
             model: &model,
             marks: &marks,
             modulus_margin: report.margins.map(|margins| margins.modulus_margin.value),
@@ -78,8 +80,15 @@ impl MeasuredLoopFiles {
             subtitle: &report.subtitle,
         };
         let (s, t) = (&curves.sensitivity, &curves.complementary);
-        let sensitivity_plot =
-            measured_sensitivity_svg(s, t, peak.as_ref(), &report.title, &report.subtitle)?;
+        let sensitivity_plot = measured_sensitivity_svg(&MeasuredSensitivityPlot {
+            sensitivity: s,
+            complementary: t,
+            model_loop: &model,
+            peak: peak.as_ref(),
+            min_modulus_margin: report.min_modulus_margin,
+            title: &report.title,
+            subtitle: &report.subtitle,
+        })?;
         Ok(MeasuredLoopFiles {
             loop_csv: results.write_frf("loop", &curves.loop_gain, RATIO)?,
             sensitivity_csv: results.write_frf("sensitivity", s, RATIO)?,
@@ -108,35 +117,5 @@ impl MeasuredLoopFiles {
             ("plot", &self.nyquist_plot),
             ("plot", &self.sensitivity_plot),
         ]
-    }
-}
-
-/// The crossover with its phase margin, and the peak of |S|.
-fn marks(margins: &MeasuredMargins, curves: &LoopCurves) -> Vec<MeasuredMark> {
-    let crossover = margins.crossover().map(|crossing| {
-        let margin_deg = crossing.phase_margin_deg;
-        let argument = (margin_deg.value - 180.0).to_radians();
-        MeasuredMark {
-            label: format!("phase margin {} deg", with_interval(margin_deg, 1.0)),
-            frequency_hz: hz(crossing.rad_s.value),
-            loop_gain: Complex::from_polar(1.0, argument),
-        }
-    });
-    let peak = peak_mark(margins, curves);
-    crossover.into_iter().chain([peak]).collect()
-}
-
-/// The peak of |S|.
-fn peak_mark(margins: &MeasuredMargins, curves: &LoopCurves) -> MeasuredMark {
-    let (frequency_hz, margin) = (hz(margins.sensitivity_peak_rad_s), margins.modulus_margin);
-    let response = &curves.loop_gain.response;
-    let after = curves
-        .loop_gain
-        .frequency_hz
-        .partition_point(|f| *f < frequency_hz);
-    MeasuredMark {
-        label: format!("modulus margin {}", with_interval(margin, 1.0)),
-        frequency_hz,
-        loop_gain: response[after.min(response.len() - 1)],
     }
 }

@@ -9,12 +9,14 @@
 //! ComparedRun (several runs) -> comparison (HTML)
 //! ```
 
+mod amplitude_page;
 mod basic_page;
 mod bench_run;
 mod comparison;
 mod control_page;
 mod distortion_plot;
 mod external;
+mod loop_marks;
 mod measured_loop;
 mod outputs;
 mod page;
@@ -22,13 +24,14 @@ mod plots;
 mod run_differences;
 mod run_facts;
 
-use nalgebra::Complex;
-
+use crate::experiment::ModelResponse;
 use crate::experiment::certificate::SignCheck;
 use crate::identify::modal::{MeasurementChain, ModalFit};
 use crate::identify::verdict::Verdict;
 use crate::identify::{Frf, Unit};
+use crate::report::MagnitudeAxis;
 
+pub use amplitude_page::AmplitudeFiles;
 pub use basic_page::BasicReport;
 pub use bench_run::BenchRun;
 pub use comparison::{ComparedRun, comparison_page};
@@ -59,8 +62,10 @@ pub struct RecordReport<'a> {
     pub residue_unit: String,
     /// The measured response.
     pub frf: &'a Frf,
-    /// The response of the model at the same frequencies, if there is a model.
-    pub model: Option<&'a [Complex<f64>]>,
+    /// The model, if there is one.
+    pub model: Option<&'a ModelResponse>,
+    /// Axis of the magnitudes.
+    pub magnitude_axis: MagnitudeAxis,
     /// The signal path between set-point and reading, without the mechanics.
     pub chain: MeasurementChain,
     /// The fitted modes, if the fit succeeded.

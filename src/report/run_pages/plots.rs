@@ -2,28 +2,35 @@
 
 use std::f64::consts::TAU;
 
+use nalgebra::Complex;
 use serde::Serialize;
 
 use super::RecordReport;
+use crate::control;
 use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use crate::identify::verdict::{self, UncertainZero};
 use crate::model::zeros::ModalTerm;
 use crate::report::{
-    OrderedMode, PoleZeroMap, ReportError, Trace, UncertainPoint, bode_svg, coherence_svg,
-    nyquist_svg, pole_zero_svg, stability_svg,
+    Identification, OrderedMode, PoleZeroMap, ReportError, StabilityChart, Trace, UncertainPoint,
+    coherence_svg, has_ambiguous_phase, identification_svg, nyquist_svg, pole_zero_svg,
+    stability_svg,
 };
 
 /// The part of a Nyquist plot around two close modes extends by this multiple of their distance to either side.
 const SURROUNDINGS_RATIO: f64 = 1.5;
 
-const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured with a band of two sigma, the model of the configuration \
-    and the fit of modes, where they exist. The line is faint where the band reaches zero magnitude.";
+const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured (wide line) with a band of two sigma, the model of the \
+    configuration and the fit of modes, where they exist. The line is faint where the band reaches zero magnitude.";
+const RESIDUAL_CAPTION: &str = " The residual is the distance of the measured response from the fit; noise alone leaves 95 % of it \
+    in the band.";
+const WRAPPED_CAPTION: &str = " The phase is not unwrapped, because neighbouring points differ by more than 120 degrees or are too \
+    noisy: whole turns are unknown.";
 const COHERENCE_CAPTION: &str = "The part of the output power that the input explains. Below: 1 − coherence, which is due to \
     noise, leakage and nonlinearity.";
 const NYQUIST_CAPTION: &str = "The response in the complex plane, where its magnitude exceeds two sigma; on the right the \
-    closest modes. Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency.";
+    closest modes. Arrows point to rising frequency; some frequencies are given. Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency.";
 const STABILITY_CAPTION: &str = "The modes at each model order that the fit visited. A mode of the stage persists from one \
-    order to the next; a mode of noise or of the search moves. The first orders are fitted with larger tolerances.";
+    order to the next; a mode of noise or of the search moves. Behind them: the measured magnitude. The first orders are fitted with larger tolerances.";
 
 /// The kinds of plots of an analysed record and of a closed-loop run. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
 /// distortion needs a multisine with lines that are not excited.
@@ -68,13 +75,14 @@ impl PlotKind {
     ];
 
     /// The kinds of an analysed record.
-    pub const ALL: [PlotKind; 8] = [
+    pub const ALL: [PlotKind; 9] = [
         PlotKind::Bode,
         PlotKind::Coherence,
         PlotKind::Nyquist,
         PlotKind::PoleZero,
         PlotKind::Stability,
         PlotKind::Loop,
+        PlotKind::LoopNyquist,
         PlotKind::Sensitivity,
         PlotKind::Linearity,
     ];
@@ -117,11 +125,11 @@ pub struct Plot {
 /// When a response is invalid, or drawing fails.
 pub fn plots(report: &RecordReport<'_>) -> Result<Vec<Plot>, ReportError> {
     let map = report.fit.map(|fit| pole_zero_map(report, fit));
-    let traces = Responses::of(report);
+    let curves = Curves::of(report);
     let mut plots = vec![
-        bode(report, &traces)?,
+        bode(report, &curves)?,
         coherence(report)?,
-        nyquist(report, &traces, map.as_ref())?,
+        nyquist(report, &curves, map.as_ref())?,
     ];
     if let (Some(fit), Some(map)) = (report.fit, &map) {
         plots.push(pole_zero(report, map)?);
@@ -131,46 +139,103 @@ pub fn plots(report: &RecordReport<'_>) -> Result<Vec<Plot>, ReportError> {
     Ok(plots)
 }
 
-/// The measured response, that of the model, and that of the fit.
-struct Responses<'a> {
-    report: &'a RecordReport<'a>,
-    fitted: Option<(String, Vec<nalgebra::Complex<f64>>)>,
+/// Model and fit on a fine grid, and the fit at the measured frequencies.
+struct Curves {
+    grid_hz: Vec<f64>,
+    model: Option<Vec<Complex<f64>>>,
+    fit: Option<FitCurve>,
 }
 
-impl<'a> Responses<'a> {
-    fn of(report: &'a RecordReport<'a>) -> Self {
-        let fitted = report.fit.map(|fit| {
-            let name = format!("fit of {} modes", fit.parameters.modes.len());
-            (name, fit.response(&report.chain, &report.frf.frequency_hz))
-        });
-        Self { report, fitted }
+struct FitCurve {
+    name: String,
+    on_grid: Vec<Complex<f64>>,
+    at_measured: Vec<Complex<f64>>,
+}
+
+impl Curves {
+    fn of(report: &RecordReport<'_>) -> Curves {
+        let grid_hz = fine_grid_hz(report);
+        Curves {
+            model: report.model.map(|model| model.at(&grid_hz)),
+            fit: report.fit.map(|fit| FitCurve::of(report, fit, &grid_hz)),
+            grid_hz,
+        }
     }
 
     fn traces(&self) -> Vec<Trace<'_>> {
-        let frequency_hz = &self.report.frf.frequency_hz;
-        let mut traces = vec![Trace::measured("measured", self.report.frf)];
-        if let Some(response) = self.report.model {
-            traces.push(Trace::model("model", frequency_hz, response));
-        }
-        if let Some((name, response)) = &self.fitted {
-            traces.push(Trace::model(name, frequency_hz, response));
-        }
-        traces
+        let model = self.model.iter();
+        let fit = self.fit.iter();
+        model
+            .map(|model| Trace::model("model", &self.grid_hz, model))
+            .chain(fit.map(|fit| Trace::fit(&fit.name, &self.grid_hz, &fit.on_grid)))
+            .collect()
     }
 }
 
-fn bode(report: &RecordReport<'_>, responses: &Responses<'_>) -> Result<Plot, ReportError> {
+impl FitCurve {
+    fn of(report: &RecordReport<'_>, fit: &ModalFit, grid_hz: &[f64]) -> FitCurve {
+        FitCurve {
+            name: format!("fit of {} modes", fit.parameters.modes.len()),
+            on_grid: fit.response(&report.chain, grid_hz),
+            at_measured: fit.response(&report.chain, &report.frf.frequency_hz),
+        }
+    }
+}
+
+/// Frequencies over the measured band, dense at the modes and at the zeros of the fit. A record may have a few lines only.
+fn fine_grid_hz(report: &RecordReport<'_>) -> Vec<f64> {
+    let frequency_hz = &report.frf.frequency_hz;
+    let ends = frequency_hz.first().zip(frequency_hz.last());
+    let Some((low_hz, high_hz)) = ends.filter(|(low, high)| low < high) else {
+        return frequency_hz.clone();
+    };
+    let mut features = report.fit.map_or(Vec::new(), features_of);
+    features.extend(report.model.iter().flat_map(|model| model.resonances()));
+    let grid_rad_s = control::grid(TAU * low_hz, TAU * high_hz, &features);
+    let mut grid_hz: Vec<f64> = grid_rad_s.into_iter().map(|w| w / TAU).collect();
+    // Two neighbours can be equal after the division by 2 pi.
+    grid_hz.dedup();
+    grid_hz
+}
+
+/// Magnitude in rad/s and damping ratio of the poles and zeros of a fit.
+fn features_of(fit: &ModalFit) -> Vec<(f64, f64)> {
+    let poles = fit.parameters.modes.iter();
+    let zeros = verdict::zeros(fit).unwrap_or_default();
+    poles
+        .map(|term| (term.omega_rad_s, term.damping_ratio))
+        .chain(zeros.iter().map(|zero| {
+            let magnitude_rad_s = zero.s.norm();
+            (magnitude_rad_s, (zero.s.re / magnitude_rad_s).abs())
+        }))
+        .filter(|(omega_rad_s, _)| *omega_rad_s > 0.0)
+        .collect()
+}
+
+fn bode(report: &RecordReport<'_>, curves: &Curves) -> Result<Plot, ReportError> {
+    let fit = curves.fit.as_ref();
+    let plot = Identification {
+        unit: report.unit,
+        magnitude_axis: report.magnitude_axis,
+        measured: report.frf,
+        curves: &curves.traces(),
+        fitted: fit.map(|fit| &fit.at_measured[..]),
+    };
     Ok(Plot {
         kind: PlotKind::Bode,
         heading: "Frequency response",
-        caption: BODE_CAPTION.into(),
-        svg: bode_svg(
-            report.unit,
-            &responses.traces(),
-            &report.title,
-            &report.subtitle,
-        )?,
+        caption: bode_caption(report),
+        svg: identification_svg(&plot, &report.title, &report.subtitle)?,
     })
+}
+
+fn bode_caption(report: &RecordReport<'_>) -> String {
+    let residual = report.fit.map_or("", |_| RESIDUAL_CAPTION);
+    let phase = match has_ambiguous_phase(report.frf) {
+        true => WRAPPED_CAPTION,
+        false => "",
+    };
+    [BODE_CAPTION, residual, phase].concat()
 }
 
 fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
@@ -184,11 +249,13 @@ fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
 
 fn nyquist(
     report: &RecordReport<'_>,
-    responses: &Responses<'_>,
+    curves: &Curves,
     map: Option<&PoleZeroMap>,
 ) -> Result<Plot, ReportError> {
     let part_hz = map.and_then(PoleZeroMap::close_pair).map(surroundings_hz);
-    let (traces, title, subtitle) = (responses.traces(), &report.title, &report.subtitle);
+    let mut traces = vec![Trace::measured("measured", report.frf)];
+    traces.extend(curves.traces());
+    let (title, subtitle) = (&report.title, &report.subtitle);
     Ok(Plot {
         kind: PlotKind::Nyquist,
         heading: "Nyquist plot",
@@ -253,12 +320,18 @@ fn stability(report: &RecordReport<'_>, fit: &ModalFit) -> Result<Plot, ReportEr
     let orders: Vec<Vec<OrderedMode>> = fit.orders.iter().map(ordered_modes).collect();
     let fit_modes = fit.parameters.modes.iter();
     let fit_hz: Vec<f64> = fit_modes.map(|term| term.omega_rad_s / TAU).collect();
-    let (title, subtitle) = (&report.title, &report.subtitle);
+    let chart = StabilityChart {
+        orders: &orders,
+        fit_hz: &fit_hz,
+        band_hz: fit.band_hz,
+        measured: report.frf,
+        unit: report.unit,
+    };
     Ok(Plot {
         kind: PlotKind::Stability,
         heading: "Stability chart",
         caption: STABILITY_CAPTION.into(),
-        svg: stability_svg(&orders, &fit_hz, fit.band_hz, title, subtitle)?,
+        svg: stability_svg(&chart, &report.title, &report.subtitle)?,
     })
 }
 

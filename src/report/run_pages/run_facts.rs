@@ -5,6 +5,7 @@ use crate::config::{Config, SettingDifference, changed_settings};
 use crate::experiment::{Description, Ending, TripSummary};
 use crate::recording::{Recording, event_text};
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
+use crate::report::plant_conditions;
 
 /// Entries of the recording's metadata that the page shows.
 const METADATA: [&str; 11] = [
@@ -29,6 +30,31 @@ const LONGEST_VALUE: usize = 80;
 /// An entry of the recording's metadata; empty if it is missing.
 pub(super) fn metadata<'a>(recording: &'a Recording, name: &str) -> &'a str {
     recording.metadata().get(name).map_or("", String::as_str)
+}
+
+/// Operating point and mass asymmetry of the plant, devices or simulation, and the time of the start.
+pub(super) fn conditions(recording: &Recording, config: &Config) -> String {
+    let parts = [
+        plant_conditions(&config.plant, &[]),
+        devices(recording),
+        metadata(recording, "started").to_string(),
+    ];
+    let parts = parts.into_iter().filter(|part| !part.is_empty());
+    parts.collect::<Vec<String>>().join("; ")
+}
+
+/// The devices that moved and measured the stage.
+fn devices(recording: &Recording) -> String {
+    const SIMULATED: &str = "simulated";
+    let (amplifier, probe) = (
+        metadata(recording, "amplifier"),
+        metadata(recording, "probe"),
+    );
+    match (amplifier, probe) {
+        ("", "") => String::new(),
+        (SIMULATED, SIMULATED) => "simulated stage".into(),
+        _ => format!("amplifier {amplifier}, probe {probe}"),
+    }
 }
 
 /// The name of the file.

@@ -1,0 +1,76 @@
+//! Options of pictures.
+
+use std::path::{Path, PathBuf};
+
+use super::columns::cannot_write;
+use super::error::CliError;
+use crate::report::{MagnitudeAxis, Picture, ReportError};
+use crate::util::atomic_file::write_atomic;
+
+/// How the responses of a run are drawn.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+pub(super) struct ResponseFigureOptions {
+    /// Draw magnitudes of responses in dB [default: on a logarithmic axis]
+    #[arg(long)]
+    db: bool,
+}
+
+impl ResponseFigureOptions {
+    pub fn magnitude_axis(self) -> MagnitudeAxis {
+        match self.db {
+            true => MagnitudeAxis::Decibels,
+            false => MagnitudeAxis::Logarithmic,
+        }
+    }
+}
+
+/// Where a command writes its picture.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub(super) struct PictureOptions {
+    /// Draw the result to this file as SVG
+    #[arg(long, value_name = "FILE")]
+    svg: Option<PathBuf>,
+    /// Draw the result to this file as an HTML page with cursor readout and zoom
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+}
+
+impl PictureOptions {
+    /// Writes the requested files and replaces existing ones. Without a file, nothing is drawn.
+    pub fn write(
+        &self,
+        picture: impl FnOnce() -> Result<Picture, ReportError>,
+    ) -> Result<(), CliError> {
+        if self.files().next().is_none() {
+            return Ok(());
+        }
+        let picture = picture().map_err(|error| CliError::Failed(error.to_string()))?;
+        if let Some(path) = &self.svg {
+            write(path, &picture.svg)?;
+        }
+        match &self.html {
+            Some(path) => write(path, &picture.html()),
+            None => Ok(()),
+        }
+    }
+
+    /// The files, as a line; empty without a file.
+    pub fn files_text(&self) -> String {
+        let files: Vec<String> = self
+            .files()
+            .map(|path| path.display().to_string())
+            .collect();
+        match files.is_empty() {
+            true => String::new(),
+            false => format!("picture in {}\n", files.join(" and ")),
+        }
+    }
+
+    fn files(&self) -> impl Iterator<Item = &PathBuf> {
+        self.svg.iter().chain(&self.html)
+    }
+}
+
+fn write(path: &Path, text: &str) -> Result<(), CliError> {
+    write_atomic(path, text).map_err(|error| cannot_write(path, &error))
+}

@@ -1,0 +1,136 @@
+//! The locus of zeros: where they lie in the complex plane as a setting varies, and their parts over the setting.
+
+use nalgebra::Complex;
+
+use super::{colour, setting_label};
+use crate::model::zeros::Locus;
+use crate::report::ReportError;
+use crate::report::chart::colours::{GREY, INK};
+use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::report::number::plain;
+
+const PLANE_HEIGHT: f64 = 420.0;
+const PARTS_HEIGHT: f64 = 260.0;
+/// Zeros beyond this multiple of the magnitude that 90 % of them do not exceed are not drawn: they pass through infinity.
+const FAR: f64 = 1.5;
+/// Values of the setting that are written at the first track.
+const LABELS: usize = 6;
+/// The real or the imaginary part of a zero.
+type Part = fn(Complex<f64>) -> f64;
+
+const NOWHERE: (f64, f64) = (f64::NAN, f64::NAN);
+
+/// The zeros in the complex plane, with the setting written at some places and its direction shown by arrows, and below the real and
+/// imaginary parts over the setting, as an SVG document.
+///
+/// # Errors
+/// When there are no zeros, or drawing fails.
+pub fn locus_svg(
+    locus: &Locus,
+    vary: &str,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    if locus.tracks.is_empty() {
+        return Err(ReportError::NoTrace);
+    }
+    let limit_rad_s = limit_rad_s(locus);
+    let near = |s: &Option<Complex<f64>>| s.filter(|s| s.norm() <= limit_rad_s);
+    let tracks: Vec<Vec<Option<Complex<f64>>>> = locus
+        .tracks
+        .iter()
+        .map(|track| track.iter().map(near).collect())
+        .collect();
+    let parts: [(&str, Part); 2] = [
+        ("Real part of s (rad/s)", |s| s.re),
+        ("Imaginary part of s (rad/s)", |s| s.im),
+    ];
+    let parts = parts.map(|(label, part)| over_setting(locus, &tracks, vary, label, part));
+    let rows = [
+        Row::new(PLANE_HEIGHT, vec![plane(locus, &tracks, limit_rad_s)]),
+        Row::new(PARTS_HEIGHT, parts.to_vec()),
+    ];
+    sheet_svg(title, subtitle, &rows)
+}
+
+fn limit_rad_s(locus: &Locus) -> f64 {
+    let all = locus.tracks.iter().flatten().flatten();
+    let mut magnitudes: Vec<f64> = all.map(|s| s.norm()).filter(|m| m.is_finite()).collect();
+    magnitudes.sort_by(f64::total_cmp);
+    let index = magnitudes.len() * 9 / 10;
+    magnitudes.get(index).map_or(0.0, |most| FAR * most)
+}
+
+fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) -> Chart {
+    let x = Scale::linear("Real part of s (rad/s)");
+    let y = Scale::linear("Imaginary part of s (rad/s)");
+    let mut chart = Chart::new("", x, y);
+    for (k, track) in tracks.iter().enumerate() {
+        let (name, pen) = (format!("zero {}", k + 1), Pen::solid(colour(k)));
+        let points = track.iter().map(|s| s.map_or(NOWHERE, |s| (s.re, s.im)));
+        chart = chart.directed(&name, pen, points.collect());
+        let ends = [track.iter().flatten().next(), track.iter().flatten().last()];
+        for (symbol, s) in [Symbol::Ring, Symbol::Dot].into_iter().zip(ends) {
+            if let Some(s) = s {
+                chart = chart.points("", colour(k), symbol, vec![(s.re, s.im)]);
+            }
+        }
+    }
+    chart = with_values(chart, locus, tracks);
+    let changes = locus.changes.iter().map(|change| change.s);
+    let near = changes.filter(|s| s.norm() <= limit_rad_s);
+    let places: Vec<(f64, f64)> = near.map(|s| (s.re, s.im)).collect();
+    let (first, last) = (locus.values[0], locus.values[locus.values.len() - 1]);
+    let [first, last] = [first, last].map(|value| plain(value, 6));
+    chart.heading = format!("From {first} (ring) to {last} (dot)");
+    match places.is_empty() {
+        true => chart,
+        false => chart.points("change of the kind", INK, Symbol::Cross, places),
+    }
+}
+
+/// Values of the setting at the track that moves most.
+fn with_values(mut chart: Chart, locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>]) -> Chart {
+    let length = |track: &[Option<Complex<f64>>]| -> f64 {
+        let steps = track
+            .windows(2)
+            .filter_map(|pair| Some((pair[1]? - pair[0]?).norm()));
+        steps.sum()
+    };
+    let longest = tracks.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
+    let Some(track) = longest else {
+        return chart;
+    };
+    let step = (locus.values.len() / LABELS).max(1);
+    for k in (0..locus.values.len()).step_by(step) {
+        if let Some(s) = track[k] {
+            let text = format!("{:.4}", locus.values[k]);
+            chart = chart.text((s.re, s.im), (34.0, 0.0), &text);
+        }
+    }
+    chart
+}
+
+fn over_setting(
+    locus: &Locus,
+    tracks: &[Vec<Option<Complex<f64>>>],
+    vary: &str,
+    label: &str,
+    part: Part,
+) -> Chart {
+    let ends = [locus.values[0], locus.values[locus.values.len() - 1]];
+    let zero = ends.map(|value| (value, 0.0)).to_vec();
+    let chart = Chart::new(
+        "",
+        Scale::linear(&setting_label(vary)),
+        Scale::linear(label),
+    )
+    .without_legend()
+    .line("", Pen::solid(GREY).thin(), zero);
+    tracks.iter().enumerate().fold(chart, |chart, (k, track)| {
+        let points = locus.values.iter().zip(track);
+        let points = points.map(|(value, s)| s.map_or(NOWHERE, |s| (*value, part(s))));
+        let name = format!("zero {}", k + 1);
+        chart.line(&name, Pen::solid(colour(k)), points.collect())
+    })
+}

@@ -1,0 +1,73 @@
+//! The response of the plant to a step of force, and the part of each mode.
+
+use super::colour;
+use crate::model::zeros::{StepFeatures, StepResponse};
+use crate::report::ReportError;
+use crate::report::chart::colours::{BLUE, GREY, INK};
+use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::util::numeric::linspace;
+
+const HEIGHT: f64 = 420.0;
+const MICRO: f64 = 1e6;
+const MILLI: f64 = 1e3;
+/// Number of times that are drawn.
+const TIMES: usize = 2000;
+
+/// The response up to a time and its beginning, in which reversals are counted, with its zero crossings and reversals, and thin the
+/// parts of the modes, as an SVG document.
+///
+/// # Errors
+/// When drawing fails.
+pub fn model_step_svg(
+    response: &StepResponse<'_>,
+    features: &StepFeatures,
+    end_s: f64,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    let mut charts = vec![chart("", response, features, end_s)];
+    if features.initial_s > 0.0 && features.initial_s < end_s {
+        charts.push(chart(
+            "The beginning",
+            response,
+            features,
+            features.initial_s,
+        ));
+    }
+    sheet_svg(title, subtitle, &[Row::new(HEIGHT, charts)])
+}
+
+fn chart(heading: &str, response: &StepResponse<'_>, features: &StepFeatures, end_s: f64) -> Chart {
+    let times_s: Vec<f64> = linspace(0.0, end_s, TIMES).collect();
+    let place = |t: f64| (MILLI * t, MICRO * response.position_m(t));
+    let parts: Vec<Vec<f64>> = times_s.iter().map(|t| response.parts_m(*t)).collect();
+    let x = Scale::linear("Time since the step (ms)");
+    let mut chart = Chart::new(heading, x, Scale::linear("Displacement (µm/N)")).line(
+        "",
+        Pen::solid(GREY).thin(),
+        vec![(0.0, 0.0), (MILLI * end_s, 0.0)],
+    );
+    for mode in 0..parts.first().map_or(0, Vec::len) {
+        let points = times_s.iter().zip(&parts);
+        let points = points.map(|(t, parts)| (MILLI * t, MICRO * parts[mode]));
+        let name = format!("part of mode {}", mode + 1);
+        chart = chart.line(
+            &name,
+            Pen::dashed(colour(mode + 1)).thin(),
+            points.collect(),
+        );
+    }
+    let whole = times_s.iter().map(|t| place(*t)).collect();
+    chart = chart.line("response", Pen::solid(BLUE).width(2.2), whole);
+    for (name, symbol, marked_s) in [
+        ("zero crossing", Symbol::Ring, &features.zero_crossings_s),
+        ("reversal", Symbol::Cross, &features.reversals_s),
+    ] {
+        let inside = marked_s.iter().filter(|t| **t <= end_s);
+        let places: Vec<(f64, f64)> = inside.map(|t| place(*t)).collect();
+        if !places.is_empty() {
+            chart = chart.points(name, INK, symbol, places);
+        }
+    }
+    chart
+}

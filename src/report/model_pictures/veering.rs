@@ -1,0 +1,53 @@
+//! Two close modes as a setting varies: their frequencies, and those of all modes.
+
+use super::{colour, setting_label};
+use crate::model::veering::report::VeeringReport;
+use crate::report::ReportError;
+use crate::report::chart::colours::INK;
+use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+
+const HEIGHT: f64 = 400.0;
+
+/// The frequencies of the two modes over the setting, with the place where they are closest, and beside it those of all modes, as an
+/// SVG document.
+///
+/// # Errors
+/// When there are no values, or drawing fails.
+pub fn veering_svg(
+    report: &VeeringReport,
+    vary: &str,
+    title: &str,
+    subtitle: &str,
+) -> Result<String, ReportError> {
+    if report.values.is_empty() {
+        return Err(ReportError::NoTrace);
+    }
+    let point = &report.point;
+    let pair = point.modes;
+    let modes = |chart: Chart, is_shown: &dyn Fn(usize) -> bool| {
+        let numbered = (1..).zip(&report.frequencies_hz);
+        let shown = numbered.filter(|(mode, _)| is_shown(*mode));
+        shown.fold(chart, |chart, (mode, frequencies_hz)| {
+            let points = report
+                .values
+                .iter()
+                .copied()
+                .zip(frequencies_hz.iter().copied());
+            let (name, pen) = (format!("mode {mode}"), Pen::solid(colour(mode - 1)));
+            chart.line(&name, pen, points.collect())
+        })
+    };
+    let closest = (point.value, point.frequency_hz);
+    let gap = format!("gap {:.3} Hz at {:.5}", point.gap_hz, point.value);
+    let close = modes(chart("The close modes", vary), &|mode| pair.contains(&mode));
+    let close = close
+        .points("closest approach", INK, Symbol::Cross, vec![closest])
+        .text(closest, (0.0, -18.0), &gap);
+    let all = modes(chart("All modes", vary), &|_| true);
+    sheet_svg(title, subtitle, &[Row::new(HEIGHT, vec![close, all])])
+}
+
+fn chart(heading: &str, vary: &str) -> Chart {
+    let y = Scale::linear("Natural frequency (Hz)");
+    Chart::new(heading, Scale::linear(&setting_label(vary)), y)
+}
