@@ -4,11 +4,15 @@ use core::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
+use super::outcome::Outcome;
+use super::run_options::exit;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
 use crate::config::Config;
 use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
-use crate::experiment::{AnalysisPhase, ReadSignals, analyse_opened, open_with_signals};
+use crate::experiment::{
+    AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
+};
 use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
@@ -65,6 +69,24 @@ pub(super) fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) ->
         progress.set(done, STEPS);
         ControlFlow::Continue(())
     }
+}
+
+/// The outcome of a run with its analysis.
+pub(super) fn outcome(run: &RunSummary, outputs: &AnalysisOutputs) -> Outcome {
+    match outputs.is_cancelled() {
+        true => Outcome::Failed,
+        false => exit(run),
+    }
+}
+
+/// A failed analysis of a run, with the state of its recording.
+pub(super) fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
+    let path = recording.display();
+    let state = match recording.exists() {
+        true => "is complete",
+        false => "was removed",
+    };
+    CliError::Failed(format!("{error}; the recording of the run {state}: {path}"))
 }
 
 /// Files, delay, modes, zeros and verdict.

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use serde::Serialize;
 
-use super::analysis_output::{self, open_analyse_and_write};
+use super::analysis_output::{self, analysis_failed, open_analyse_and_write, outcome};
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::figure_options::ResponseFigureOptions;
@@ -15,9 +15,9 @@ use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, close, exit, run_text};
+use super::run_options::{RunOptions, close, run_text};
 use super::table::{labelled, wrap};
-use super::until_decided::{self, SequentialOptions};
+use super::until_decided::{SequenceCommand, SequentialOptions};
 use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
 use crate::excitation::Extremes;
 use crate::experiment::sequential::first_shot_config;
@@ -34,11 +34,11 @@ use crate::util::quantity::Time;
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
-    pub(super) bench: BenchOptions,
+    bench: BenchOptions,
     #[command(flatten)]
     pub(super) run: RunOptions,
     #[command(flatten)]
-    pub(super) figures: ResponseFigureOptions,
+    figures: ResponseFigureOptions,
     /// Kind of excitation
     #[arg(long, value_name = "KIND", help = with_setting("Kind of excitation", "excitation.kind"))]
     excitation: Option<ExcitationKind>,
@@ -76,6 +76,14 @@ impl Args {
         let config = self.bench.load(Purpose::Chirp, &self.settings())?;
         self.refuse_unused(&config)?;
         self.band.shaped(config)
+    }
+
+    fn sequence(&self) -> SequenceCommand<'_> {
+        SequenceCommand {
+            bench: &self.bench,
+            run: &self.run,
+            magnitude_axis: self.figures.magnitude_axis(),
+        }
     }
 
     /// Refuses options of a chirp that have no effect on another kind of excitation.
@@ -139,7 +147,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         return Ok(Outcome::Done);
     }
     match max_motion_s {
-        Some(max_motion_s) => until_decided::measure(args, &base, max_motion_s),
+        Some(max_motion_s) => args.sequence().measure(&base, max_motion_s),
         None => measure(args, &config, expected),
     }
 }
@@ -163,14 +171,6 @@ fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, 
     let text = run_text(&report.run, config) + &analysis_output::text(&report.made);
     close(run, &report, args.bench.json, &text)?;
     Ok(outcome(&report.run, &report.made))
-}
-
-/// The outcome of a run with its analysis.
-pub(super) fn outcome(run: &RunSummary, outputs: &AnalysisOutputs) -> Outcome {
-    match outputs.is_cancelled() {
-        true => Outcome::Failed,
-        false => exit(run),
-    }
 }
 
 /// Analyses a run, if it is completed.
@@ -205,16 +205,6 @@ fn analysed(
     let outputs = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let outputs = outputs.unwrap_or_else(|| Ok(AnalysisOutputs::cancelled()));
     outputs.map_err(|error| analysis_failed(&error, path))
-}
-
-/// A failed analysis of a run, with the state of its recording.
-pub(super) fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
-    let path = recording.display();
-    let state = match recording.exists() {
-        true => "is complete",
-        false => "was removed",
-    };
-    CliError::Failed(format!("{error}; the recording of the run {state}: {path}"))
 }
 
 /// The plan of the run, printed before it starts.

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::chirp::{outcome, outputs};
+use super::analysis_output::outcome;
+use super::chirp::outputs;
 pub(super) use super::control_options::Args;
 use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
 use super::error::CliError;

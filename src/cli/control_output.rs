@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::analysis_failed;
+use super::analysis_output::analysis_failed;
 use super::error::CliError;
 use super::margins::text as margins_text;
 use super::output::warn;

@@ -6,7 +6,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::analysis_output;
-use super::chirp::{outcome, outputs};
+use super::analysis_output::outcome;
+use super::chirp::outputs;
 use super::error::CliError;
 use super::excitation_options::ExcitationOptions;
 use super::figure_options::ResponseFigureOptions;

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output;
-use super::chirp::{Args, analysis_failed, outcome};
+use super::analysis_output::{self, analysis_failed, outcome};
 use super::error::CliError;
+use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
-use super::run_options::{close, run_text};
+use super::run_options::{RunOptions, close, run_text};
 use super::table::wrap;
 use crate::config::Config;
 use crate::experiment::sequential::{
@@ -71,35 +71,48 @@ struct Report {
     made: AnalysisOutputs,
 }
 
-/// Makes the shots and writes the results of all of them beside the last recording.
-pub(super) fn measure(args: &Args, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
-    let setup = args.run.setup(&args.bench, base)?;
-    let json = args.bench.json;
-    let sequence = stop_on_signal(|stop| {
-        let limits = SequenceLimits { max_motion_s, stop };
-        shots(base, limits, setup, json)
-    });
-    let mut sequence =
-        sequence.map_err(|error: RunError| CliError::Failed(error.to_string()))??;
-    let summary = RunSummary::of(&mut sequence.last)?;
-    let path = sequence.last.path.clone();
-    let made = outputs(&sequence, &path, args.figures.magnitude_axis())
-        .map_err(|error| analysis_failed(&error, &path))?;
-    let report = Report {
-        run: summary,
-        motion_s: sequence.motion_s(),
-        shots: sequence.shots,
-        sequence: sequence.end,
-        made,
-    };
-    let text = run_text(&report.run, &sequence.config)
-        + &wrap(&end_text(report.sequence, report.motion_s), 2)
-        + &analysis_output::text(&report.made);
-    close(sequence.last, &report, json, &text)?;
-    Ok(match report.sequence {
-        SequenceEnd::Interrupted => Outcome::Failed,
-        _ => outcome(&report.run, &report.made),
-    })
+/// What a sequence needs besides the configuration.
+#[derive(Clone, Copy)]
+pub(super) struct SequenceCommand<'a> {
+    pub(super) bench: &'a BenchOptions,
+    pub(super) run: &'a RunOptions,
+    pub(super) magnitude_axis: MagnitudeAxis,
+}
+
+impl SequenceCommand<'_> {
+    /// Makes the shots and writes the results of all of them beside the last recording.
+    pub(super) fn measure(&self, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
+        let setup = self.run.setup(self.bench, base)?;
+        let json = self.bench.json;
+        let sequence = stop_on_signal(|stop| {
+            let limits = SequenceLimits { max_motion_s, stop };
+            shots(base, limits, setup, json)
+        });
+        let failed = |error: RunError| CliError::Failed(error.to_string());
+        self.report(sequence.map_err(failed)??)
+    }
+
+    fn report(&self, mut sequence: Sequence) -> Result<Outcome, CliError> {
+        let summary = RunSummary::of(&mut sequence.last)?;
+        let path = sequence.last.path.clone();
+        let made = outputs(&sequence, &path, self.magnitude_axis);
+        let made = made.map_err(|error| analysis_failed(&error, &path))?;
+        let report = Report {
+            run: summary,
+            motion_s: sequence.motion_s(),
+            shots: sequence.shots,
+            sequence: sequence.end,
+            made,
+        };
+        let text = run_text(&report.run, &sequence.config)
+            + &wrap(&end_text(report.sequence, report.motion_s), 2)
+            + &analysis_output::text(&report.made);
+        close(sequence.last, &report, self.bench.json, &text)?;
+        Ok(match report.sequence {
+            SequenceEnd::Interrupted => Outcome::Failed,
+            _ => outcome(&report.run, &report.made),
+        })
+    }
 }
 
 fn shots(

@@ -247,7 +247,7 @@ impl Axis {
 fn abscissa(number: f64) -> String {
     let exponential = |decimals: usize| format!("{number:.decimals$E}");
     let decimal = |decimals: usize| format!("{number:.decimals$}");
-    let candidates = (1..ABSCISSA).flat_map(|decimals| [exponential(decimals), decimal(decimals)]);
+    let candidates = (1..ABSCISSA).flat_map(|decimals| [decimal(decimals), exponential(decimals)]);
     let error = |text: &String| {
         let read: f64 = text.parse().unwrap_or(f64::INFINITY);
         (read - number).abs()

@@ -37,8 +37,8 @@ pub(crate) fn by_denominator(mode: &ModalTerm, s: Complex<f64>) -> Complex<f64> 
 }
 
 impl ModalFit {
-    /// dH/dtheta at each frequency in hertz, of the free parameters in the order of the covariance. Sampling is neglected: it changes
-    /// the derivatives by about a thousandth.
+    /// dH/dtheta at each frequency in hertz, of the free parameters in the order of the covariance. Sampling is neglected, and the
+    /// path is that of a stiff mode: both change the derivatives by about a thousandth.
     pub(crate) fn sensitivities(
         &self,
         chain: &MeasurementChain,
@@ -100,7 +100,7 @@ mod tests {
         let frequency_hz = [5.0, 29.9, 31.0, 60.0, 79.9, 150.0];
         let sensitivities = fit.sensitivities(&chain, &frequency_hz);
         // About the cube root of the rounding, relative to each parameter: w1, zeta1, r1, w2, zeta2, r2, R, tau.
-        let steps = [2e-3, 1e-7, 5e-6, 5e-3, 4e-8, 3e-7, 1e-13, 2e-8];
+        let steps = [1e-3, 1e-7, 5e-6, 2e-3, 4e-8, 3e-7, 1e-13, 2e-8];
         for (i, step) in steps.into_iter().enumerate() {
             let moved = |sign: f64| {
                 let mut difference = [0.0; 8];
@@ -116,8 +116,9 @@ mod tests {
             let quotients = quotients.map(|(up, down)| (up - down) / (2.0 * step));
             for (row, quotient) in sensitivities.iter().zip(quotients) {
                 let error = (row[i] - quotient).norm() / quotient.norm();
-                // The second-order error of the quotient at 0.1 Hz from a resonance: (step/half-width)^2 < 1e-4.
-                assert!(error < 1e-3, "parameter {i}: {error}");
+                // The path is that of a mode at 1e6 rad/s with damping 1, whose phase at 150 Hz is 2 x 942/1e6 = 1.9e-3; the quotient
+                // adds (step/half-width)^2 < 1e-4 at 0.1 Hz from a resonance.
+                assert!(error < 2e-3, "parameter {i}: {error}");
             }
         }
     }
