@@ -25,7 +25,7 @@ impl DescriptionOptions {
             note: self.note.clone(),
             operator: match is_started_by_daemon() {
                 true => self.operator.clone(),
-                false => Some(self.operator()),
+                false => self.operator.clone().or_else(user),
             },
             invocation: Some(Invocation::new(arguments(), profile)),
         }
@@ -43,7 +43,8 @@ impl DescriptionOptions {
 
     /// The operator, by default the user of this process.
     pub fn operator(&self) -> String {
-        self.operator.clone().unwrap_or_else(user)
+        let operator = self.operator.clone().or_else(user);
+        operator.unwrap_or_else(|| "unknown".into())
     }
 }
 
@@ -53,9 +54,8 @@ fn arguments() -> impl Iterator<Item = String> {
     arguments.map(|argument| argument.to_string_lossy().into_owned())
 }
 
-/// The user of this process.
-fn user() -> String {
+/// The user of this process, if it is known.
+fn user() -> Option<String> {
     let user = std::env::var("USER").ok();
-    let user = user.and_then(|user| operator_name(&user).ok());
-    user.unwrap_or_else(|| "unknown".into())
+    user.and_then(|user| operator_name(&user).ok())
 }

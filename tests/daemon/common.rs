@@ -109,9 +109,7 @@ impl Daemon {
     /// `bench` with this daemon as that of the machine.
     pub fn bench(&self, folder: &Path, arguments: &[&str]) -> Command {
         let mut command = bench_in(folder, arguments);
-        command
-            .env("BENCH_SOCKET", self.socket())
-            .env("USER", "tester");
+        command.env("BENCH_SOCKET", self.socket());
         command
     }
 
@@ -252,6 +250,7 @@ pub fn bench_in(folder: &Path, arguments: &[&str]) -> Command {
         .args(arguments)
         .current_dir(folder)
         .env("BENCH_SOCKET", "/nonexistent/bench.sock")
+        .env("USER", "tester")
         .env_remove("BENCH_LOG")
         .stdin(Stdio::null());
     command

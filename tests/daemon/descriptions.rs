@@ -48,7 +48,7 @@ fn run_over_http_is_recorded_with_its_name_and_the_operator_of_the_lease() {
 fn command_at_a_terminal_passes_name_note_and_operator_to_the_daemon() {
     let daemon = Daemon::start();
     let here = tempfile::tempdir().expect("a folder");
-    let url = format!("http://{}", daemon.address());
+    let url = daemon.url();
     for connect in [daemon.socket().display().to_string(), url] {
         let given = [
             "--name",
