@@ -63,7 +63,7 @@ pub(super) struct Args {
     /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
     #[arg(long)]
     simulate: bool,
-    /// Make one chirp at each point, as configured in [chirp], in place of short chirps until the verdict is certain
+    /// Make one chirp at each point, as configured (chirp.duration_s, ...), in place of short chirps until the verdict is certain
     #[arg(long)]
     single_chirp: bool,
     /// Keep the recording of each chirp as well, up to 9 MB each

@@ -29,11 +29,16 @@ pub(crate) fn merged(data: &[FrfDatum], model: &ModalParameters) -> Vec<FrfDatum
 }
 
 fn max_width_hz(datum: &FrfDatum, model: &ModalParameters) -> f64 {
-    let s = Complex::new(0.0, datum.omega_rad_s());
-    let distances = model.modes.iter().map(|mode| (s - pole(mode)).norm());
-    let nearest = distances.fold(f64::INFINITY, f64::min);
+    let nearest = nearest_pole_rad_s(datum, model);
     let by_pole_hz = POLE_DISTANCE_RATIO * nearest / (2.0 * std::f64::consts::PI);
     by_pole_hz.min(FREQUENCY_RATIO * datum.frequency_hz)
+}
+
+/// Distance of the nearest pole from a datum on the imaginary axis, in rad/s; infinite without modes.
+pub(super) fn nearest_pole_rad_s(datum: &FrfDatum, model: &ModalParameters) -> f64 {
+    let s = Complex::new(0.0, datum.omega_rad_s());
+    let distances = model.modes.iter().map(|mode| (s - pole(mode)).norm());
+    distances.fold(f64::INFINITY, f64::min)
 }
 
 /// The pole of a mode above the real axis; on the axis beyond critical damping.

@@ -21,6 +21,7 @@ mod parameters;
 mod peaks;
 mod prune;
 mod refine;
+mod residual_noise;
 mod search;
 mod sensitivity;
 mod solution;
@@ -36,16 +37,14 @@ pub(crate) use parameters::Parameter;
 pub use search::ModelOrder;
 
 use crate::identify::FrfDatum;
-use crate::identify::mean::mean_around;
 pub use crate::identify::{Estimate, SIGMAS_95};
 pub(crate) use merge::merged;
 use prune::pruned;
 use refine::refine;
+use residual_noise::with_residual_noise;
 pub(crate) use sensitivity::{by_denominator, mechanics_derivative};
 use solution::{Problem, Solution};
 
-/// Data to either side over which the noise is averaged: 64 degrees of freedom a side.
-const NOISE_REACH: usize = 32;
 /// Progress at the end of the search; the rest is the final fit.
 const SEARCH_PROGRESS: f64 = 0.8;
 
@@ -118,39 +117,28 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
 /// The fit of given modes with its covariance; the residual counts as noise.
 fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
     let data = problem.data;
-    let parameters = start.free().len();
+    let free = start.free().len();
+    let undetermined = FitError::Undetermined {
+        modes: start.modes.len(),
+    };
     let by_estimator = Solution::new(problem, start.clone());
-    let noisy = &with_residual_noise(&by_estimator, data, parameters);
-    let solution = refine(
-        Problem {
-            data: noisy,
-            ..problem
-        },
-        start,
-        0.0,
-    );
-    let modes = solution.parameters.modes.len();
-    let undetermined = FitError::Undetermined { modes };
-    Ok(ModalFit {
-        covariance: solution.covariance(noisy).ok_or(undetermined)?,
-        chi2_per_freedom: by_estimator.chi2 / (2 * data.len() - parameters) as f64,
-        orders: Vec::new(),
-        parameters: solution.parameters,
-        band_hz: (0.0, 0.0),
-    })
-}
-
-/// The data with the residual of a solution as their noise: the mean of |e|^2/v around each.
-fn with_residual_noise(solution: &Solution, data: &[FrfDatum], parameters: usize) -> Vec<FrfDatum> {
-    let freedom = 1.0 - parameters as f64 / (2 * data.len()) as f64;
-    let residual = solution.residual.iter().zip(data);
-    let ratio: Vec<f64> = residual
-        .map(|(e, datum)| e.norm_sqr() / datum.variance / freedom)
-        .collect();
-    let data = data.iter().enumerate();
-    data.map(|(b, datum)| FrfDatum {
-        variance: datum.variance * mean_around(&ratio, b, NOISE_REACH),
-        ..*datum
-    })
-    .collect()
+    let chi2_per_freedom = by_estimator.chi2 / (2 * data.len() - free) as f64;
+    let fit = |solution: &Solution, data: &[FrfDatum]| {
+        Some(ModalFit {
+            covariance: solution.covariance(data)?,
+            chi2_per_freedom,
+            orders: Vec::new(),
+            parameters: solution.parameters.clone(),
+            band_hz: (0.0, 0.0),
+        })
+    };
+    let Some(first) = fit(&by_estimator, data) else {
+        return Err(undetermined);
+    };
+    let noisy = &with_residual_noise(problem, &first, &by_estimator.residual);
+    let problem = Problem {
+        data: noisy,
+        ..problem
+    };
+    fit(&refine(problem, start, 0.0), noisy).ok_or(undetermined)
 }
