@@ -5,43 +5,17 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bench::config::Config;
-use bench::experiment::sequential::{
-    Sequence, SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
-};
-use bench::experiment::{Plan, Runner, Setup, close};
+use bench::experiment::sequential::{SequenceEnd, ShotSummary, default_max_motion_s};
 use bench::identify::verdict::{Cnmp, MAX_LOOKS};
 use bench::recording::Recording;
 use bench_test_support::identified::{config, truth};
 use bench_test_support::program::{Bench, near, number};
+use bench_test_support::sequences::{decided, sequence};
 
 fn settings(more: &[&str]) -> Config {
     let rate = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
     let sets = rate.iter().chain(more).map(|set| set.to_string());
     config(&sets.collect::<Vec<String>>())
-}
-
-/// A sequence whose shots are given to `watch`, and the plans of its runs.
-fn sequence(
-    config: &Config,
-    folder: &Path,
-    max_motion_s: f64,
-    watch: impl Fn(&ShotSummary, &AtomicBool),
-) -> (Sequence, Vec<Plan>) {
-    let runner = Runner::new(Setup::simulated(folder.into()));
-    let mut plans = Vec::new();
-    let mut make_run = |plan: &Plan| {
-        plans.push(plan.clone());
-        runner.run(plan, "shot")
-    };
-    let stop = AtomicBool::new(false);
-    let limits = SequenceLimits {
-        max_motion_s,
-        stop: &stop,
-    };
-    let sequence = until_decided(config, limits, &mut make_run, &mut |shot| {
-        watch(shot, &stop)
-    });
-    (sequence.expect("shots"), plans)
 }
 
 fn recordings(folder: &Path) -> Vec<PathBuf> {
@@ -66,16 +40,14 @@ fn shots_stay_within_travel_current_and_motion() {
     let config = settings(&HARD);
     let folder = tempfile::tempdir().expect("a folder");
     let limit_s = default_max_motion_s(&config).expect("a model");
-    let (sequence, plans) = sequence(&config, folder.path(), limit_s, |_, _| {});
-    assert!((2..=MAX_LOOKS).contains(&plans.len()), "{}", plans.len());
+    let ended = sequence(&config, folder.path(), limit_s, |_, _| {});
+    let shots = ended.shots.len();
+    assert!((2..=MAX_LOOKS).contains(&shots), "{shots}");
     let is_detected = truth(&config) > 0;
-    assert_eq!(
-        sequence.shots.last().expect("a shot").cnmp == Cnmp::Detected,
-        is_detected
-    );
-    let motion_s = sequence.motion_s();
+    let last = ended.shots.last().expect("a shot");
+    assert_eq!(last.cnmp == Cnmp::Detected, is_detected);
+    let motion_s = ended.motion_s;
     assert!(motion_s > 3.0 && motion_s <= limit_s, "{motion_s}");
-    close(sequence.last, &"end").expect("a good disk");
     // A third of the soft limit and six standard deviations of the probe; half of the permitted current: sqrt(2) 26 N / 11.12 N/A.
     let travel_m = 0.0009 / 3.0 + 6.0 * 8e-6;
     let current_a = 0.5 * std::f64::consts::SQRT_2 * 26.0 / 11.12;
@@ -97,12 +69,11 @@ fn shots_stay_within_travel_current_and_motion() {
 
 #[test]
 fn ends_after_two_shots_where_no_motion_decides() {
-    let config = settings(&["plant.operating_point_m=0"]);
-    let folder = tempfile::tempdir().expect("a folder");
-    let limit_s = default_max_motion_s(&config).expect("a model");
-    let (sequence, plans) = sequence(&config, folder.path(), limit_s, |_, _| {});
-    assert_eq!((sequence.end, plans.len()), (SequenceEnd::Undecidable, 2));
-    close(sequence.last, &"end").expect("a good disk");
+    let ended = decided(&settings(&["plant.operating_point_m=0"]));
+    assert_eq!(
+        (ended.end, ended.shots.len()),
+        (SequenceEnd::Undecidable, 2)
+    );
 }
 
 #[test]
@@ -111,9 +82,11 @@ fn no_shot_begins_after_a_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let limit_s = default_max_motion_s(&config).expect("a model");
     let stops = |_: &ShotSummary, stop: &AtomicBool| stop.store(true, Ordering::Relaxed);
-    let (sequence, plans) = sequence(&config, folder.path(), limit_s, stops);
-    assert_eq!((sequence.end, plans.len()), (SequenceEnd::Interrupted, 1));
-    close(sequence.last, &"end").expect("a good disk");
+    let ended = sequence(&config, folder.path(), limit_s, stops);
+    assert_eq!(
+        (ended.end, ended.shots.len()),
+        (SequenceEnd::Interrupted, 1)
+    );
     let recording = Recording::open(&recordings(folder.path())[0]).expect("a recording");
     assert!(!recording.truncated());
 }
@@ -122,17 +95,16 @@ fn no_shot_begins_after_a_stop() {
 fn sequence_keeps_to_its_limit_of_motion() {
     let config = settings(&HARD);
     let folder = tempfile::tempdir().expect("a folder");
-    let (sequence, _) = sequence(&config, folder.path(), 4.2, |_, _| {});
-    assert!(sequence.motion_s() <= 4.2 && sequence.motion_s() > 2.0);
+    let ended = sequence(&config, folder.path(), 4.2, |_, _| {});
+    assert!(ended.motion_s <= 4.2 && ended.motion_s > 2.0);
     assert!(
         matches!(
-            sequence.end,
+            ended.end,
             SequenceEnd::LimitReached | SequenceEnd::NeedsMoreMotion { .. }
         ),
         "{:?}",
-        sequence.end
+        ended.end
     );
-    close(sequence.last, &"end").expect("a good disk");
 }
 
 #[test]

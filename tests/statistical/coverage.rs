@@ -4,17 +4,15 @@
 //! By default a few cells with few seeds. `BENCH_COVERAGE_SEEDS=200 cargo test --features statistical --test statistical coverage --
 //! --nocapture` measures all cells and prints the table.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-
 use bench::config::{Config, Purpose, Source, load};
-use bench::experiment::sequential::{SequenceLimits, default_max_motion_s, until_decided};
-use bench::experiment::{Analysis, Plan, Runner, Setup, close};
+use bench::experiment::{Analysis, Plan};
 use bench::identify::Estimate;
 use bench::identify::verdict::zeros;
 use bench::model::plant;
 use bench::model::zeros::damped_zeros;
 use bench_test_support::identified::{model, stands_for};
+use bench_test_support::seeds::over_seeds;
+use bench_test_support::sequences::decided;
 use bench_test_support::simulated::analysed;
 use nalgebra::Complex;
 
@@ -217,7 +215,7 @@ impl Cell {
                 let plan = Plan::control(config.clone()).expect("a plan");
                 analysed(&plan, &plan.config.clone()).expect("an analysis")
             }
-            Run::Sequential => sequential(config),
+            Run::Sequential => decided(config).analysis,
         }
     }
 
@@ -272,42 +270,16 @@ fn complex_zeros(config: &Config) -> Vec<Complex<f64>> {
     zeros.filter(|s| s.im > 0.0).collect()
 }
 
-fn sequential(config: &Config) -> Analysis {
-    let folder = tempfile::tempdir().expect("a folder");
-    let runner = Runner::new(Setup::simulated(folder.path().into()));
-    let mut make_run = |plan: &Plan| runner.run(plan, "shot");
-    let stop = AtomicBool::new(false);
-    let limits = SequenceLimits {
-        max_motion_s: default_max_motion_s(config).expect("a model"),
-        stop: &stop,
-    };
-    let sequence = until_decided(config, limits, &mut make_run, &mut |_| {}).expect("shots");
-    close(sequence.last, &"end").expect("a good disk");
-    sequence.analysis.expect("an analysis")
-}
-
-/// The counts of a cell over some seeds, on two threads.
+/// The counts of a cell over some seeds.
 fn counts(cell: &Cell, seeds: u64) -> Counts {
-    let (next, sum) = (AtomicUsize::new(0), Mutex::new(Counts::default()));
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                loop {
-                    let seed = next.fetch_add(1, Ordering::Relaxed) as u64;
-                    if seed >= seeds {
-                        return;
-                    }
-                    let one = cell.counts(1 + seed);
-                    let mut sum = sum.lock().expect("no panic");
-                    for (sum, one) in sum.iter_mut().zip(one) {
-                        sum.within += one.within;
-                        sum.all += one.all;
-                    }
-                }
-            });
+    let mut sum = Counts::default();
+    for counts in over_seeds(1..seeds + 1, |seed| cell.counts(seed)) {
+        for (sum, one) in sum.iter_mut().zip(counts) {
+            sum.within += one.within;
+            sum.all += one.all;
         }
-    });
-    sum.into_inner().expect("no panic")
+    }
+    sum
 }
 
 #[test]

@@ -1,12 +1,10 @@
 //! Bias and coverage of the default estimator over many seeds, on the default simulated stage at 5 kHz with noise, floor vibration,
 //! quantisation and unmodelled modes. The reference response is computed independently of the library.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use bench::config::{Config, Source, load};
 use bench::identify::{Frf, response};
 
+use bench_test_support::seeds::over_seeds;
 use bench_test_support::stage::SampledPlant;
 use bench_test_support::unrecorded;
 
@@ -14,7 +12,6 @@ const BAND_HZ: (f64, f64) = (0.5, 450.0);
 /// A run takes about 1/3 s on one core, 200 runs 30 to 60 s on two.
 const SEEDS: u64 = 200;
 const SEEDS_OF_BIAS: usize = 50;
-const WORKERS: usize = 2;
 
 fn config(sets: &[&str]) -> Config {
     load(&Source {
@@ -27,23 +24,6 @@ fn config(sets: &[&str]) -> Config {
 fn estimated(sets: &[&str]) -> Frf {
     let config = config(sets);
     response(&unrecorded::chirp(&config), BAND_HZ, &config.identify).expect("a response")
-}
-
-/// The results of `of` for the seeds 1 to [`SEEDS`], in order.
-fn over_seeds<T: Send>(of: impl Fn(u64) -> T + Sync) -> Vec<T> {
-    let (next, all) = (AtomicU64::new(1), Mutex::new(Vec::new()));
-    let work = || {
-        while let Some(seed) =
-            Some(next.fetch_add(1, Ordering::Relaxed)).filter(|seed| *seed <= SEEDS)
-        {
-            let one = of(seed);
-            all.lock().unwrap().push((seed, one));
-        }
-    };
-    std::thread::scope(|scope| (0..WORKERS).for_each(|_| drop(scope.spawn(work))));
-    let mut all = all.into_inner().unwrap();
-    all.sort_by_key(|(seed, _)| *seed);
-    all.into_iter().map(|(_, one)| one).collect()
 }
 
 /// Errors at one frequency: relative error of the magnitude, error of the phase in degrees, and both divided by their sigmas.
@@ -113,7 +93,9 @@ fn noiseless_estimate_is_within_0_2_percent_and_0_1_degrees() {
 fn bias_is_below_0_2_percent_and_0_1_degrees_and_95_percent_intervals_are_valid() {
     let plant = SampledPlant::stage();
     let frequency_hz = estimated(&[]).frequency_hz;
-    let all = over_seeds(|seed| errors(&estimated(&[&format!("sim.seed={seed}")]), &plant));
+    let all = over_seeds(1..SEEDS + 1, |seed| {
+        errors(&estimated(&[&format!("sim.seed={seed}")]), &plant)
+    });
     assert!(all.iter().all(|errors| errors.len() == frequency_hz.len()));
     assert_unbiased(&frequency_hz, &all[..SEEDS_OF_BIAS]);
     assert_covered(&frequency_hz, &all);

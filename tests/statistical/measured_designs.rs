@@ -2,9 +2,6 @@
 //!
 //! `BENCH_TUNE_SEEDS=50` designs for 50 seeds; without it for a few.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use bench::config::Config;
 use bench::control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MeasuredPlant, NamedPlant, Requirements,
@@ -13,9 +10,9 @@ use bench::control::tuning::{
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
 use bench::util::progress::Progress;
 use bench_test_support::chirp_source::{config_at, measured, true_loop};
+use bench_test_support::seeds::over_seeds;
 
 const DEFAULT_SEEDS: u64 = 2;
-const WORKERS: usize = 2;
 /// Operating points in % of the beam length.
 const POINTS: [f64; 5] = [0.0, 2.0, 4.0, 6.0, 8.0];
 /// 60 s of sweep in place of 110 s.
@@ -94,29 +91,13 @@ fn of_seed(seed: u64) -> Attained {
     attained
 }
 
-fn over_seeds(seeds: u64) -> Vec<Attained> {
-    let (next, all) = (AtomicU64::new(1), Mutex::new(Vec::new()));
-    let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed > seeds {
-                break;
-            }
-            let one = of_seed(seed);
-            all.lock().expect("no panic").push(one);
-        }
-    };
-    std::thread::scope(|scope| (0..WORKERS).for_each(|_| drop(scope.spawn(work))));
-    all.into_inner().expect("no panic")
-}
-
 #[test]
 fn designs_from_five_noisy_chirps_are_stable_on_the_true_plants_and_near_the_design_by_the_model() {
     let seeds = std::env::var("BENCH_TUNE_SEEDS").ok();
     let seeds = seeds.map_or(DEFAULT_SEEDS, |text| text.parse().expect("a number"));
     let model_rad_s = by_model().attained;
     println!("by the model: {model_rad_s} rad/s");
-    let all = over_seeds(seeds);
+    let all = over_seeds(1..seeds + 1, of_seed);
     assert_eq!(all.len() as u64, seeds);
     for one in &all {
         let ratio = one.slope_rad_s / model_rad_s;

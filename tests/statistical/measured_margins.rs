@@ -1,18 +1,15 @@
 //! Coverage of the 95 % intervals of margins from measured responses.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use bench::config::{Config, Source, load};
 use bench::control::{ClosedLoop, ControllerText};
 use bench::experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
 use bench::identify::{Estimate, response};
 use bench::model::plant::LoopPlant;
 use bench::rig::simulated;
+use bench_test_support::seeds::over_seeds;
 use bench_test_support::unrecorded;
 
 const SEEDS: u64 = 200;
-const WORKERS: usize = 2;
 /// 60 s of sweep: a run takes about 1/5 s on one core.
 const SETS: [&str; 3] = [
     "chirp.duration_s=60",
@@ -108,22 +105,6 @@ fn of_seed(seed: u64, controller: &str) -> Vec<Compared> {
     compared(&found, &simulated_loop(&config))
 }
 
-fn over_seeds(controller: &str) -> Vec<Vec<Compared>> {
-    let (next, all) = (AtomicU64::new(0), Mutex::new(Vec::new()));
-    let work = || {
-        loop {
-            let seed = next.fetch_add(1, Ordering::Relaxed);
-            if seed >= SEEDS {
-                break;
-            }
-            let one = of_seed(seed, controller);
-            all.lock().expect("no panic").push(one);
-        }
-    };
-    std::thread::scope(|scope| (0..WORKERS).for_each(|_| drop(scope.spawn(work))));
-    all.into_inner().expect("no panic")
-}
-
 /// The number of seeds whose interval contains the truth. Prints mean and RMS of the errors in sigmas.
 fn covered(all: &[Vec<Compared>], k: usize) -> u64 {
     let error = |one: &Vec<Compared>| {
@@ -145,7 +126,7 @@ fn covered(all: &[Vec<Compared>], k: usize) -> u64 {
 
 #[test]
 fn intervals_of_margins_contain_the_truth_in_93_to_97_percent_of_the_seeds() {
-    let all = over_seeds("fast");
+    let all = over_seeds(0..SEEDS, |seed| of_seed(seed, "fast"));
     let quantities = all[0].len();
     let covered: Vec<u64> = (0..quantities).map(|k| covered(&all, k)).collect();
     // Expected: 190 +- 3.1 of 200 for each; 2.3 standard deviations for one of seven.

@@ -1,31 +1,9 @@
 //! Modes R, u and v of the simulated stage with noise, quantisation and unmodelled modes.
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use bench::config::{Source, UnmodelledMode, load};
 use bench::experiment::Analysis;
 use bench::identify::modal::Estimate;
 use bench_test_support::identified::{Truth, analysed, config, model, stands_for};
-
-/// The analyses of the seeds 0 to `count` - 1, on two threads, in any order.
-fn analyses_of_seeds(count: u64, of: impl Fn(u64) -> Analysis + Sync) -> Vec<Analysis> {
-    let (next, all) = (AtomicU64::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                loop {
-                    let seed = next.fetch_add(1, Ordering::Relaxed);
-                    if seed >= count {
-                        break;
-                    }
-                    let analysis = of(seed);
-                    all.lock().expect("no panic").push(analysis);
-                }
-            });
-        }
-    });
-    all.into_inner().expect("no panic")
-}
+use bench_test_support::seeds::over_seeds;
 
 /// The expected result of a fit. The fourth mode of the model, at 22.9 Hz, has 6e-6 of R's residue and cannot be measured. The fit
 /// assigns its static compliance to mode R: r_R + r_4 (w_R/w_4)^2, a change by two sigma of r_R.
@@ -51,7 +29,7 @@ fn intervals_of_modes_contain_the_truth_in_90_to_98_percent_of_the_seeds() {
     let at = |seed: u64| config(&[format!("sim.seed={}", 1000 + seed)]);
     let truth = measurable(&model(&at(0)));
     assert_eq!(truth.len(), 3);
-    let analyses = analyses_of_seeds(200, |seed| analysed(&at(seed), &at(seed)));
+    let analyses = over_seeds(0..200, |seed| analysed(&at(seed), &at(seed)));
     for truth in truth {
         let mut covered = [0; 3];
         for analysis in &analyses {
@@ -108,7 +86,7 @@ fn finds_modes_closer_than_their_widths_and_no_others() {
         .chain(unmodelled.iter().map(of))
         .collect();
     truth.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    for analysis in analyses_of_seeds(8, |seed| analysed(&at(seed), &at(seed))) {
+    for analysis in over_seeds(0..8, |seed| analysed(&at(seed), &at(seed))) {
         let modes = analysis.fit.expect("modes").modes();
         assert_eq!(modes.len(), truth.len(), "{modes:?}");
         for (mode, truth) in modes.iter().zip(&truth) {

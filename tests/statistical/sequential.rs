@@ -1,15 +1,13 @@
 //! Sequential experiments over the grid of section 5.2.2: no verdict is wrong, and the motion is short.
 //!
-//! By default a coarse grid with one seed; `BENCH_SEQUENTIAL_SEEDS=5` takes the whole grid of 15 x 10 points with five seeds.
-
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+//! By default a coarse grid with one seed; `BENCH_SEQUENTIAL_SEEDS=5` takes the whole grid of 15 x 10 points with five seeds
+//! (with `-- --nocapture` it prints the motion).
 
 use bench::config::Config;
-use bench::experiment::sequential::{SequenceLimits, default_max_motion_s, until_decided};
-use bench::experiment::{Plan, Runner, Setup, close};
 use bench::identify::verdict::Cnmp;
 use bench_test_support::identified::{config, truth};
+use bench_test_support::seeds::over_seeds;
+use bench_test_support::sequences::decided;
 
 /// A point of the grid: operating point as a ratio of L, asymmetry, seed.
 type Point = (f64, f64, u64);
@@ -37,26 +35,15 @@ fn config_of((operating_point, asymmetry, seed): Point) -> Config {
 
 fn outcome(point: Point) -> Outcome {
     let config = config_of(point);
-    let folder = tempfile::tempdir().expect("a folder");
-    let runner = Runner::new(Setup::simulated(folder.path().into()));
-    let mut make_run = |plan: &Plan| runner.run(plan, "shot");
-    let limit_s = default_max_motion_s(&config).expect("a model");
-    let stop = AtomicBool::new(false);
-    let limits = SequenceLimits {
-        max_motion_s: limit_s,
-        stop: &stop,
-    };
-    let sequence = until_decided(&config, limits, &mut make_run, &mut |_| {}).expect("shots");
-    let motion_s = sequence.motion_s();
-    let last = sequence.shots.last().expect("a shot").clone();
-    close(sequence.last, &last).expect("a good disk");
+    let ended = decided(&config);
+    let last = ended.shots.last().expect("a shot");
     Outcome {
         point,
         cnmp: last.cnmp,
         pairs: truth(&config),
-        motion_s,
-        shots: sequence.shots.len(),
-        why: format!("{:?}: {}", sequence.end, last.why),
+        motion_s: ended.motion_s,
+        shots: ended.shots.len(),
+        why: format!("{:?}: {}", ended.end, last.why),
     }
 }
 
@@ -79,22 +66,6 @@ fn points(rows: usize, columns: usize, seeds: u64) -> Vec<Point> {
     points
 }
 
-/// The outcomes on two threads, in the order of the points.
-fn outcomes(points: &[Point]) -> Vec<Outcome> {
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    std::thread::scope(|scope| {
-        for _ in 0..2 {
-            scope.spawn(|| {
-                while let Some(point) = points.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let outcome = outcome(*point);
-                    done.lock().expect("no panic").push(outcome);
-                }
-            });
-        }
-    });
-    done.into_inner().expect("no panic")
-}
-
 #[test]
 fn no_verdict_is_wrong_and_the_median_motion_is_below_six_seconds() {
     let seeds = std::env::var("BENCH_SEQUENTIAL_SEEDS");
@@ -103,7 +74,7 @@ fn no_verdict_is_wrong_and_the_median_motion_is_below_six_seconds() {
         Ok(seeds) => points(15, 10, seeds),
         Err(_) => points(5, 4, 1),
     };
-    let outcomes = outcomes(&points);
+    let outcomes = over_seeds(0..points.len() as u64, |k| outcome(points[k as usize]));
     let mut motions: Vec<f64> = outcomes.iter().map(|outcome| outcome.motion_s).collect();
     motions.sort_by(f64::total_cmp);
     let median_s = motions[motions.len() / 2];

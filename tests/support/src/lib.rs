@@ -9,6 +9,8 @@ pub mod identified;
 pub mod loop_rig;
 pub mod program;
 pub mod python;
+pub mod seeds;
+pub mod sequences;
 pub mod simulated;
 pub mod stage;
 pub mod svg;
