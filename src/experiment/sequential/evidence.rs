@@ -4,7 +4,9 @@ use core::ops::ControlFlow;
 use std::path::Path;
 
 use crate::config::Config;
-use crate::experiment::analysis::{Analysis, AnalysisPhase, ModalStep, estimated, run_signals_of};
+use crate::experiment::analysis::{
+    Analysis, AnalysisPhase, ModalStep, cautions, estimated, run_signals_of,
+};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::read_run::open_with_signals;
 use crate::experiment::response_estimate::ResponseEstimate;
@@ -18,27 +20,26 @@ pub(super) struct Evidence {
     /// The data of all shots, frequencies rising.
     pub(super) data: Vec<FrfDatum>,
     filled_ticks: u64,
+    /// Defects of the runs.
+    cautions: Vec<String>,
 }
 
 impl Evidence {
-    /// Adds the recording of a shot; returns its data.
+    /// Adds the recording of a shot.
     ///
     /// # Errors
     /// When the recording cannot be read, or contains no frequency response.
-    pub(super) fn add(
-        &mut self,
-        recording: &Path,
-        config: &Config,
-    ) -> Result<Vec<FrfDatum>, AnalysisError> {
+    pub(super) fn add(&mut self, recording: &Path, config: &Config) -> Result<(), AnalysisError> {
         let (recording, signals) = open_with_signals(recording)?;
         let signals = run_signals_of(&recording, signals, config, &mut never_cancels)?;
         self.filled_ticks += signals.filled_ticks;
         let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
         self.frfs.push(estimate.frf);
-        self.data.extend(estimate.frf_data.iter().copied());
+        self.cautions.extend(cautions(&recording));
+        self.data.extend(estimate.frf_data);
         self.data
             .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
-        Ok(estimate.frf_data)
+        Ok(())
     }
 
     /// Fit and verdict of all data so far.
@@ -56,7 +57,11 @@ impl Evidence {
             config,
             certainty: Certainty::REPEATED_LOOKS,
         };
-        step.of(estimate, self.filled_ticks, &mut never_cancels)
+        let mut analysis = step.of(estimate, self.filled_ticks, &mut never_cancels)?;
+        for caution in &self.cautions {
+            analysis.verdict = analysis.verdict.with(Some(caution.clone()));
+        }
+        Ok(analysis)
     }
 }
 

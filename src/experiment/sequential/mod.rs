@@ -16,11 +16,11 @@ mod amplitude;
 mod evidence;
 mod information;
 mod next_shot;
+mod planner;
 mod run;
 mod shot;
+mod summary;
 
-pub use run::{
-    Sequence, SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, first_shot_config,
-    until_decided,
-};
+pub use run::{Sequence, default_max_motion_s, first_shot_config, until_decided};
 pub use shot::Shot;
+pub use summary::{SequenceEnd, SequenceLimits, ShotSummary};

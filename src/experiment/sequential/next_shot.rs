@@ -71,7 +71,7 @@ fn best_band(
             quantity.value.abs() / (quantity.quantile * sigma)
         });
         let certainty = certainties.fold(f64::INFINITY, f64::min);
-        Some(Candidate { shot, certainty }).filter(|candidate| candidate.certainty.is_finite())
+        Some(Candidate { shot, certainty }).filter(|candidate| candidate.certainty.is_normal())
     });
     candidates.max_by(|a, b| a.certainty.total_cmp(&b.certainty))
 }

@@ -10,10 +10,10 @@
 use nalgebra::DVector;
 
 use super::decisive::decisive_uncertain_mode;
-use super::input::VerdictInput;
+use super::input::{Certainty, VerdictInput};
 use super::zeros::{derivatives, zeros};
 use super::{UncertainZero, has_certain_side};
-use crate::identify::modal::Parameter;
+use crate::identify::modal::{ModalFit, Parameter};
 use crate::model::plant::PlantError;
 
 /// A quantity whose sign is not certain, and on which the verdict depends.
@@ -27,6 +27,21 @@ pub(crate) struct DecisiveQuantity {
     pub(crate) quantile: f64,
 }
 
+impl DecisiveQuantity {
+    /// The real part of a zero.
+    pub(crate) fn side_of(
+        fit: &ModalFit,
+        zero: &UncertainZero,
+        certainty: Certainty,
+    ) -> DecisiveQuantity {
+        DecisiveQuantity {
+            value: zero.s.re,
+            gradient: derivatives(fit, zero.s).row(0).transpose(),
+            quantile: certainty.quantile(),
+        }
+    }
+}
+
 /// The quantities that are not decided; none if the verdict is certain, or undecided for another reason than noise.
 ///
 /// # Errors
@@ -37,7 +52,7 @@ pub(crate) fn decisive_quantities(
     let mut quantities: Vec<DecisiveQuantity> = zeros(input.fit)?
         .iter()
         .filter(|zero| is_open(input, zero))
-        .map(|zero| side_of(input, zero))
+        .map(|zero| DecisiveQuantity::side_of(input.fit, zero, input.certainty))
         .collect();
     let mode = decisive_uncertain_mode(input)?;
     quantities.extend(mode.and_then(|k| sign_of(input, k)));
@@ -46,14 +61,6 @@ pub(crate) fn decisive_quantities(
 
 fn is_open(input: &VerdictInput<'_>, zero: &UncertainZero) -> bool {
     zero.s.im != 0.0 && input.covers(zero.s.norm()) && !has_certain_side(zero, input.certainty)
-}
-
-fn side_of(input: &VerdictInput<'_>, zero: &UncertainZero) -> DecisiveQuantity {
-    DecisiveQuantity {
-        value: zero.s.re,
-        gradient: derivatives(input.fit, zero.s).row(0).transpose(),
-        quantile: input.certainty.quantile(),
-    }
 }
 
 /// The residue of a mode.

@@ -1,0 +1,56 @@
+//! The shots of a sequence, its limits and its end. The names in JSON must not change.
+
+use std::sync::atomic::AtomicBool;
+
+use serde::Serialize;
+
+use super::shot::Shot;
+use crate::identify::verdict::Cnmp;
+
+/// A shot with the verdict of all data up to it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ShotSummary {
+    /// Band and length.
+    #[serde(flatten)]
+    pub shot: Shot,
+    /// Its recording.
+    pub recording: String,
+    /// The verdict of this and all earlier shots.
+    pub cnmp: Cnmp,
+    /// The reasons.
+    pub why: String,
+}
+
+/// Why a sequence ended.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "end")]
+pub enum SequenceEnd {
+    /// The verdict is certain.
+    Decided,
+    /// The motion or the number of looks reached its limit.
+    LimitReached,
+    /// More motion is predicted to be necessary than is allowed.
+    NeedsMoreMotion {
+        /// The predicted motion in seconds.
+        needed_s: f64,
+    },
+    /// The model has fewer modes with a residue than a verdict needs, and all of them are found.
+    Undecidable,
+    /// A run was stopped or tripped, or the sequence was stopped between two runs.
+    Interrupted,
+}
+
+/// What ends a sequence before the verdict is certain.
+#[derive(Clone, Copy, Debug)]
+pub struct SequenceLimits<'a> {
+    /// Largest length of all sweeps in seconds.
+    pub max_motion_s: f64,
+    /// When it is set, no other shot begins.
+    pub stop: &'a AtomicBool,
+}
+
+/// Length of all sweeps in seconds.
+pub(super) fn motion_s(shots: &[ShotSummary]) -> f64 {
+    let lengths = shots.iter().map(|shot| shot.shot.duration_s);
+    lengths.fold(0.0, |sum, length| sum + length)
+}
