@@ -35,6 +35,9 @@ struct Totals {
     detected: usize,
     excluded: usize,
     undecided: usize,
+    /// Length of all chirps in seconds; absent for single chirps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    motion_s: Option<f64>,
 }
 
 /// The number of verdicts that disagree with the model with damping.
@@ -78,6 +81,11 @@ impl Totals {
             detected: evaluation.count(Cnmp::Detected),
             excluded: evaluation.count(Cnmp::Excluded),
             undecided: evaluation.count(Cnmp::Undecided),
+            motion_s: evaluation
+                .points
+                .iter()
+                .map(|point| point.result.motion_s)
+                .sum(),
         }
     }
 }
@@ -120,7 +128,7 @@ impl<'a> Report<'a> {
     pub fn text(&self) -> String {
         let totals = &self.totals;
         format!(
-            "{}: {} points\n{}\n{}\n{}{} detected, {} excluded, {} undecided\n{}{}{}{}",
+            "{}: {} points\n{}\n{}\n{}{} detected, {} excluded, {} undecided\n{}{}{}{}{}",
             self.profile,
             totals.points,
             description_text(&self.description),
@@ -129,6 +137,7 @@ impl<'a> Report<'a> {
             totals.detected,
             totals.excluded,
             totals.undecided,
+            self.motion_text(),
             labelled("model", &self.agreement_text()),
             labelled("offset", &self.offset_text()),
             labelled("recommend", &self.recommendation_text()),
@@ -164,6 +173,13 @@ impl<'a> Report<'a> {
             )
         });
         lines.collect()
+    }
+
+    fn motion_text(&self) -> String {
+        let motion_s = self.totals.motion_s;
+        motion_s.map_or(String::new(), |s| {
+            labelled("motion", &format!("{:.1} min of chirps in all", s / 60.0))
+        })
     }
 
     fn agreement_text(&self) -> String {
