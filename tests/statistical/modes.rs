@@ -1,6 +1,5 @@
 //! Modes R, u and v of the simulated stage with noise, quantisation and unmodelled modes.
 use bench::config::{Source, UnmodelledMode, load};
-use bench::experiment::Analysis;
 use bench::identify::modal::Estimate;
 use bench_test_support::identified::{Truth, analysed, config, model, stands_for};
 use bench_test_support::seeds::over_seeds;
