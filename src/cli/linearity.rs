@@ -92,7 +92,7 @@ struct Report {
     scales: Vec<f64>,
     /// One for each amplitude, as by `bench chirp`.
     runs: Vec<AmplitudeRun>,
-    /// The modes of the smallest amplitude in all runs.
+    /// The modes of the smallest amplitude within the excited band, in all runs.
     modes: Vec<ModeOverAmplitude>,
     /// Whether a parameter of a mode differs from that at the smallest amplitude by more than its errors; null if unknown:
     /// without modes, or if no parameter differs but a run was not completed.
@@ -119,13 +119,15 @@ impl AmplitudeRun {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let plans = plan_amplitudes(&args.planned()?, &args.scales()?)?;
+    let planned = args.planned()?;
+    let plans = plan_amplitudes(&planned, &args.scales()?)?;
     if !args.bench.json {
         print_text(&plan_text(&plans))?;
     }
     let runs = measure(args, &plans)?;
     let outcome = overall(&runs);
-    let mut report = report(runs, outcome != Outcome::Failed);
+    let band_hz = planned.chirp.band_hz();
+    let mut report = report(runs, band_hz, outcome != Outcome::Failed);
     report.overview = overview(&report, &plans)?;
     print_result(args.bench.json, &report, |report| text(report, &plans))?;
     Ok(outcome)
@@ -204,7 +206,7 @@ fn overall(runs: &[AmplitudeRun]) -> Outcome {
     impaired.unwrap_or(Outcome::Done)
 }
 
-fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
+fn report(runs: Vec<AmplitudeRun>, band_hz: (f64, f64), all_completed: bool) -> Report {
     let fitted: Vec<Vec<FittedMode>> = runs
         .iter()
         .map(|run| run.outputs.summary.modes.clone())
@@ -213,7 +215,7 @@ fn report(runs: Vec<AmplitudeRun>, all_completed: bool) -> Report {
         modes,
         shifted,
         why,
-    } = compare_modes(&fitted, all_completed);
+    } = compare_modes(&fitted, band_hz, all_completed);
     Report {
         scales: runs.iter().map(|run| run.scale).collect(),
         runs,

@@ -172,6 +172,7 @@ fn response(
             frf,
             frf_data,
             count,
+            ..
         } = periodic::estimate(signals, band_hz, repetition)?;
         let lines = harmonics(signals, band_hz, repetition, InputSignal::Measured)?;
         let linearity = lines.map(Linearity::new);

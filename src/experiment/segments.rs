@@ -11,9 +11,9 @@ use crate::excitation::{Pattern, Window};
 use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
 use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::{Frf, FrfDatum, IdentifyError, Signals, repeated};
+use crate::identify::{Frf, FrfDatum, IdentifyError, NoiseParts, PowerDatum, Signals, repeated};
 
-/// Number of lines on either side over which the noise is averaged for a fit.
+/// Number of lines on either side from which the noise is estimated for a fit.
 const NEIGHBOURS: usize = 4;
 
 /// A record to be estimated as a whole, or the estimate from the lines of a run.
@@ -57,28 +57,46 @@ fn periodic_lines(
     band_hz: (f64, f64),
     repetition: Repetition,
 ) -> Result<Segments, IdentifyError> {
-    let Periods { frf, frf_data, .. } = periodic::estimate(signals, band_hz, repetition)?;
+    let Periods {
+        frf,
+        frf_data,
+        input_powers,
+        ..
+    } = periodic::estimate(signals, band_hz, repetition)?;
     let Some(lines) = harmonics(signals, band_hz, repetition, InputSignal::Commanded)? else {
-        return Ok(Segments::Lines(frf, with_mean_variance(&frf_data), None));
+        let data = with_mean_variance(&frf_data, &input_powers);
+        return Ok(Segments::Lines(frf, data, None));
     };
     let linearity = Linearity::new(lines);
-    let data = with_mean_variance(&linearity.with_odd_distortion(&frf_data));
+    let data = with_mean_variance(&linearity.with_odd_distortion(&frf_data), &input_powers);
     Ok(Segments::Lines(frf, data, Some(Box::new(linearity))))
 }
 
-/// The data with the mean variance of neighbouring lines. The scatter of a few periods alone is occasionally far too small,
-/// and a fit would then take such a line for a mode.
-pub(super) fn with_mean_variance(data: &[FrfDatum]) -> Vec<FrfDatum> {
-    let with_mean = data.iter().enumerate().map(|(k, datum)| FrfDatum {
-        variance: mean_variance(data, k),
-        ..*datum
+/// The data with the variances that those of neighbouring lines give. The scatter of a few periods alone is occasionally far too
+/// small, and a fit would then take such a line for a mode. `input_powers` are |U|^2 of the lines.
+pub(super) fn with_mean_variance(data: &[FrfDatum], input_powers: &[f64]) -> Vec<FrfDatum> {
+    let lines = data.iter().zip(input_powers);
+    let powers: Vec<PowerDatum> = lines.map(power_of).collect();
+    let with_mean = data.iter().enumerate().map(|(k, datum)| {
+        let near = k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(data.len());
+        let PowerDatum {
+            of_probe, of_plant, ..
+        } = powers[k];
+        FrfDatum {
+            variance: NoiseParts::of(&powers[near]).power(of_probe, of_plant),
+            ..*datum
+        }
     });
     with_mean.collect()
 }
 
-fn mean_variance(data: &[FrfDatum], k: usize) -> f64 {
-    let near = &data[k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(data.len())];
-    near.iter().map(|datum| datum.variance).sum::<f64>() / near.len() as f64
+/// The variance of a line: of noise that is white, or passes through the plant, over the power of the input.
+fn power_of((datum, input_power): (&FrfDatum, &f64)) -> PowerDatum {
+    PowerDatum {
+        power: datum.variance,
+        of_probe: 1.0 / input_power,
+        of_plant: datum.response.norm_sqr() / input_power,
+    }
 }
 
 /// Up to `length` samples of a signal from `start` on.
@@ -97,12 +115,13 @@ fn estimate_stepped_sine(
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),
 ) -> Result<Segments, IdentifyError> {
-    let (mut frf, mut data) = (Frf::default(), Vec::new());
+    let (mut frf, mut data, mut input_powers) = (Frf::default(), Vec::new(), Vec::new());
     for (hz, window) in rising_windows(signals, windows) {
         match sine(signals, window, hz) {
             Ok(periods) => {
                 append(&mut frf, periods.frf);
                 data.extend(periods.frf_data);
+                input_powers.extend(periods.input_powers);
             }
             // The other sines are still usable.
             Err(IdentifyError::NotExcited { .. }) => {}
@@ -111,7 +130,11 @@ fn estimate_stepped_sine(
     }
     match data.is_empty() {
         true => Err(IdentifyError::NotExcited { low_hz, high_hz }),
-        false => Ok(Segments::Lines(frf, with_mean_variance(&data), None)),
+        false => Ok(Segments::Lines(
+            frf,
+            with_mean_variance(&data, &input_powers),
+            None,
+        )),
     }
 }
 

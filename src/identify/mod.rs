@@ -39,6 +39,7 @@ mod local_model;
 mod mean;
 pub mod modal;
 mod multisine_lines;
+mod noise_parts;
 pub mod record_check;
 pub mod repeated;
 mod signals;
@@ -58,6 +59,7 @@ pub use local_model::frf_data::frf_data;
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
+pub use noise_parts::{NoiseParts, PowerDatum};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};
 

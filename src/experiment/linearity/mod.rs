@@ -11,7 +11,7 @@ use crate::config::{Config, validate};
 use crate::excitation::Extremes;
 use crate::identify::modal::FittedMode;
 
-pub use mode_shifts::{ModeOverAmplitude, modes_over_amplitude};
+pub use mode_shifts::{ModeOverAmplitude, is_within, modes_over_amplitude};
 
 /// A run at one amplitude.
 #[derive(Clone, Debug)]
@@ -72,7 +72,7 @@ pub fn run<E: From<ExperimentError>>(
 /// The modes of all runs compared.
 #[derive(Clone, Debug)]
 pub struct ModeComparison {
-    /// The modes of the smallest amplitude in all runs.
+    /// The modes of the smallest amplitude within the excited band, in all runs.
     pub modes: Vec<ModeOverAmplitude>,
     /// Whether a parameter of a mode shifts; `None` if that is not known.
     pub shifted: Option<bool>,
@@ -80,9 +80,19 @@ pub struct ModeComparison {
     pub why: String,
 }
 
-/// Compares the modes of the runs. `all_completed` states whether every amplitude was run and analysed to its end.
-pub fn compare_modes(runs: &[Vec<FittedMode>], all_completed: bool) -> ModeComparison {
-    let modes = modes_over_amplitude(runs);
+/// Compares the modes of the runs within the excited band. `all_completed` states whether every amplitude was run and analysed to
+/// its end.
+pub fn compare_modes(
+    runs: &[Vec<FittedMode>],
+    band_hz: (f64, f64),
+    all_completed: bool,
+) -> ModeComparison {
+    let within = |modes: &Vec<FittedMode>| -> Vec<FittedMode> {
+        let modes = modes.iter().filter(|mode| is_within(mode, band_hz));
+        modes.copied().collect()
+    };
+    let runs: Vec<Vec<FittedMode>> = runs.iter().map(within).collect();
+    let modes = modes_over_amplitude(&runs);
     let shifts = modes.iter().any(ModeOverAmplitude::shifts);
     let is_compared = |mode: &ModeOverAmplitude| mode.by_run.iter().flatten().count() > 1;
     let (shifted, why) = match (shifts, all_completed) {
@@ -148,7 +158,7 @@ mod tests {
             damping_ratio: known(0.01),
             residue_per_kg: known(0.5),
         };
-        let why = |runs: &[Vec<FittedMode>]| compare_modes(runs, true).why;
+        let why = |runs: &[Vec<FittedMode>]| compare_modes(runs, (5.0, 200.0), true).why;
         let both = vec![mode(29.0), mode(82.0)];
         // 90 Hz is not matched with 82 Hz: no shift is detected, but the mode is missing at one amplitude.
         let missing = why(&[both.clone(), vec![mode(29.0), mode(90.0)]]);

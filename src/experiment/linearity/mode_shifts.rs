@@ -54,6 +54,15 @@ impl ModeOverAmplitude {
     }
 }
 
+/// Whether the half-power band of a mode, omega (1 -+ zeta), lies within the excited band. A mode beyond it stands for what the band
+/// does not show, such as a mode above it, and changes with the noise. A free mass has no such band.
+pub fn is_within(mode: &FittedMode, (low_hz, high_hz): (f64, f64)) -> bool {
+    let frequency_hz = mode.frequency_hz().value;
+    let half_width_hz = mode.damping_ratio.value * frequency_hz;
+    let is_free = frequency_hz == 0.0;
+    is_free || (frequency_hz - half_width_hz >= low_hz && frequency_hz + half_width_hz <= high_hz)
+}
+
 /// The modes of the first run in all runs. With z = (x - x_1)/sqrt(sigma^2 + sigma_1^2), a parameter shifts where
 /// erfc(|z|/sqrt 2) < 1 %/(number of compared parameters): a linear stage shows any shift in at most one of a hundred campaigns
 /// (Bonferroni).
@@ -134,6 +143,18 @@ mod tests {
                 .iter()
                 .all(|mode| mode.by_run.iter().all(Option::is_some))
         );
+    }
+
+    #[test]
+    fn mode_beyond_the_excited_band_is_not_compared() {
+        let at = |hz: f64, damping_ratio: f64| {
+            is_within(
+                &mode(hz * std::f64::consts::TAU, damping_ratio),
+                (5.0, 200.0),
+            )
+        };
+        assert!(at(29.0, 0.01) && at(198.0, 0.01) && at(5.1, 0.01) && at(0.0, 0.0));
+        assert!(!at(199.0, 0.01) && !at(160.0, 0.5) && !at(5.1, 0.03) && !at(208.0, 0.01));
     }
 
     #[test]

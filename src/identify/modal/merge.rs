@@ -35,7 +35,7 @@ fn max_width_hz(datum: &FrfDatum, model: &ModalParameters) -> f64 {
 }
 
 /// Distance of the nearest pole from a datum on the imaginary axis, in rad/s; infinite without modes.
-pub(super) fn nearest_pole_rad_s(datum: &FrfDatum, model: &ModalParameters) -> f64 {
+fn nearest_pole_rad_s(datum: &FrfDatum, model: &ModalParameters) -> f64 {
     let s = Complex::new(0.0, datum.omega_rad_s());
     let distances = model.modes.iter().map(|mode| (s - pole(mode)).norm());
     distances.fold(f64::INFINITY, f64::min)

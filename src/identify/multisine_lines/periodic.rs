@@ -10,7 +10,7 @@
 //! describe it has a reduced chi-square above 1. With P periods, chi-square is (P - 1)/(P - 2) times too high.
 
 use super::excited::excited;
-use super::lines::{Line, ROUNDING, lines};
+use super::lines::{Line, ROUNDING, lines, mean};
 use crate::identify::{Frf, FrfDatum, FrfPoint, IdentifyError, Signals};
 
 pub use super::lines::Repetition;
@@ -22,6 +22,8 @@ pub struct Periods {
     pub frf: Frf,
     /// The same for a fit, one datum per line.
     pub frf_data: Vec<FrfDatum>,
+    /// |mean U|^2 of each of these data.
+    pub input_powers: Vec<f64>,
     /// Number of averaged periods.
     pub count: usize,
 }
@@ -41,6 +43,7 @@ pub fn estimate(
     let mut periods = Periods {
         frf: Frf::default(),
         frf_data: Vec::new(),
+        input_powers: Vec::new(),
         count,
     };
     for line in excited(&lines) {
@@ -74,6 +77,7 @@ impl Periods {
                 response,
                 variance,
             });
+            self.input_powers.push(mean(&line.input).norm_sqr());
         }
     }
 }
