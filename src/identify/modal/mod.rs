@@ -12,6 +12,7 @@
 //! describe the data, the standard deviations grow accordingly.
 
 mod candidates;
+mod clusters;
 mod error;
 mod measurement_chain;
 mod merge;

@@ -1,5 +1,6 @@
 //! Removal of modes that the data do not need.
 
+use super::clusters::with_fewer_in_clusters;
 use super::parameters::{ModalParameters, Parameter};
 use super::refine::refine;
 use super::solution::{Problem, Solution};
@@ -13,7 +14,8 @@ const CERTAIN_SIGMAS: f64 = 5.0;
 /// The parameters without the modes whose residues are uncertain, the least certain first, as long as the other modes can take
 /// their place without a significant increase of chi^2.
 pub(super) fn pruned(problem: Problem<'_>, parameters: ModalParameters) -> ModalParameters {
-    let mut best = with_one_mode_below(problem, refine(problem, parameters, 0.0));
+    let below = with_one_mode_below(problem, refine(problem, parameters, 0.0));
+    let mut best = with_fewer_in_clusters(problem, below);
     while best.parameters.modes.len() > 1 {
         let Some(index) = least_certain(problem, &best) else {
             break;
