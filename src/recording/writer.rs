@@ -31,8 +31,9 @@ const CHUNK_NS: u64 = 100_000_000;
 /// A chunk is also closed at this size, so that its size is limited at any rate and with any number of events.
 const CHUNK_BYTES: u64 = 1 << 20;
 
-/// Level of the compression. Level 3 makes a recording 12 % smaller, and a whole `bench chirp` needs 9 % more processor time.
-const ZSTD_LEVEL: u32 = 1;
+/// Level of the compression. Of a chirp of 120 s at 5 kHz, level 1 leaves 46.4, level 2 41.9 and level 3 39.1 bytes a tick, beside 16 bytes
+/// a tick of message index that are not compressed. Level 3 takes more processor time, 5 and 6 leave as much as 3.
+const ZSTD_LEVEL: u32 = 2;
 
 /// Keys of the metadata: period of the loop, and log time of its start.
 pub(super) const PERIOD_S: &str = "period_s";
