@@ -270,7 +270,7 @@ fn implausible(
     fit: &Result<ModalFit, FitError>,
     chain: &MeasurementChain,
 ) -> Option<String> {
-    incoherent(frf)
+    incoherent(frf, fit)
         .or_else(|| growing(frf, fit))
         .or_else(|| inverse_fits(data, fit, chain))
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
@@ -301,7 +301,11 @@ fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
     }
 }
 
-fn incoherent(frf: &Frf) -> Option<String> {
+/// Modes that describe the response may lie in less than half of the band.
+fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
+    if fit.as_ref().is_ok_and(describes) {
+        return None;
+    }
     let median = frf.median_coherence()?;
     (median < MIN_COHERENCE).then(|| {
         format!(

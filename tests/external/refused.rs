@@ -251,7 +251,7 @@ fn accepts_other_separators_and_a_rate_instead_of_times() {
 }
 
 #[test]
-fn swapped_channels_give_an_undecided_verdict_with_the_reason() {
+fn swapped_channels_give_an_undecided_verdict_and_exchanging_them_decides() {
     let bench = Bench::new();
     bench.write("data.csv", valid());
     let swapped = "identify data.csv --input position_m --output force_n --time time_s --period 1000 --band 5:200";
@@ -260,9 +260,12 @@ fn swapped_channels_give_an_undecided_verdict_with_the_reason() {
     assert!(
         answer["why"]
             .as_str()
-            .is_some_and(|why| why.contains("swapped")),
+            .is_some_and(|why| why.contains("exchange --input and --output")),
         "{answer}"
     );
+    let exchanged = "identify data.csv --input force_n --output position_m --time time_s --period 1000 --band 5:200";
+    let answer = bench.json(exchanged);
+    assert_eq!(answer["cnmp"], "excluded", "{answer}");
 }
 
 #[test]

@@ -7,3 +7,4 @@ mod recover;
 mod remedies;
 mod replay;
 mod stop;
+mod undecided;

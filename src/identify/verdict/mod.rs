@@ -51,7 +51,7 @@ pub(crate) const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
 
-const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation";
+const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
 const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and increase the amplitude or the duration of the excitation";
 
@@ -155,12 +155,19 @@ fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
 
 fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
     let expected = input.expected_modes.unwrap_or(0);
-    (found < expected).then(|| {
-        format!(
-            "only {found} of the {expected} modes that the model has up to {:.0} Hz are found; increase the amplitude there, or the duration",
-            hertz(input.up_to_rad_s)
-        )
-    })
+    if found >= expected {
+        return None;
+    }
+    let (up_to_hz, (_, last_hz)) = (hertz(input.up_to_rad_s), input.fit.band_hz);
+    let remedy = match last_hz < up_to_hz {
+        true => format!(
+            "the excitation ends at {last_hz:.0} Hz: extend it to more than {up_to_hz:.0} Hz"
+        ),
+        false => "increase the amplitude there, or the duration".into(),
+    };
+    Some(format!(
+        "only {found} of the {expected} modes that the model has up to {up_to_hz:.0} Hz are found; {remedy}"
+    ))
 }
 
 /// A response of zero has neither a phase nor a logarithm of its magnitude.
