@@ -10,7 +10,7 @@ use bench::identify::Estimate;
 use bench::identify::verdict::zeros;
 use bench::model::plant;
 use bench::model::zeros::damped_zeros;
-use bench_test_support::identified::{model, stands_for};
+use bench_test_support::identified::{measurable, model, stands_for};
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::sequences::decided;
 use bench_test_support::simulated::analysed;
@@ -138,7 +138,7 @@ const CELLS: [Cell; 15] = [
             "swept reference, 40 s",
             &[
                 "control.controller=fast",
-                "control.reference={kind=\"chirp\"}",
+                "control.reference={kind=\"chirp\",travel_m=20e-6}",
                 "control.duration_s=40",
             ],
         )
@@ -228,7 +228,7 @@ impl Cell {
             return counts;
         };
         let modes = fit.modes();
-        for [omega_rad_s, damping_ratio, residue_per_kg] in model(&config) {
+        for [omega_rad_s, damping_ratio, residue_per_kg] in measurable(&model(&config), &modes) {
             let Some(mode) = stands_for(&modes, omega_rad_s) else {
                 continue;
             };
