@@ -2,6 +2,7 @@
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+use super::arguments::arguments;
 use super::description_options::DescriptionOptions;
 use super::error::{CliError, ErrorReport};
 use super::help::GLOSSARY;
@@ -106,10 +107,7 @@ pub fn main() -> Outcome {
 
 /// Runs a parsed command line in this process, or at the daemon that it names.
 fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
-    let arguments: Vec<String> = std::env::args_os()
-        .skip(1)
-        .map(|argument| argument.to_string_lossy().into_owned())
-        .collect();
+    let arguments: Vec<String> = arguments().collect();
     match remote::target(&arguments) {
         Some(target) => {
             let description = cli.command.description().cloned().unwrap_or_default();

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::arguments::arguments;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use crate::daemon::client::{DaemonOwner, rig_of, running_daemon};
@@ -63,7 +64,7 @@ fn name(stage: Stage) -> &'static str {
 
 /// The command line of this process, for the queue of the daemon.
 fn request(description: &DescriptionOptions) -> RunRequest {
-    let mut words = std::env::args().skip(1);
+    let mut words = arguments();
     let named = words.next().unwrap_or_default();
     let command = Command::ALL
         .into_iter()

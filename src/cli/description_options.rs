@@ -1,5 +1,6 @@
 //! `--name`, `--note` and `--operator`: what the operator says about a run.
 
+use super::arguments::arguments;
 use crate::daemon::client::is_started_by_daemon;
 use crate::experiment::{Description, Invocation, operator_name, run_name, run_note};
 
@@ -18,7 +19,8 @@ pub(super) struct DescriptionOptions {
 }
 
 impl DescriptionOptions {
-    /// What the recording contains; `profile` is the profile or the file of the configuration. In a process that the daemon started, the daemon adds the operator of the lease.
+    /// What the recording contains; `profile` is the profile or the file of the configuration. In a process that the daemon started,
+    /// the daemon adds the operator of the lease.
     pub fn description(&self, profile: &str) -> Description {
         Description {
             name: self.name.clone(),
@@ -46,12 +48,6 @@ impl DescriptionOptions {
         let operator = self.operator.clone().or_else(user);
         operator.unwrap_or_else(|| "unknown".into())
     }
-}
-
-/// The arguments of this process.
-fn arguments() -> impl Iterator<Item = String> {
-    let arguments = std::env::args_os().skip(1);
-    arguments.map(|argument| argument.to_string_lossy().into_owned())
 }
 
 /// The user of this process, if it is known.

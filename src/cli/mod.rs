@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand.
 
 mod analysis_output;
+mod arguments;
 mod calibrate;
 mod campaign;
 mod campaign_output;

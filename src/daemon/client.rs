@@ -19,8 +19,8 @@ use super::schedule::StopKind;
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
 use super::socket::{TICKET_VARIABLE, sockets};
 use crate::experiment::{
-    ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder, RunReport, Stage,
-    StopSignals,
+    ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
+    RunReport, Stage, StopSignals,
 };
 use crate::recording::{RecordingError, Totals};
 use crate::rt::thread::Pace;
@@ -132,6 +132,7 @@ impl RigOwner for DaemonOwner {
         order: &RunOrder,
         progress: &Progress,
     ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError> {
+        require_text(&order.folder)?;
         let connection = self.connection(order, progress)?;
         let report = lock(&connection).run(order, progress)?;
         let recording = DaemonRecording {
@@ -302,6 +303,21 @@ impl Connection {
     fn unexpected(&self, message: &FromDaemon) -> ExperimentError {
         lost(&self.socket, &format!("unexpected message {message:?}"))
     }
+}
+
+/// An order is sent as JSON, which contains text only.
+fn require_text(folder: &Path) -> Result<(), RemoteError> {
+    if folder.to_str().is_some() {
+        return Ok(());
+    }
+    let message = format!(
+        "--out: the name of the folder {} is not UTF-8, so that the daemon cannot write there; choose another folder, or add --connect none",
+        folder.display()
+    );
+    Err(RemoteError {
+        error: ErrorObject::new(message, ErrorKind::Usage, Some("--out".into())),
+        is_failure: false,
+    })
 }
 
 fn lost(socket: &Path, why: &str) -> ExperimentError {

@@ -1,4 +1,6 @@
 //! Name, note and operator of runs that the daemon makes.
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
@@ -90,6 +92,28 @@ fn command_at_a_terminal_passes_name_note_and_operator_to_the_daemon() {
             "{connect}"
         );
     }
+}
+
+#[test]
+fn refuses_a_folder_whose_name_is_not_utf8_without_a_panic() {
+    let daemon = Daemon::start();
+    let here = tempfile::tempdir().expect("a folder");
+    let mut command = daemon.bench(here.path(), &["control"]);
+    command
+        .args(RUN)
+        .arg("--out")
+        .arg(OsStr::from_bytes(b"run\xff"));
+    let output = command.output().expect("a process");
+    let shown = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{shown}");
+    for word in ["--out", "UTF-8", "--connect none"] {
+        assert!(shown.contains(word), "{word}: {shown}");
+    }
+    // Without a daemon the folder is written.
+    let alone = command.args(["--connect", "none"]).output();
+    let alone = alone.expect("a process");
+    let shown = String::from_utf8_lossy(&alone.stderr);
+    assert_eq!(alone.status.code(), Some(0), "{shown}");
 }
 
 #[test]
