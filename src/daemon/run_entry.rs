@@ -203,12 +203,15 @@ pub struct RunEntry {
 }
 
 impl RunEntry {
-    /// Name, note and operator for the recording.
+    /// Name, note and operator for the recording. An attached process states its operator itself, if it knows one.
     pub fn description(&self) -> Description {
         Description {
             name: run_name(&self.request.name).ok(),
             note: run_note(&self.request.note).ok(),
-            operator: operator_name(&self.operator).ok(),
+            operator: match self.carrier {
+                Carrier::Attached => None,
+                Carrier::Started { .. } => operator_name(&self.operator).ok(),
+            },
             invocation: None,
         }
     }

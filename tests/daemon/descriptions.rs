@@ -95,6 +95,27 @@ fn command_at_a_terminal_passes_name_note_and_operator_to_the_daemon() {
 }
 
 #[test]
+fn command_of_an_unknown_user_records_no_operator() {
+    let daemon = Daemon::start();
+    let here = tempfile::tempdir().expect("a folder");
+    let socket = daemon.socket().display().to_string();
+    let arguments = [
+        &["control"][..],
+        &RUN,
+        &["--out", "run", "--connect", &socket, "--json"],
+    ]
+    .concat();
+    let mut command = daemon.bench(here.path(), &arguments);
+    let output = command.env_remove("USER").output().expect("a process");
+    let shown = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{shown}");
+    let result: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    assert_eq!(result.get("operator"), None, "{result}");
+    let path = recording(&here.path().join("run"));
+    assert_eq!(described(&path), [None, None, None]);
+}
+
+#[test]
 fn refuses_a_folder_whose_name_is_not_utf8_without_a_panic() {
     let daemon = Daemon::start();
     let here = tempfile::tempdir().expect("a folder");
