@@ -75,7 +75,7 @@ fn quoted(word: &str) -> String {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum DescriptionError {
     /// Nothing, or only spaces.
-    #[error("it is empty; leave it out, or give a text of up to {0} characters")]
+    #[error("it is empty; give a text of 1 to {0} characters")]
     Empty(usize),
     /// Too many characters.
     #[error("it has {characters} characters, and at most {limit} are allowed; shorten it")]

@@ -38,9 +38,8 @@ pub async fn take(
     State(daemon): State<Arc<Daemon>>,
     Body(operator): Body<Operator>,
 ) -> Result<Created<GivenLease>, ApiError> {
-    let name = operator_name(&operator.operator).map_err(|error| {
-        ApiError::bad_request(format!("operator: {error}; give the name of a person"))
-    })?;
+    let name = operator_name(&operator.operator)
+        .map_err(|error| ApiError::bad_request(format!("operator: {error}")))?;
     let secret = random()?;
     daemon.change(|schedule, now| schedule.take_lease(&name, secret.clone(), now))?;
     tracing::info!(operator = name, "the arm lease was taken");
