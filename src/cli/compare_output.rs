@@ -68,7 +68,7 @@ fn verdict_text(reference: &RunHead, other: &RunDifferences) -> String {
 fn settings_text(other: &RunDifferences) -> String {
     let settings = other.settings.iter().map(|setting| {
         let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "not set".into());
-        let (here, reference) = (shown(&setting.value), shown(&setting.other));
+        let (here, reference) = (shown(&setting.value), shown(&setting.reference));
         labelled(
             "setting",
             &format!("{} = {here}, reference {reference}", setting.key),

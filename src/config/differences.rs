@@ -1,19 +1,21 @@
 //! The settings in which two configurations differ.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use serde::Serialize;
 use toml::Value;
 
 use super::{Config, ConfigError, Source, load};
 
-/// A setting with different values in two configurations.
+/// A setting whose value is not that of a reference configuration: of a profile, or of a reference run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct SettingDifference {
     /// The key, for example `plant.mass_asymmetry`.
     pub key: String,
     /// Its value as TOML; `None` if it is not set.
     pub value: Option<String>,
-    /// Its value in the other configuration.
-    pub other: Option<String>,
+    /// Its value in the reference configuration; `None` if it is not set there.
+    pub reference: Option<String>,
 }
 
 /// The settings of `config` that differ from those of a profile or of a file, by key.
@@ -31,41 +33,32 @@ pub fn changed_settings(
     Ok(differences(config, &load(&source)?))
 }
 
-/// The settings of `config` that differ from those of `other`, by key.
-pub fn differences(config: &Config, other: &Config) -> Vec<SettingDifference> {
-    let (settings, others) = (flat(config), flat(other));
-    let value_in = |list: &[(String, String)], key: &str| {
-        let found = list.iter().find(|(name, _)| name == key);
-        found.map(|(_, value)| value.clone())
-    };
-    let only_in_other = others
-        .iter()
-        .filter(|(key, _)| value_in(&settings, key).is_none());
-    let mut keys: Vec<&String> = settings.iter().map(|(key, _)| key).collect();
-    keys.extend(only_in_other.map(|(key, _)| key));
-    keys.sort();
-    let compared = keys.into_iter().map(|key| SettingDifference {
+/// The settings of `config` that differ from those of `reference`, by key.
+pub fn differences(config: &Config, reference: &Config) -> Vec<SettingDifference> {
+    let (values, references) = (flat(config), flat(reference));
+    let keys: BTreeSet<&String> = values.keys().chain(references.keys()).collect();
+    let settings = keys.into_iter().map(|key| SettingDifference {
         key: key.clone(),
-        value: value_in(&settings, key),
-        other: value_in(&others, key),
+        value: values.get(key).cloned(),
+        reference: references.get(key).cloned(),
     });
-    compared
-        .filter(|setting| setting.value != setting.other)
+    settings
+        .filter(|setting| setting.value != setting.reference)
         .collect()
 }
 
 /// All keys with their values as TOML. A configuration can always be written as TOML; one that cannot has no keys.
-fn flat(config: &Config) -> Vec<(String, String)> {
-    let mut pairs = Vec::new();
+fn flat(config: &Config) -> BTreeMap<String, String> {
+    let mut values = BTreeMap::new();
     if let Ok(value) = Value::try_from(config) {
-        collect("", &value, &mut pairs);
+        collect("", &value, &mut values);
     }
-    pairs
+    values
 }
 
-fn collect(key: &str, value: &Value, pairs: &mut Vec<(String, String)>) {
+fn collect(key: &str, value: &Value, values: &mut BTreeMap<String, String>) {
     let Value::Table(table) = value else {
-        pairs.push((key.into(), value.to_string()));
+        values.insert(key.into(), value.to_string());
         return;
     };
     for (name, value) in table {
@@ -73,7 +66,7 @@ fn collect(key: &str, value: &Value, pairs: &mut Vec<(String, String)>) {
             "" => name.clone(),
             key => format!("{key}.{name}"),
         };
-        collect(&key, value, pairs);
+        collect(&key, value, values);
     }
 }
 

@@ -45,6 +45,12 @@ fn finds_a_softer_spring_with_sign_and_size_of_the_closed_form() {
     assert!(compliance.significant, "{compliance:?}");
     let keys: Vec<&str> = found.settings.iter().map(|one| one.key.as_str()).collect();
     assert_eq!(keys, ["plant.springs.guide.stiffness_n_per_m", "sim.seed"]);
+    let [value, reference] = [softer_n_per_m, GUIDE_N_PER_M].map(|k| Some(format!("{k:?}")));
+    let stiffness = &found.settings[0];
+    assert_eq!(
+        (&stiffness.value, &stiffness.reference),
+        (&value, &reference)
+    );
     assert_eq!(
         (found.signs_differ, found.verdict_differs),
         (Some(false), Some(false))

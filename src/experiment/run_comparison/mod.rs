@@ -60,7 +60,7 @@ pub struct RunDifferences {
     pub verdict_differs: Option<bool>,
     /// Figures of the loop and its timing.
     pub figures: Vec<FigureDifference>,
-    /// The settings that differ; `other` is the value of the reference run.
+    /// The settings that differ.
     pub settings: Vec<SettingDifference>,
 }
 

@@ -158,7 +158,7 @@ fn settings(other: &RunDifferences) -> String {
             let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "not set".into());
             row(&[
                 setting.key.clone(),
-                shown(&setting.other),
+                shown(&setting.reference),
                 shown(&setting.value),
             ])
         })

@@ -128,7 +128,7 @@ fn setting_row(setting: &SettingDifference) -> String {
     row(&[
         setting.key.clone(),
         shown(&setting.value),
-        shown(&setting.other),
+        shown(&setting.reference),
     ])
 }
 
