@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use super::run_result::RunResult;
-use crate::experiment::ControlRun;
 
 /// A figure of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -49,7 +48,8 @@ pub struct FigureDifference {
 }
 
 impl Figure {
-    const OF_A_LOOP: [Figure; 10] = [
+    /// All figures.
+    pub const ALL: [Figure; 12] = [
         Figure::SettlingTimeS,
         Figure::OvershootPercent,
         Figure::SteadyStateMeanErrorM,
@@ -60,6 +60,8 @@ impl Figure {
         Figure::RmsErrorM,
         Figure::PeakCurrentA,
         Figure::RmsCurrentA,
+        Figure::Overruns,
+        Figure::LostRecords,
     ];
 
     /// Name and unit, and the factor from the SI unit.
@@ -88,49 +90,41 @@ impl Figure {
         }
     }
 
-    fn of_loop(self, run: &ControlRun) -> Option<f64> {
-        let (tracking, figures) = (run.tracking, run.figures);
+    /// Its value in a run; `None` if the run has no such figure.
+    fn value(self, run: &RunResult) -> Option<f64> {
+        let control = run.control.as_ref();
+        let figures = control.map(|control| control.figures);
+        let tracking = control.and_then(|control| control.tracking);
         let step = tracking.and_then(|tracking| tracking.step);
         let sine = tracking.and_then(|tracking| tracking.sine);
         match self {
             Figure::SettlingTimeS => step?.settling_time_s,
-            Figure::OvershootPercent => step.map(|step| step.overshoot_percent),
-            Figure::SteadyStateMeanErrorM => tracking.map(|t| t.steady_state_mean_error_m),
-            Figure::SteadyStateRmsM => tracking.map(|t| t.steady_state_rms_m),
-            Figure::SineGain => sine.map(|sine| sine.gain),
-            Figure::SinePhaseDeg => sine.map(|sine| sine.phase_deg),
-            Figure::PeakErrorM => Some(figures.peak_error_m),
-            Figure::RmsErrorM => Some(figures.rms_error_m),
-            Figure::PeakCurrentA => Some(figures.peak_current_a),
-            Figure::RmsCurrentA => Some(figures.rms_current_a),
-            Figure::Overruns | Figure::LostRecords => None,
+            Figure::OvershootPercent => Some(step?.overshoot_percent),
+            Figure::SteadyStateMeanErrorM => Some(tracking?.steady_state_mean_error_m),
+            Figure::SteadyStateRmsM => Some(tracking?.steady_state_rms_m),
+            Figure::SineGain => Some(sine?.gain),
+            Figure::SinePhaseDeg => Some(sine?.phase_deg),
+            Figure::PeakErrorM => Some(figures?.peak_error_m),
+            Figure::RmsErrorM => Some(figures?.rms_error_m),
+            Figure::PeakCurrentA => Some(figures?.peak_current_a),
+            Figure::RmsCurrentA => Some(figures?.rms_current_a),
+            Figure::Overruns => Some(run.overruns as f64),
+            Figure::LostRecords => Some(run.lost_records as f64),
         }
     }
 }
 
 /// The figures that at least one of two runs has. Overruns and lost records are figures of every run.
 pub(super) fn figures(reference: &RunResult, other: &RunResult) -> Vec<FigureDifference> {
-    let (first, second) = (reference.control.as_ref(), other.control.as_ref());
-    let of_loops = Figure::OF_A_LOOP.into_iter().map(|figure| {
-        let value = |run: Option<&ControlRun>| run.and_then(|run| figure.of_loop(run));
-        difference(figure, value(first), value(second))
-    });
-    let counts = [
-        (Figure::Overruns, reference.overruns, other.overruns),
-        (
-            Figure::LostRecords,
-            reference.lost_records,
-            other.lost_records,
-        ),
-    ];
-    let counts = counts
-        .map(|(figure, first, second)| difference(figure, Some(first as f64), Some(second as f64)));
-    let all = of_loops.chain(counts);
-    all.filter(|figure| figure.reference.is_some() || figure.other.is_some())
+    let all = Figure::ALL.map(|figure| difference(figure, reference, other));
+    let found = all.into_iter();
+    found
+        .filter(|found| found.reference.is_some() || found.other.is_some())
         .collect()
 }
 
-fn difference(figure: Figure, reference: Option<f64>, other: Option<f64>) -> FigureDifference {
+fn difference(figure: Figure, reference: &RunResult, other: &RunResult) -> FigureDifference {
+    let (reference, other) = (figure.value(reference), figure.value(other));
     FigureDifference {
         figure,
         reference,
