@@ -5,6 +5,7 @@ use crate::experiment::run_comparison::{
     Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
 use crate::identify::Estimate;
+use crate::identify::verdict::Cnmp;
 use crate::report::number::interval;
 use crate::util::decimal::Decimal;
 
@@ -47,22 +48,22 @@ fn run_text(reference: &RunHead, other: &RunDifferences) -> String {
 }
 
 fn verdict_text(reference: &RunHead, other: &RunDifferences) -> String {
-    let mut text = String::new();
-    if let (Some(first), Some(second)) = (reference.cnmp, other.run.cnmp) {
-        let line = match other.verdict_differs == Some(true) {
-            true => format!("DIFFERENT: {}, reference {}", second.name(), first.name()),
-            false => format!("{} in both", second.name()),
-        };
-        text += &labelled("CNMP zeros", &line);
-    }
-    if let (Some(first), Some(second)) = (&reference.signs, &other.run.signs) {
-        let line = match other.signs_differ == Some(true) {
-            true => format!("DIFFERENT: {second}, reference {first}"),
-            false => format!("{second} in both"),
-        };
-        text += &labelled("signs", &line);
-    }
-    text
+    let [first, second] = [reference, &other.run].map(|run| run.cnmp.map(Cnmp::name));
+    let verdicts = agreement("CNMP zeros", first, second);
+    let [first, second] = [reference, &other.run].map(|run| run.signs.as_deref());
+    verdicts + &agreement("signs", first, second)
+}
+
+/// Whether both runs show the same; empty if a run shows nothing.
+fn agreement(label: &str, reference: Option<&str>, other: Option<&str>) -> String {
+    let (Some(reference), Some(other)) = (reference, other) else {
+        return String::new();
+    };
+    let line = match other == reference {
+        true => format!("{other} in both"),
+        false => format!("DIFFERENT: {other}, reference {reference}"),
+    };
+    labelled(label, &line)
 }
 
 fn settings_text(other: &RunDifferences) -> String {

@@ -115,7 +115,8 @@ impl Comparison {
 }
 
 impl RunDifferences {
-    /// The differences whose significance is tested. Two values without error are equal by definition, as the frequencies of free bodies.
+    /// The differences whose significance is tested. Two values without error are equal by definition, as the frequencies of free
+    /// bodies.
     fn tested(&mut self) -> Vec<&mut Difference> {
         let modes = self.modes.modes.iter_mut();
         let modes = modes.flat_map(ModeDifference::tested);
@@ -126,7 +127,7 @@ impl RunDifferences {
 }
 
 fn compared(reference: &RunResult, other: &RunResult) -> Result<RunDifferences, ComparisonError> {
-    let fits = (fit(reference), fit(other));
+    let fits = (reference.fit(), other.fit());
     let modes = match fits {
         (Some(reference), Some(other)) => ModeDifferences::of(reference, other),
         _ => ModeDifferences::default(),
@@ -149,10 +150,6 @@ fn compared(reference: &RunResult, other: &RunResult) -> Result<RunDifferences, 
         figures: figures::figures(reference, other),
         settings: differences(&other.config, &reference.config),
     })
-}
-
-fn fit(run: &RunResult) -> Option<&crate::identify::modal::ModalFit> {
-    run.analysis.as_ref()?.fit.as_ref().ok()
 }
 
 fn differ<T: PartialEq>(first: Option<T>, second: Option<T>) -> Option<bool> {

@@ -1,7 +1,5 @@
 //! The modes and the static compliance of two runs.
 
-use std::f64::consts::TAU;
-
 use serde::Serialize;
 
 use super::difference::Difference;
@@ -75,16 +73,12 @@ impl ModeDifferences {
             modes: shared
                 .map(|(mode, other)| ModeDifference::of(mode, other))
                 .collect(),
-            only_in_reference_hz: missing.map(|(mode, _)| hertz(mode)).collect(),
-            only_in_other_hz: added.map(|(_, mode)| hertz(mode)).collect(),
+            only_in_reference_hz: missing.map(|(mode, _)| mode.frequency_hz().value).collect(),
+            only_in_other_hz: added.map(|(_, mode)| mode.frequency_hz().value).collect(),
             static_compliance_m_per_n: match compliances {
                 (Some(reference), Some(other)) => Some(Difference::of(reference, other)),
                 _ => None,
             },
         }
     }
-}
-
-fn hertz(mode: &FittedMode) -> f64 {
-    mode.omega_rad_s.value / TAU
 }

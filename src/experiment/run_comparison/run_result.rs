@@ -10,7 +10,7 @@ use crate::experiment::description::Description;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::{Plan, RunKind};
-use crate::identify::modal::FittedMode;
+use crate::identify::modal::{FittedMode, ModalFit};
 use crate::identify::verdict::Cnmp;
 use crate::recording::Recording;
 
@@ -94,10 +94,15 @@ impl RunResult {
         })
     }
 
+    /// The fitted modes, if there are any.
+    pub fn fit(&self) -> Option<&ModalFit> {
+        self.analysis.as_ref()?.fit.as_ref().ok()
+    }
+
     /// The run for JSON.
     pub(super) fn head(&self) -> RunHead {
         let analysis = self.analysis.as_ref();
-        let fit = analysis.and_then(|analysis| analysis.fit.as_ref().ok());
+        let fit = self.fit();
         RunHead {
             label: self.label.clone(),
             recording: self.recording.clone(),
