@@ -63,6 +63,27 @@ fn figures_of_two_loops_are_those_of_the_runs() {
 }
 
 #[test]
+fn runs_of_equal_names_are_distinguished_by_their_paths() {
+    let bench = Bench::new();
+    for given in ["", "--name slow"] {
+        let (recording, _) = control(&bench, &format!("--slow {given}"));
+        for folder in ["monday", "tuesday"] {
+            std::fs::create_dir_all(bench.path(folder)).expect("a folder");
+            let copy = bench.path(folder).join("run.mcap");
+            std::fs::copy(bench.path(&recording), copy).expect("a copy");
+        }
+        let comparison = bench.json("compare monday/run.mcap tuesday/run.mcap");
+        let name = given.strip_prefix("--name ").unwrap_or("run");
+        let labels = [
+            &comparison["reference"]["label"],
+            &comparison["others"][0]["label"],
+        ];
+        let expected = ["monday", "tuesday"].map(|folder| format!("{name} ({folder}/run.mcap)"));
+        assert_eq!(labels, expected.each_ref());
+    }
+}
+
+#[test]
 fn refuses_runs_with_nothing_in_common_and_single_recordings() {
     let bench = Bench::new();
     let (control, _) = control(&bench, "--slow");

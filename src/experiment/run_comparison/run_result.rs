@@ -138,15 +138,13 @@ fn label(recording: &Recording) -> String {
     name.unwrap_or_else(|| stem.to_string_lossy().into_owned())
 }
 
-/// Makes labels different that are equal, by the names of the files.
+/// Makes labels different that are equal, by the paths of the recordings.
 pub fn distinguish(runs: &mut [RunResult]) {
     let labels: Vec<String> = runs.iter().map(|run| run.label.clone()).collect();
     for run in runs {
         let equal = labels.iter().filter(|label| **label == run.label);
         if equal.count() > 1 {
-            let path = std::path::Path::new(&run.recording);
-            let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-            run.label = format!("{} ({stem})", run.label);
+            run.label = format!("{} ({})", run.label, run.recording);
         }
     }
 }
