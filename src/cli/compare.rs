@@ -9,7 +9,7 @@ use super::compare_output::text;
 use super::error::CliError;
 use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
-use super::output::print_result;
+use super::output::{print_result, warn};
 use super::progress::ProgressLine;
 use crate::experiment::run_comparison::{Comparison, RunResult, distinguish};
 use crate::recording::Recording;
@@ -53,10 +53,24 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         page: page.transpose()?,
         comparison,
     };
+    let cautions: Vec<String> = runs.iter().flat_map(cautions).collect();
+    warn(&cautions);
     print_result(args.json, &report, |report| {
         text(&report.comparison, report.page.as_deref())
     })?;
-    Ok(Outcome::Done)
+    Ok(match cautions.is_empty() {
+        true => Outcome::Done,
+        false => Outcome::Impaired,
+    })
+}
+
+/// The defects of a run, with the path of its recording.
+fn cautions(run: &RunResult) -> Vec<String> {
+    let path = &run.recording;
+    let cautions = run.cautions.iter();
+    cautions
+        .map(|caution| format!("{path}: {caution}"))
+        .collect()
 }
 
 /// Reads and analyses the recordings, with progress on a terminal.

@@ -84,6 +84,35 @@ fn runs_of_equal_names_are_distinguished_by_their_paths() {
 }
 
 #[test]
+fn warns_of_runs_that_are_cut_off_or_tripped_and_exits_with_code_3() {
+    let bench = Bench::new();
+    let (whole, _) = control(&bench, "--slow");
+    let recorded = std::fs::read(bench.path(&whole)).expect("a recording");
+    bench.write("cut.mcap", &recorded[..recorded.len() * 7 / 10]);
+    // The reference is beyond the soft limit.
+    let tripped = bench.run(
+        "control --slow --amplitude 4um --duration 1.5s --no-report --json --set interlock.soft_limit_m=4.2e-6 \
+         --set control.min_modulus_margin=0",
+    );
+    assert_eq!(tripped.code, 1, "{}", tripped.err);
+    let tripped = tripped.json()["recording"].as_str().map(String::from);
+    let tripped = tripped.expect("a path");
+    for (recording, word) in [("cut.mcap", "cut off"), (&tripped, "tripped")] {
+        for order in [
+            format!("{whole} {recording}"),
+            format!("{recording} {whole}"),
+        ] {
+            let answer = bench.run(&format!("compare {order}"));
+            assert_eq!(answer.code, 3, "{answer:?}");
+            let lines: Vec<&str> = answer.err.lines().collect();
+            let warned = |line: &&str| line.contains(recording) && line.contains(word);
+            assert!(lines.len() == 1 && lines.iter().all(warned), "{answer:?}");
+        }
+    }
+    assert_eq!(bench.run(&format!("compare {whole} {whole}")).code, 0);
+}
+
+#[test]
 fn refuses_runs_with_nothing_in_common_and_single_recordings() {
     let bench = Bench::new();
     let (control, _) = control(&bench, "--slow");

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::config::Config;
-use crate::experiment::analysis::{Analysis, AnalysisProgress, analyse_with_progress};
+use crate::experiment::analysis::{Analysis, AnalysisProgress, analyse_with_progress, cautions};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::control_run::{ControlRun, control_run};
 use crate::experiment::description::Description;
@@ -25,6 +25,8 @@ pub struct RunResult {
     pub kind: RunKind,
     /// How the run ended.
     pub outcome: Ending,
+    /// Defects of the run that affect its results: it was not completed, or records are lost.
+    pub cautions: Vec<String>,
     /// Its settings.
     pub config: Config,
     /// Scheduled ticks that were not served.
@@ -82,6 +84,7 @@ impl RunResult {
             recording: recording.path().display().to_string(),
             kind: plan.kind,
             outcome: Ending::of(recording),
+            cautions: cautions(recording),
             overruns: recording.overruns(),
             lost_records: recording.lost_records(),
             analysis,
