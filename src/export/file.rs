@@ -61,19 +61,22 @@ impl Target {
     }
 }
 
-/// Writes a new file under another name and renames it when it is complete. Returns its path and the result of `write`.
+/// Writes a new file under another name and renames it when it is complete. Returns its path and the result of `write`. Each call
+/// has a partial file of its own, `FILE.partial`, `FILE-2.partial`, ..., also beside one that a killed process left.
 pub(super) fn write_new<T>(
     target: &Target,
     write: impl FnOnce(&mut Output) -> Result<T, ExportError>,
 ) -> Result<(PathBuf, T), ExportError> {
     target.check()?;
+    let at_target = |error: ExportError| error.at(target.path());
     let partial = PathBuf::from(format!("{}.partial", target.path().display()));
+    let partial = create_free(&partial).map_err(|error| at_target(error.into()))?;
     let written =
         write_synced(&partial, write).and_then(|result| Ok((rename_to(&partial, target)?, result)));
     written.map_err(|error| {
         // The error of writing is the one to report.
         let _ = std::fs::remove_file(&partial);
-        error.at(target.path())
+        at_target(error)
     })
 }
 
@@ -81,19 +84,11 @@ fn write_synced<T>(
     partial: &Path,
     write: impl FnOnce(&mut Output) -> Result<T, ExportError>,
 ) -> Result<T, ExportError> {
-    let mut out = BufWriter::new(create_partial(partial)?);
+    let mut out = BufWriter::new(File::create(partial)?);
     let result = write(&mut out)?;
     out.flush()?;
     out.get_ref().sync_all()?;
     Ok(result)
-}
-
-/// Creates the partial file in place of one that a killed process left.
-fn create_partial(partial: &Path) -> std::io::Result<File> {
-    if partial.is_file() {
-        std::fs::remove_file(partial)?;
-    }
-    File::create_new(partial)
 }
 
 fn rename_to(partial: &Path, target: &Target) -> Result<PathBuf, ExportError> {
@@ -103,4 +98,52 @@ fn rename_to(partial: &Path, target: &Target) -> Result<PathBuf, ExportError> {
         return Err(error.into());
     }
     Ok(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Writes `text` to a new file, and runs `during` while the file is incomplete.
+    fn write(target: &Target, text: &str, during: impl FnOnce()) -> Result<PathBuf, ExportError> {
+        let written = write_new(target, |out| {
+            during();
+            Ok(out.write_all(text.as_bytes())?)
+        });
+        written.map(|(path, ())| path)
+    }
+
+    #[test]
+    fn exports_to_one_name_at_the_same_time_have_files_of_their_own() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        let target = Target::Numbered(path.clone());
+        let mut inner = None;
+        let outer = write(&target, "outer", || {
+            inner = write(&target, "inner", || {}).ok()
+        });
+        assert_eq!(inner.as_ref(), Some(&path));
+        let outer = outer.expect("written");
+        assert_eq!(outer, folder.path().join("run-2.csv"));
+        for (file, text) in [(path, "inner"), (outer, "outer")] {
+            assert_eq!(std::fs::read_to_string(file).expect("a file"), text);
+        }
+        assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 2);
+    }
+
+    #[test]
+    fn an_export_to_a_name_that_another_took_meanwhile_is_refused_and_leaves_nothing() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        let target = Target::Named(path.clone());
+        let outer = write(&target, "outer", || {
+            write(&target, "inner", || {}).expect("a free name");
+        });
+        assert!(
+            matches!(outer, Err(ExportError::Exists { .. })),
+            "{outer:?}"
+        );
+        assert_eq!(std::fs::read_to_string(path).expect("a file"), "inner");
+        assert_eq!(std::fs::read_dir(&folder).expect("a folder").count(), 1);
+    }
 }

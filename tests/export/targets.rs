@@ -78,10 +78,11 @@ fn states_that_the_recording_does_not_exist() {
 }
 
 #[test]
-fn replaces_the_partial_file_of_a_killed_export() {
+fn partial_file_of_a_killed_export_is_left_and_does_not_prevent_another() {
     let bench = short_recording();
     bench.write("run.csv.partial", "time_s,refer");
     bench.json("export run.mcap --format csv");
-    assert_eq!(bench.files(), ["run.csv", "run.mcap"]);
+    assert_eq!(bench.files(), ["run.csv", "run.csv.partial", "run.mcap"]);
     assert_eq!(bench.read("run.csv").lines().count(), 11);
+    assert_eq!(bench.read("run.csv.partial"), "time_s,refer");
 }
