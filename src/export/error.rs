@@ -35,11 +35,14 @@ pub enum ExportError {
     },
     /// UFF 58 has regular times only.
     #[error(
-        "the recording lacks ticks after {time_s} s, but signals in UFF 58 have regular times; use --format csv, parquet or mat"
+        "the recording lacks ticks between tick {after_tick} and tick {before_tick}, but signals in UFF 58 have regular times; \
+         use --format csv, parquet or mat"
     )]
     Uneven {
-        /// Time of the tick before the gap.
-        time_s: f64,
+        /// The last tick before the first gap.
+        after_tick: u64,
+        /// The first tick after it.
+        before_tick: u64,
     },
     /// A variable of a MAT-file has at most 2^32 bytes.
     #[error(

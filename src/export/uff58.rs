@@ -62,7 +62,7 @@ struct Dataset<'a> {
 pub(super) fn signals(recording: &Path, file: &File) -> Result<Recording, ExportError> {
     let mut survey = Survey::default();
     let recording = rows::open(recording, &mut survey)?;
-    survey.require_regular_times()?;
+    require_regular_times(&recording)?;
     let measured = SIGNALS.iter().zip(survey.measured).filter(|(_, is)| *is);
     let (signals, heads): (Vec<&Signal>, Vec<String>) = measured
         .filter_map(|(signal, _)| {
@@ -96,7 +96,7 @@ fn head(recording: &Recording, survey: &Survey, signal: &Signal, numerator: Axis
         ordinates: REAL_DOUBLE,
         points: recording.tick_count(),
         spacing: EVEN,
-        first: survey.first_s,
+        first: survey.first_s.unwrap_or_default(),
         increment: recording.period_s().unwrap_or_default(),
         abscissa: TIME,
         numerator,
@@ -154,26 +154,15 @@ fn axis(quantity: Quantity) -> Option<Axis> {
 /// What must be known before the first dataset is written.
 #[derive(Default)]
 struct Survey {
-    first_s: f64,
-    /// Number and time of the last tick.
-    last: Option<(u64, f64)>,
-    /// Time of the tick before the first gap.
-    gap_after_s: Option<f64>,
+    /// Time of the first tick in seconds.
+    first_s: Option<f64>,
     /// Whether a signal has a measurement in any tick.
     measured: [bool; SIGNALS.len()],
 }
 
 impl Rows for Survey {
     fn push(&mut self, record: &TickRecord) -> Result<(), ExportError> {
-        let time_s = record.scheduled_ns as f64 / 1e9;
-        match self.last {
-            None => self.first_s = time_s,
-            Some((tick, before_s)) if tick.checked_add(1) != Some(record.tick) => {
-                self.gap_after_s.get_or_insert(before_s);
-            }
-            Some(_) => {}
-        }
-        self.last = Some((record.tick, time_s));
+        self.first_s.get_or_insert(record.scheduled_ns as f64 / 1e9);
         for (measured, signal) in self.measured.iter_mut().zip(&SIGNALS) {
             *measured |= !signal.number(record).is_nan();
         }
@@ -181,13 +170,14 @@ impl Rows for Survey {
     }
 }
 
-impl Survey {
-    /// Refuses a recording with a gap.
-    fn require_regular_times(&self) -> Result<(), ExportError> {
-        match self.gap_after_s {
-            Some(time_s) => Err(ExportError::Uneven { time_s }),
-            None => Ok(()),
-        }
+/// Refuses a recording with a gap.
+fn require_regular_times(recording: &Recording) -> Result<(), ExportError> {
+    match recording.gaps().first() {
+        Some(gap) => Err(ExportError::Uneven {
+            after_tick: gap.after_tick,
+            before_tick: gap.before_tick,
+        }),
+        None => Ok(()),
     }
 }
 
