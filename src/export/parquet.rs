@@ -1,5 +1,6 @@
 //! Doubles for quantities, null where there is no measurement; unsigned 64-bit integers for counts. Not compressed.
 
+use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -92,8 +93,16 @@ impl Groups<'_> {
     }
 }
 
+/// The error of the operating system, if it is the reason, so that its remedy is stated.
 fn failed(error: ParquetError) -> ExportError {
-    std::io::Error::other(error).into()
+    let error = match error {
+        ParquetError::External(source) => match source.downcast::<io::Error>() {
+            Ok(error) => *error,
+            Err(source) => io::Error::other(source),
+        },
+        error => io::Error::other(error),
+    };
+    error.into()
 }
 
 fn signals_schema() -> Result<TypePtr> {
@@ -155,5 +164,19 @@ fn bits(sample: Sample) -> i64 {
     match sample {
         Sample::Real(_) => 0,
         Sample::Count(count) => count.cast_signed(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn states_that_the_disk_is_full() {
+        let full = io::Error::from(io::ErrorKind::StorageFull);
+        let error = failed(ParquetError::from(full)).at(Path::new("run.parquet"));
+        assert!(error.to_string().contains("free some space"), "{error}");
+        let other = failed(ParquetError::EOF("no more bytes".into()));
+        assert!(other.to_string().contains("no more bytes"), "{other}");
     }
 }

@@ -1,5 +1,8 @@
 //! The file that is written.
 
+use std::path::Path;
+
+use bench_test_support::program::run_program;
 use serde_json::json;
 
 use crate::{recorded_chirp, short_recording};
@@ -63,6 +66,26 @@ fn states_what_to_do_if_the_file_cannot_be_written() {
         assert!(!answer.err.contains("space"), "{answer:?}");
     }
     assert_eq!(bench.files(), ["run.mcap"]);
+}
+
+#[test]
+fn states_that_the_file_is_larger_than_the_system_allows() {
+    let bench = recorded_chirp();
+    let mut formats = vec!["csv", "mat", "uff58"];
+    if cfg!(feature = "parquet") {
+        formats.push("parquet");
+    }
+    for format in formats {
+        // 64 blocks of 512 bytes (1024 in some shells): fewer than the 80,500 ticks of the chirp have in any format.
+        let script = format!("ulimit -f 64; exec \"$0\" export run.mcap --format {format}");
+        let program = env!("CARGO_BIN_EXE_bench");
+        let answer = run_program(Path::new("sh"), &bench.path(""), ["-c", &script, program]);
+        assert_eq!(answer.code, 1, "{format}: {answer:?}");
+        for words in ["run.", "File too large", "ulimit -f"] {
+            assert!(answer.err.contains(words), "{format}: {answer:?}");
+        }
+        assert_eq!(bench.files(), ["run.mcap"], "{format}");
+    }
 }
 
 #[test]
