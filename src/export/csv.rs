@@ -1,11 +1,11 @@
 //! A header line, and a line for each tick or frequency. A cell without a measurement is empty; numbers read back to the same double.
 
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::Path;
 
 use super::file::Output;
 use super::rows::{self, Rows};
-use super::{ExportError, SIGNALS, Sample};
+use super::{ExportError, SIGNALS, Signal, Value};
 use crate::identify::{Frf, frf_csv};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
@@ -31,12 +31,18 @@ impl Rows for Lines<'_> {
             if index > 0 {
                 out.write_all(b",")?;
             }
-            match (signal.value)(record) {
-                Sample::Real(Some(value)) => write!(out, "{value:e}")?,
-                Sample::Real(None) => {}
-                Sample::Count(count) => write!(out, "{count}")?,
-            }
+            write_cell(out, signal, record)?;
         }
         Ok(out.write_all(b"\n")?)
+    }
+}
+
+fn write_cell(out: &mut Output, signal: &Signal, record: &TickRecord) -> io::Result<()> {
+    match signal.value {
+        Value::Real(_, value) => match value(record) {
+            Some(value) => write!(out, "{value:e}"),
+            None => Ok(()),
+        },
+        Value::Count(value) => write!(out, "{}", value(record)),
     }
 }

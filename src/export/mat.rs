@@ -14,7 +14,7 @@ use super::file::Output;
 use super::response::Response;
 use super::rows::{self, Rows};
 use super::sections::Sections;
-use super::{ExportError, SIGNALS, Sample, Signal};
+use super::{ExportError, SIGNALS, Signal, Value};
 use crate::identify::Frf;
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
@@ -64,9 +64,9 @@ pub(super) fn signals(recording: &Path, file: &File) -> Result<Recording, Export
 
 /// Everything of a column before its numbers.
 fn column_head(signal: &Signal, rows: u64) -> Result<Vec<u8>, ExportError> {
-    let (class, kind) = match signal.is_count() {
-        true => (UINT64_CLASS, UINT64),
-        false => (DOUBLE_CLASS, DOUBLE),
+    let (class, kind) = match signal.value {
+        Value::Real(..) => (DOUBLE_CLASS, DOUBLE),
+        Value::Count(_) => (UINT64_CLASS, UINT64),
     };
     let head = array_head(class, &[dimension(rows)?, 1], signal.name);
     let bytes = 8 * rows;
@@ -80,9 +80,9 @@ struct Columns<'a>(Sections<'a>);
 impl Rows for Columns<'_> {
     fn push(&mut self, record: &TickRecord) -> Result<(), ExportError> {
         for (index, signal) in SIGNALS.iter().enumerate() {
-            let bytes = match (signal.value)(record) {
-                Sample::Real(value) => value.unwrap_or(f64::NAN).to_le_bytes(),
-                Sample::Count(count) => count.to_le_bytes(),
+            let bytes = match signal.value {
+                Value::Real(..) => signal.number(record).to_le_bytes(),
+                Value::Count(value) => value(record).to_le_bytes(),
             };
             self.0.append(index + 1, &bytes)?;
         }

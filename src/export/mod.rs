@@ -27,7 +27,7 @@ use serde::Serialize;
 pub use error::ExportError;
 pub use file::Target;
 pub use response::Response;
-pub use signal::{Quantity, SIGNALS, Sample, Signal};
+pub use signal::{Quantity, SIGNALS, Signal, Value};
 
 use crate::recording::{Recording, RecordingError};
 use file::write_new;

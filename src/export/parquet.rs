@@ -12,7 +12,7 @@ use ::parquet::schema::types::{Type, TypePtr};
 
 use super::file::Output;
 use super::rows::{self, Rows};
-use super::{ExportError, SIGNALS, Sample, Signal};
+use super::{ExportError, SIGNALS, Signal, Value};
 use crate::identify::{Frf, frf_csv};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
@@ -116,12 +116,12 @@ fn table(name: &str, fields: Vec<TypePtr>) -> Result<TypePtr> {
 }
 
 fn field(signal: &Signal) -> Result<TypePtr> {
-    let field = match signal.is_count() {
-        true => Type::primitive_type_builder(signal.name, PhysicalType::INT64)
+    let field = match signal.value {
+        Value::Real(..) => Type::primitive_type_builder(signal.name, PhysicalType::DOUBLE)
+            .with_repetition(Repetition::OPTIONAL),
+        Value::Count(_) => Type::primitive_type_builder(signal.name, PhysicalType::INT64)
             .with_converted_type(ConvertedType::UINT_64)
             .with_repetition(Repetition::REQUIRED),
-        false => Type::primitive_type_builder(signal.name, PhysicalType::DOUBLE)
-            .with_repetition(Repetition::OPTIONAL),
     };
     Ok(Arc::new(field.build()?))
 }
@@ -137,34 +137,22 @@ fn write_column(
     signal: &Signal,
     rows: &[TickRecord],
 ) -> Result<()> {
-    let samples = rows.iter().map(signal.value);
-    if signal.is_count() {
-        let counts: Vec<i64> = samples.map(bits).collect();
-        let column = writer.typed::<Int64Type>();
-        column.write_batch(&counts, None, None)?;
-    } else {
-        let values: Vec<Option<f64>> = samples.map(quantity).collect();
-        let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
-        let values: Vec<f64> = values.into_iter().flatten().collect();
-        let column = writer.typed::<DoubleType>();
-        column.write_batch(&values, Some(&levels), None)?;
+    match signal.value {
+        Value::Real(_, value) => {
+            let values = rows.iter().map(value);
+            let levels: Vec<i16> = values.clone().map(|v| i16::from(v.is_some())).collect();
+            let values: Vec<f64> = values.flatten().collect();
+            let column = writer.typed::<DoubleType>();
+            column.write_batch(&values, Some(&levels), None)?;
+        }
+        Value::Count(value) => {
+            // The 64 bits of Parquet's integer, which the schema declares unsigned.
+            let bits: Vec<i64> = rows.iter().map(|row| value(row).cast_signed()).collect();
+            let column = writer.typed::<Int64Type>();
+            column.write_batch(&bits, None, None)?;
+        }
     }
     writer.close()
-}
-
-fn quantity(sample: Sample) -> Option<f64> {
-    match sample {
-        Sample::Real(value) => value,
-        Sample::Count(count) => Some(count as f64),
-    }
-}
-
-/// A count in the 64 bits of Parquet's integer, which the schema declares unsigned.
-fn bits(sample: Sample) -> i64 {
-    match sample {
-        Sample::Real(_) => 0,
-        Sample::Count(count) => count.cast_signed(),
-    }
 }
 
 #[cfg(test)]

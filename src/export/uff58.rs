@@ -11,7 +11,7 @@ use super::file::Output;
 use super::response::Response;
 use super::rows::{self, Rows};
 use super::sections::Sections;
-use super::{ExportError, Quantity, SIGNALS, Signal};
+use super::{ExportError, Quantity, SIGNALS, Signal, Value};
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
 
@@ -66,7 +66,7 @@ pub(super) fn signals(recording: &Path, file: &File) -> Result<Recording, Export
     let measured = SIGNALS.iter().zip(survey.measured).filter(|(_, is)| *is);
     let (signals, heads): (Vec<&Signal>, Vec<String>) = measured
         .filter_map(|(signal, _)| {
-            let numerator = axis(signal.quantity)?;
+            let numerator = axis(signal)?;
             Some((signal, head(&recording, &survey, signal, numerator)))
         })
         .unzip();
@@ -143,11 +143,11 @@ impl Datasets<'_> {
 }
 
 /// The axis of a signal that gets a dataset.
-fn axis(quantity: Quantity) -> Option<Axis> {
-    match quantity {
-        Quantity::Displacement => Some(DISPLACEMENT),
-        Quantity::Current => Some(CURRENT),
-        Quantity::Time | Quantity::Count => None,
+fn axis(signal: &Signal) -> Option<Axis> {
+    match signal.value {
+        Value::Real(Quantity::Displacement, _) => Some(DISPLACEMENT),
+        Value::Real(Quantity::Current, _) => Some(CURRENT),
+        Value::Real(Quantity::Time, _) | Value::Count(_) => None,
     }
 }
 
