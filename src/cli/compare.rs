@@ -14,7 +14,7 @@ use super::progress::ProgressLine;
 use crate::experiment::run_comparison::{Comparison, RunResult, distinguish};
 use crate::recording::Recording;
 use crate::report::ReportError;
-use crate::report::run_pages::{ComparedRun, comparison_page};
+use crate::report::run_pages::comparison_page;
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
 
@@ -44,8 +44,7 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let mut runs = results(&args.recordings)?;
-    distinguish(&mut runs);
+    let runs = results(&args.recordings)?;
     let comparison = Comparison::of(&runs).map_err(|error| CliError::Usage(error.to_string()))?;
     let page = args.out.as_deref();
     let page = page.map(|path| write_page(path, &runs, &comparison));
@@ -73,12 +72,14 @@ fn cautions(run: &RunResult) -> Vec<String> {
         .collect()
 }
 
-/// Reads and analyses the recordings, with progress on a terminal.
-fn results(paths: &[PathBuf]) -> Result<Vec<RunResult>, CliError> {
+/// Reads and analyses the recordings, with progress on a terminal. Their labels are different.
+pub(super) fn results(paths: &[PathBuf]) -> Result<Vec<RunResult>, CliError> {
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
     let results = paths.iter().map(|path| result(path, &progress));
-    results.collect()
+    let mut results = results.collect::<Result<Vec<_>, _>>()?;
+    distinguish(&mut results);
+    Ok(results)
 }
 
 fn result(path: &Path, progress: &Progress) -> Result<RunResult, CliError> {
@@ -94,8 +95,7 @@ fn write_page(
     comparison: &Comparison,
 ) -> Result<String, CliError> {
     let failed = |error: ReportError| CliError::Failed(error.to_string());
-    let compared: Vec<ComparedRun> = runs.iter().map(ComparedRun::from).collect();
-    let page = comparison_page(&compared, Some(comparison)).map_err(failed)?;
+    let page = comparison_page(runs, Some(comparison)).map_err(failed)?;
     let shown = path.display().to_string();
     write_atomic(path, &page).map_err(|error| {
         CliError::Failed(format!(

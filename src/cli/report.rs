@@ -5,20 +5,18 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::analysis_output::shown_by;
+use super::compare::results;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
-use crate::experiment::{
-    AnalysisError, BasicResults, Plan, RunKind, analyse_with_progress, control_run, overview,
-    step_response,
-};
-use crate::identify::{Frf, frf_csv};
+use crate::config::Config;
+use crate::experiment::run_comparison::RunResult;
+use crate::experiment::{Analysis, BasicResults, ControlRun, overview};
 use crate::recording::Recording;
 use crate::report::ReportError;
 use crate::report::run_pages::{
-    BasicReport, BenchRun, ComparedRun, ControlReport, comparison_page, page as analysed_page,
-    plots,
+    BasicReport, BenchRun, ControlReport, comparison_page, page as analysed_page, plots,
 };
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
@@ -76,63 +74,59 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// The page of one run, or of several recordings in the same plots.
 fn page(paths: &[PathBuf]) -> Result<String, CliError> {
-    if let [path] = paths {
-        return run_page(path);
+    match paths {
+        [path] => run_page(path),
+        paths => comparison_page(&results(paths)?, None).map_err(nothing_common),
     }
-    let runs = paths.iter().map(|path| compared_run(path));
-    let runs = runs.collect::<Result<Vec<_>, _>>()?;
-    comparison_page(&runs, None).map_err(nothing_common)
 }
 
 /// The page of one run: its analysis, if it is one of an excitation; its loop; or what else it has found.
 fn run_page(path: &Path) -> Result<String, CliError> {
     let recording = Recording::open(path)?;
-    let plan = Plan::of(&recording)?;
-    let page = match (plan.kind, plan.config.control.reference.is_swept()) {
-        (RunKind::Chirp, _) | (RunKind::Control, true) => analysis_page(&recording, &plan)?,
-        (RunKind::Control, false)
-        | (RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck, _) => Err(String::new()),
-    };
-    match (page, plan.kind) {
-        (Ok(page), _) => Ok(page),
-        (Err(_), RunKind::Control) => control_page(&recording, &plan),
-        (Err(why), _) => basic_page(&recording, &plan, &why),
+    let progress = Progress::new("analysing");
+    let _line = ProgressLine::show(&progress);
+    let run = RunResult::of(&recording, &mut shown_by(&progress))?;
+    match (&run.analysis, &run.control) {
+        (Some(analysis), _) => analysis_page(&recording, &run.config, analysis),
+        (None, Some(control)) => control_page(&recording, &run.config, control),
+        (None, None) => basic_page(&recording, &run),
     }
 }
 
-/// The page of an analysed excitation, or why it cannot be analysed.
-fn analysis_page(recording: &Recording, plan: &Plan) -> Result<Result<String, String>, CliError> {
-    let progress = Progress::new("analysing");
-    let _line = ProgressLine::show(&progress);
-    let analysis = match analyse_with_progress(recording, &plan.config, &mut shown_by(&progress)) {
-        Ok(analysis) => analysis,
-        Err(AnalysisError::Recording(error)) => return Err(error.into()),
-        Err(error) => return Ok(Err(error.to_string())),
-    };
-    let report = BenchRun::new(recording, &analysis, &plan.config).report();
+/// The page of an analysed excitation.
+fn analysis_page(
+    recording: &Recording,
+    config: &Config,
+    analysis: &Analysis,
+) -> Result<String, CliError> {
+    let report = BenchRun::new(recording, analysis, config).report();
     let report = report.map_err(failed)?;
     let plots = plots(&report).map_err(failed)?;
-    Ok(Ok(analysed_page(&report, &plots)))
+    Ok(analysed_page(&report, &plots))
 }
 
-/// The report of a closed-loop run.
-fn control_page(recording: &Recording, plan: &Plan) -> Result<String, CliError> {
+/// The page of a closed-loop run.
+fn control_page(
+    recording: &Recording,
+    config: &Config,
+    run: &ControlRun,
+) -> Result<String, CliError> {
     let report = ControlReport {
         recording,
-        config: &plan.config,
-        run: &control_run(recording, plan)?,
+        config,
+        run,
     };
     let plots = report.plots().map_err(failed)?;
-    let frf = frf_beside(recording.path())?;
-    report.page(&plots, frf.as_ref()).map_err(failed)
+    Ok(report.page(&plots))
 }
 
 /// The page of a run without a frequency response.
-fn basic_page(recording: &Recording, plan: &Plan, why: &str) -> Result<String, CliError> {
+fn basic_page(recording: &Recording, run: &RunResult) -> Result<String, CliError> {
+    let why = run.why.as_deref().unwrap_or_default();
     let report = BasicReport {
         recording,
-        config: &plan.config,
-        results: &BasicResults::of(recording, plan, why),
+        config: &run.config,
+        results: &BasicResults::of(recording, run.kind, &run.config, why),
         overview: &overview(recording)?,
     };
     report.page().map_err(failed)
@@ -146,7 +140,7 @@ fn nothing_common(error: ReportError) -> CliError {
     let text = match error {
         ReportError::NoTrace => {
             "the recordings have neither steps nor frequency responses that one plot could show; \
-             run `bench identify` on recordings of a chirp first, or give a single recording"
+             give recordings of `bench chirp` or of steps of `bench control`, or a single recording"
                 .into()
         }
         error => error.to_string(),
@@ -157,31 +151,4 @@ fn nothing_common(error: ReportError) -> CliError {
 fn default_page(recording: &Path) -> PathBuf {
     let stem = recording.file_stem().unwrap_or_default().to_string_lossy();
     recording.with_file_name(format!("{stem}_plots.html"))
-}
-
-/// A recording with its signals, its step and with the frequency response beside it.
-fn compared_run(path: &Path) -> Result<ComparedRun, CliError> {
-    let recording = Recording::open(path)?;
-    let plan = Plan::of(&recording)?;
-    let step = match plan.kind {
-        RunKind::Control => step_response(&recording, &plan)?,
-        RunKind::Chirp | RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => None,
-    };
-    let stem = path.file_stem().unwrap_or_default();
-    Ok(ComparedRun {
-        name: stem.to_string_lossy().into_owned(),
-        frf: frf_beside(path)?,
-        step,
-    })
-}
-
-/// The response that the analysis wrote beside a recording.
-fn frf_beside(path: &Path) -> Result<Option<Frf>, CliError> {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let csv = path.with_file_name(format!("{stem}_frf.csv"));
-    if !csv.exists() {
-        return Ok(None);
-    }
-    let frf = frf_csv::read(&csv).map_err(|error| CliError::Failed(error.to_string()))?;
-    Ok(Some(frf))
 }

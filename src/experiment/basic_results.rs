@@ -2,8 +2,9 @@
 
 use super::calibration::{StaircaseResult, staircase};
 use super::campaign::RestPosition;
-use super::plan::{Plan, RunKind};
+use super::plan::RunKind;
 use super::stage_check::StageCheck;
+use crate::config::Config;
 use crate::recording::Recording;
 
 /// What a run without a frequency response has found.
@@ -21,9 +22,9 @@ pub enum BasicResults {
 
 impl BasicResults {
     /// The results of a recording by its kind. `why` is the reason why an excitation or a closed loop has no analysis.
-    pub fn of(recording: &Recording, plan: &Plan, why: &str) -> BasicResults {
-        match plan.kind {
-            RunKind::Calibrate => match staircase(recording, &plan.config) {
+    pub fn of(recording: &Recording, kind: RunKind, config: &Config, why: &str) -> BasicResults {
+        match kind {
+            RunKind::Calibrate => match staircase(recording, config) {
                 Ok(result) => BasicResults::Staircase(result),
                 Err(why) => BasicResults::Nothing(why),
             },

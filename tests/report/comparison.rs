@@ -53,6 +53,22 @@ fn page_of_several_steps_names_each_recording() {
 }
 
 #[test]
+fn page_of_several_chirps_does_not_need_the_files_of_their_analysis() {
+    let bench = Bench::new();
+    let made = bench.json("chirp --duration 6 --start 5 --stop 50 --out made");
+    let recording = bench.path(made["recording"].as_str().expect("a path"));
+    for copy in ["first.mcap", "second.mcap"] {
+        std::fs::copy(&recording, bench.path(copy)).expect("a copy");
+    }
+    let answer = bench.run("report first.mcap second.mcap --out both.html");
+    assert_eq!(answer.code, 0, "{}", answer.err);
+    let page = bench.read("both.html");
+    for part in ["Frequency responses of the stage", "first", "second"] {
+        assert!(page.contains(part), "{part}");
+    }
+}
+
+#[test]
 fn prints_the_page_to_standard_output() {
     let bench = Bench::new();
     let run = bench.json(STEP);
@@ -73,7 +89,7 @@ fn refuses_recordings_that_one_plot_cannot_show() {
     });
     let answer = bench.run(&format!("report {}", recordings.join(" ")));
     assert_eq!(answer.code, 1);
-    assert!(answer.err.contains("bench identify"), "{}", answer.err);
+    assert!(answer.err.contains("bench chirp"), "{}", answer.err);
     let missing = bench.run("report missing.mcap");
     assert_eq!(missing.code, 1);
     assert!(missing.err.contains("missing.mcap"), "{}", missing.err);

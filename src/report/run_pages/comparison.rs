@@ -21,34 +21,12 @@ const SIGNALS_CAPTION: &str =
     "The whole run. Each column reaches from minimum to maximum, so that no spike is left out.";
 const FRF_CAPTION: &str = "Measured responses, each with a band of two sigma.";
 
-/// A recording with what it shows.
-#[derive(Clone, Debug)]
-pub struct ComparedRun {
-    /// Name in legends and tables.
-    pub name: String,
-    /// The frequency response of the stage.
-    pub frf: Option<Frf>,
-    /// The step of a closed loop.
-    pub step: Option<StepResponse>,
-}
-
-impl From<&RunResult> for ComparedRun {
-    fn from(run: &RunResult) -> ComparedRun {
-        let control = run.control.as_ref();
-        ComparedRun {
-            name: run.label.clone(),
-            frf: run.analysis.as_ref().map(|analysis| analysis.frf.clone()),
-            step: control.and_then(|control| control.step.clone()),
-        }
-    }
-}
-
 /// The page of recordings as an HTML document, with the tables of their differences if they were compared.
 ///
 /// # Errors
 /// When there is nothing to draw, or drawing fails.
 pub fn comparison_page(
-    runs: &[ComparedRun],
+    runs: &[RunResult],
     comparison: Option<&Comparison>,
 ) -> Result<String, ReportError> {
     let plots = [responses(runs)?, steps(runs)?].concat();
@@ -61,32 +39,24 @@ pub fn comparison_page(
     Ok(document_with_plots(&title, &(heading + &parts)))
 }
 
-fn responses(runs: &[ComparedRun]) -> Result<String, ReportError> {
-    let named = |run: &'_ ComparedRun| -> Option<(String, Frf)> {
-        Some((run.name.clone(), run.frf.clone()?))
-    };
-    let found: Vec<(String, Frf)> = runs.iter().filter_map(named).collect();
-    if found.is_empty() {
+/// Measured frequency responses in one plot.
+fn responses(runs: &[RunResult]) -> Result<String, ReportError> {
+    let measured = runs
+        .iter()
+        .filter_map(|run| Some((run.label.as_str(), &run.analysis.as_ref()?.frf)));
+    let measured: Vec<(&str, &Frf)> = measured.collect();
+    if measured.is_empty() {
         return Ok(String::new());
     }
-    let traces: Vec<(&str, &Frf)> = found
-        .iter()
-        .map(|(name, frf)| (name.as_str(), frf))
-        .collect();
-    responses_section(&traces)
-}
-
-/// Measured frequency responses in one plot.
-pub(super) fn responses_section(responses: &[(&str, &Frf)]) -> Result<String, ReportError> {
     let heading = "Frequency responses of the stage";
-    let svg = overlay_bode_svg(Unit::MetresPerAmpere, responses, heading)?;
+    let svg = overlay_bode_svg(Unit::MetresPerAmpere, &measured, heading)?;
     Ok(section(heading, &picture(&svg, heading, FRF_CAPTION)))
 }
 
-fn steps(runs: &[ComparedRun]) -> Result<String, ReportError> {
+fn steps(runs: &[RunResult]) -> Result<String, ReportError> {
     let found = runs
         .iter()
-        .filter_map(|run| Some((run.name.as_str(), run.step.as_ref()?)));
+        .filter_map(|run| Some((run.label.as_str(), run.control.as_ref()?.step.as_ref()?)));
     let found: Vec<(&str, &StepResponse)> = found.collect();
     let heading = "Step response";
     let svg = match found[..] {

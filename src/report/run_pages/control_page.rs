@@ -1,11 +1,11 @@
 //! The report of a closed-loop run: its figures, its signals, its error spectrum and the loop by the model.
 
-use super::comparison::{responses_section, step_picture};
+use super::comparison::step_picture;
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
 use crate::config::Config;
 use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
-use crate::identify::{Frf, SIGMAS_95};
+use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
 use crate::report::html::{facts, note, picture, row, section};
 use crate::report::number::{angular_frequency, interval, plain};
@@ -65,15 +65,8 @@ impl ControlReport<'_> {
         Ok(plots)
     }
 
-    /// The page as an HTML document. `frf` is the response that an analysis of the run has found.
-    ///
-    /// # Errors
-    /// When the response cannot be drawn.
-    pub fn page(&self, plots: &[Plot], frf: Option<&Frf>) -> Result<String, ReportError> {
-        let name = self.name();
-        let responses = frf
-            .map(|frf| responses_section(&[(&name, frf)]))
-            .transpose()?;
+    /// The page as an HTML document.
+    pub fn page(&self, plots: &[Plot]) -> String {
         let title = &self.config.title;
         let body = [
             self.heading(),
@@ -81,13 +74,12 @@ impl ControlReport<'_> {
             run_facts::asked(self.recording, self.config),
             self.figures(),
             self.whole_run(),
-            responses.unwrap_or_default(),
             plots.iter().map(plot_section).collect(),
             run_facts::events(self.recording),
             run_facts::scheduling(self.recording, &[]),
             run_facts::configuration(self.recording, title),
         ];
-        Ok(run_facts::document(self.recording, &name, &body.concat()))
+        run_facts::document(self.recording, &self.name(), &body.concat())
     }
 
     /// The name of the recording without its ending.

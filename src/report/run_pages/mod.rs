@@ -6,7 +6,7 @@
 //! ExternalRecord (a CSV) --------------'
 //! ControlReport (a closed-loop run) -> plots (SVG), control_page (HTML)
 //! BasicReport (a run without a frequency response) -> basic_page (HTML)
-//! ComparedRun (several runs) -> comparison (HTML)
+//! RunResult (several runs) -> comparison (HTML)
 //! ```
 
 mod amplitude_page;
@@ -34,7 +34,7 @@ use crate::report::MagnitudeAxis;
 pub use amplitude_page::AmplitudeFiles;
 pub use basic_page::BasicReport;
 pub use bench_run::BenchRun;
-pub use comparison::{ComparedRun, comparison_page};
+pub use comparison::comparison_page;
 pub use control_page::ControlReport;
 pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};

@@ -162,7 +162,7 @@ impl ControlFiles {
             let path = results.write(plot.kind.name(), "svg", &plot.svg)?;
             plots.insert(plot.kind.name(), Some(path));
         }
-        let page = report.page(&drawn, None)?;
+        let page = report.page(&drawn);
         let report = Some(results.write("report", "html", &page)?);
         Ok(ControlFiles { plots, report })
     }
