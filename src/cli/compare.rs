@@ -14,18 +14,15 @@ use super::progress::ProgressLine;
 use crate::experiment::run_comparison::{Comparison, RunResult, distinguish};
 use crate::recording::Recording;
 use crate::report::ReportError;
-use crate::report::run_pages::comparison_page;
+use crate::report::run_pages::{MAX_COMPARED, comparison_page};
 use crate::util::atomic_file::write_atomic;
 use crate::util::progress::Progress;
-
-/// Most recordings: the curves of more cannot be distinguished.
-const MAX_RECORDINGS: usize = 12;
 
 /// The recordings, and where the page goes.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
-    /// Recordings (MCAP) of `bench chirp` or `bench control`; the others are compared with the first
-    #[arg(required = true, num_args = 2..=MAX_RECORDINGS)]
+    /// 2 to 12 recordings (MCAP) of `bench chirp` or `bench control`; the others are compared with the first
+    #[arg(required = true, num_args = 2..)]
     recordings: Vec<PathBuf>,
     /// Write a page with plots and tables
     #[arg(long, value_name = "PAGE")]
@@ -74,6 +71,13 @@ fn cautions(run: &RunResult) -> Vec<String> {
 
 /// Reads and analyses the recordings, with progress on a terminal. Their labels are different.
 pub(super) fn results(paths: &[PathBuf]) -> Result<Vec<RunResult>, CliError> {
+    if paths.len() > MAX_COMPARED {
+        return Err(CliError::Usage(format!(
+            "{} recordings are given, but the curves of more than {MAX_COMPARED} cannot be distinguished; give at most \
+             {MAX_COMPARED}",
+            paths.len()
+        )));
+    }
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
     let results = paths.iter().map(|path| result(path, &progress));

@@ -27,7 +27,7 @@ const STANDARD_OUTPUT: &str = "-";
 /// The recordings, and where the page goes.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
-    /// A recording (MCAP) of any run, or several of `bench chirp` and `bench control` for the same plots
+    /// A recording (MCAP) of any run, or up to 12 of `bench chirp` and `bench control` for the same plots
     #[arg(required = true)]
     recordings: Vec<PathBuf>,
     /// Path of the page; `-` prints it [default: the first recording with the ending _plots.html]

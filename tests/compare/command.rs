@@ -113,7 +113,7 @@ fn warns_of_runs_that_are_cut_off_or_tripped_and_exits_with_code_3() {
 }
 
 #[test]
-fn refuses_runs_with_nothing_in_common_and_single_recordings() {
+fn refuses_runs_with_nothing_in_common_single_recordings_and_more_than_12() {
     let bench = Bench::new();
     let (control, _) = control(&bench, "--slow");
     let chirp = bench.json("chirp --duration 10 --start 5 --stop 100");
@@ -124,6 +124,11 @@ fn refuses_runs_with_nothing_in_common_and_single_recordings() {
         assert!(answer.err.contains(word), "{word}: {}", answer.err);
     }
     assert_eq!(bench.run(&format!("compare {control}")).code, 2);
+    for command in ["compare", "report"] {
+        let recordings = vec![control.as_str(); 13].join(" ");
+        let answer = bench.run(&format!("{command} {recordings}"));
+        answer.is_refused(&["13 recordings", "at most 12"]);
+    }
     let missing = bench.run(&format!("compare {control} missing.mcap"));
     assert!(
         missing.code == 1 && missing.err.contains("missing.mcap"),

@@ -10,6 +10,8 @@ use crate::report::{
     signals_svg, step_svg,
 };
 
+/// Most recordings on one page: their curves have 4 colours and 3 strokes, so those of more cannot be distinguished.
+pub const MAX_COMPARED: usize = 12;
 /// Longest part of a step that is drawn, as a multiple of its settling time.
 const SETTLING_TIMES: f64 = 4.0;
 /// Shortest and longest part in seconds.

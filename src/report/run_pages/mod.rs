@@ -34,7 +34,7 @@ use crate::report::MagnitudeAxis;
 pub use amplitude_page::AmplitudeFiles;
 pub use basic_page::BasicReport;
 pub use bench_run::BenchRun;
-pub use comparison::comparison_page;
+pub use comparison::{MAX_COMPARED, comparison_page};
 pub use control_page::ControlReport;
 pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
