@@ -2,7 +2,9 @@
 
 use bench::experiment::run_comparison::{Comparison, Difference};
 
-use crate::compared::{GUIDE_N_PER_M, config, modes, of_equal_stages, result};
+use crate::compared::{
+    GUIDE_N_PER_M, config, differences, mean_square_ratio, modes, of_equal_stages, result,
+};
 
 /// Asserts that a difference is that of the closed form, within five standard deviations: a probability of 6e-7.
 fn is_difference(what: &str, found: &Difference, expected: f64) {
@@ -58,11 +60,15 @@ fn finds_a_softer_spring_with_sign_and_size_of_the_closed_form() {
 }
 
 #[test]
-fn equal_stages_seldom_differ_significantly() {
-    let pairs = (0..6).map(of_equal_stages);
-    let different = pairs
-        .filter(|comparison| comparison.significant > 0)
-        .count();
+fn equal_stages_seldom_differ_significantly_and_by_their_sigmas() {
+    let pairs: Vec<Comparison> = (0..6).map(of_equal_stages).collect();
+    let different = pairs.iter().filter(|pair| pair.significant > 0).count();
     // Expected: at most 5 % of 6. Three or more have a probability of 0.2 %.
     assert!(different <= 2, "{different} of 6");
+    let found: Vec<Difference> = pairs.iter().flat_map(differences).collect();
+    assert_eq!(found.len(), 6 * 7, "two modes and the compliance");
+    // A quarter of the differences of a pair is taken as independent. The mean square of 10 independent ratios is between the
+    // quantiles 0.1 % and 99.9 % of chi^2_10/10: 0.15 and 2.96.
+    let ratio = mean_square_ratio(&found);
+    assert!((0.15..2.96).contains(&ratio), "{ratio}");
 }

@@ -93,10 +93,8 @@ fn states_that_the_recording_does_not_exist() {
     let bench = short_recording();
     for option in ["", "--frf"] {
         let answer = bench.run(&format!("export no/such.mcap --format csv {option}"));
-        assert!(
-            answer.code > 0 && answer.err.contains("no such file"),
-            "{answer:?}"
-        );
+        assert_eq!(answer.code, 1, "{answer:?}");
+        assert!(answer.err.contains("no such file"), "{answer:?}");
     }
 }
 

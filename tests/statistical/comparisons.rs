@@ -1,6 +1,6 @@
 //! False alarms of the comparison of equal stages.
 
-use bench_test_support::compared::of_equal_stages;
+use bench_test_support::compared::{differences, mean_square_ratio, of_equal_stages};
 
 const PAIRS: u64 = 40;
 
@@ -11,25 +11,21 @@ fn noise_makes_comparisons_significant_in_at_most_5_percent() {
     // Expected: at most 2. Seven or more have a probability of 0.3 %.
     assert!(different <= 6, "{different} of {PAIRS}");
     // Each difference by itself exceeds its 95 % interval in 5 % of the cases: with sigmas that are too large, in fewer.
-    let mut outside = 0;
-    let mut tested = 0;
-    for comparison in &comparisons {
-        let modes = &comparison.others[0].modes;
-        let of_modes = modes
-            .modes
-            .iter()
-            .flat_map(|mode| [mode.frequency_hz, mode.damping_ratio, mode.residue_per_kg]);
-        for found in of_modes.chain(modes.static_compliance_m_per_n) {
-            tested += 1;
-            outside += u32::from(found.probability < 0.05);
-        }
-    }
+    let tested: Vec<_> = comparisons.iter().flat_map(differences).collect();
     assert_eq!(
-        tested,
+        tested.len() as u64,
         7 * PAIRS,
         "two modes and the compliance in each pair"
     );
+    let outside = tested.iter().filter(|found| found.probability < 0.05);
+    let outside = outside.count();
+    let ratio = mean_square_ratio(&tested);
+    println!(
+        "{different} of {PAIRS} pairs, {outside} of {} differences, mean square {ratio}",
+        tested.len()
+    );
     // 14 are expected of 280. The differences of a pair are correlated: with a quarter of them independent, sigma is 7.
-    println!("{different} of {PAIRS} pairs, {outside} of {tested} differences");
-    assert!((3..=35).contains(&outside), "{outside} of {tested}");
+    assert!((3..=35).contains(&outside), "{outside}");
+    // The mean square of 70 independent ratios is between the quantiles 0.1 % and 99.9 % of chi^2_70/70: 0.56 and 1.60.
+    assert!((0.56..1.60).contains(&ratio), "{ratio}");
 }

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::Plan;
-use bench::experiment::run_comparison::{Comparison, RunResult};
+use bench::experiment::run_comparison::{Comparison, Difference, RunResult};
 use bench::recording::Recording;
 
 use crate::simulated;
@@ -64,6 +64,25 @@ pub fn result(config: &Config) -> RunResult {
 pub fn of_equal_stages(pair: u64) -> Comparison {
     let runs = [0, 1].map(|k| result(&config(GUIDE_N_PER_M, 100 + 2 * pair + k)));
     Comparison::of(&runs).expect("two chirps")
+}
+
+/// The tested differences of a pair: of both modes, and of the static compliance.
+pub fn differences(comparison: &Comparison) -> Vec<Difference> {
+    let modes = &comparison.others[0].modes;
+    let of_modes = modes
+        .modes
+        .iter()
+        .flat_map(|mode| [mode.frequency_hz, mode.damping_ratio, mode.residue_per_kg]);
+    of_modes.chain(modes.static_compliance_m_per_n).collect()
+}
+
+/// Mean square of the ratios of differences to their standard deviations. Expected of equal stages: 1; with sigmas that are too
+/// large less, with sigmas that are too small more.
+pub fn mean_square_ratio(differences: &[Difference]) -> f64 {
+    let ratios = differences
+        .iter()
+        .map(|found| found.difference.value / found.difference.sigma);
+    ratios.map(|ratio| ratio * ratio).sum::<f64>() / differences.len() as f64
 }
 
 /// Frequency in hertz and residue in 1/kg of both modes, lowest first, by the roots of the characteristic equation
