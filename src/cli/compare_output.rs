@@ -25,8 +25,9 @@ fn meaning(comparison: &Comparison) -> String {
         return String::new();
     }
     let text = format!(
-        "{} of {} differences are significant (*): by the test of Holm, noise alone makes any of them significant with a probability \
-         of at most {:.0} %. ± is the 95 % confidence interval of each value by itself; the runs are taken as independent",
+        "{} of {} differences are significant (*): by the test of Holm, noise alone makes any of them significant with a \
+         probability of at most {:.0} %. ± is the 95 % confidence interval of each value by itself; \
+         the runs are taken as independent",
         comparison.significant,
         comparison.tested,
         100.0 * comparison.family_false_alarm

@@ -1,4 +1,5 @@
-//! A header line, and a line for each tick or frequency. A cell without a measurement is empty; numbers read back to the same double.
+//! A header line, and a line for each tick or frequency. A cell without a measurement is empty; numbers read back to the
+//! same double.
 
 use std::io::{self, Write};
 use std::path::Path;

@@ -12,7 +12,10 @@ pub enum ExportError {
     #[error(transparent)]
     Recording(#[from] RecordingError),
     /// The file exists.
-    #[error("--out {path}: the file exists, and no file is replaced; choose another file with --out, or move it away", path = path.display())]
+    #[error(
+        "--out {path}: the file exists, and no file is replaced; choose another file with --out, or move it away",
+        path = path.display()
+    )]
     Exists {
         /// The file.
         path: PathBuf,
@@ -57,7 +60,8 @@ pub enum ExportError {
     Changed,
     /// The program was built without Parquet.
     #[error(
-        "--format parquet is not available, because this `bench` was built without Parquet; build it with `--features parquet`, or use --format csv, mat or uff58"
+        "--format parquet is not available, because this `bench` was built without Parquet; build it with `--features parquet`, or \
+         use --format csv, mat or uff58"
     )]
     WithoutParquet,
 }

@@ -1,10 +1,10 @@
 //! MATLAB, level 5, little-endian, not compressed ("MAT-File Format", The MathWorks, chapter 1).
 //!
-//! A data element is a tag (type and number of bytes, 32 bits each) and data, padded to 8 bytes. An array is an element whose data are
-//! the elements flags, dimensions, name and contents.
+//! A data element is a tag (type and number of bytes, 32 bits each) and data, padded to 8 bytes. An array is an element whose data
+//! are the elements flags, dimensions, name and contents.
 //!
-//! No crate writes such files as a stream: `matrw` and `mat5` hold all variables in memory, `matfile` only reads, and `matio-rs` needs
-//! a C library.
+//! No crate writes such files as a stream: `matrw` and `mat5` hold all variables in memory, `matfile` only reads, and `matio-rs`
+//! needs a C library.
 
 use std::fs::File;
 use std::io::Write;
@@ -91,8 +91,8 @@ impl Rows for Columns<'_> {
 }
 
 /// The struct `frf` with the fields of an `idfrd` object: `ResponseData` (1 x 1 x N), `Frequency` (N x 1), `FrequencyUnit`, `Ts`,
-/// `InputName`, `InputUnit`, `OutputName`, `OutputUnit`, `CovarianceData` (1 x 1 x N x 2 x 2: the covariance of real and imaginary part),
-/// and `Coherence` (N x 1) and `ResolutionHz` (N x 1), which `idfrd` does not have.
+/// `InputName`, `InputUnit`, `OutputName`, `OutputUnit`, `CovarianceData` (1 x 1 x N x 2 x 2: the covariance of real and imaginary
+/// part), and `Coherence` (N x 1) and `ResolutionHz` (N x 1), which `idfrd` does not have.
 ///
 /// The error of a measured response is circular: real and imaginary part have the variance sigma(|H|)^2 each, and no covariance.
 pub(super) fn response(response: &Response<'_>, out: &mut Output) -> Result<(), ExportError> {

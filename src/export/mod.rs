@@ -69,7 +69,8 @@ impl Format {
     }
 }
 
-/// Writes the time signals of a recording to a new file, which is complete or absent. Returns the recording and the path of the file.
+/// Writes the time signals of a recording to a new file, which is complete or absent. Returns the recording and the path
+/// of the file.
 ///
 /// # Errors
 /// When the recording cannot be read, the file exists or cannot be written, or the format cannot hold the recording.

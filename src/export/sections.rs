@@ -8,8 +8,8 @@ use super::ExportError;
 /// Bytes of a section that are written at once.
 const BLOCK: usize = 1 << 18;
 
-/// The sections of a file, one behind the other. Their lengths are known before they are written, so that the columns of a table, each
-/// in a section of its own, are written in one pass over the rows.
+/// The sections of a file, one behind the other. Their lengths are known before they are written, so that the columns of a table,
+/// each in a section of its own, are written in one pass over the rows.
 pub(super) struct Sections<'a> {
     file: &'a File,
     sections: Vec<Section>,

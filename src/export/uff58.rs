@@ -1,7 +1,7 @@
 //! Universal file format, dataset 58 (function at nodal degree of freedom), ASCII, double precision.
 //!
-//! Ordinates have the format E20.12 of the standard: 13 significant digits. Abscissas have the 13 columns of the format E13.5, in which
-//! a reader takes up to 12 digits. Readers split the lines at fixed columns.
+//! Ordinates have the format E20.12 of the standard: 13 significant digits. Abscissas have the 13 columns of the format E13.5, in
+//! which a reader takes up to 12 digits. Readers split the lines at fixed columns.
 
 use std::fs::File;
 use std::io::Write;
@@ -232,8 +232,8 @@ impl Axis {
     }
 }
 
-/// The text of 13 columns that is nearest to a number: the standard asks for E13.5, a reader takes any form with a decimal point. From
-/// 1e-9 to 1e9 it has at least 9 digits.
+/// The text of 13 columns that is nearest to a number: the standard asks for E13.5, a reader takes any form with a decimal point.
+/// From 1e-9 to 1e9 it has at least 9 digits.
 fn abscissa(number: f64) -> String {
     let exponential = |decimals: usize| format!("{number:.decimals$E}");
     let decimal = |decimals: usize| format!("{number:.decimals$}");
