@@ -95,6 +95,12 @@ impl PredictedSine {
 }
 
 impl ControlRun {
+    /// The step, if the run has reached it.
+    pub fn measured_step(&self) -> Option<&StepResponse> {
+        let step = self.step.as_ref();
+        step.filter(|step| !step.positions_m.is_empty())
+    }
+
     /// The measured response to a sine.
     pub fn sine(&self) -> Option<SineResponse> {
         self.tracking?.sine

@@ -58,7 +58,7 @@ fn responses(runs: &[RunResult]) -> Result<String, ReportError> {
 fn steps(runs: &[RunResult]) -> Result<String, ReportError> {
     let found = runs
         .iter()
-        .filter_map(|run| Some((run.label.as_str(), run.control.as_ref()?.step.as_ref()?)));
+        .filter_map(|run| Some((run.label.as_str(), run.control.as_ref()?.measured_step()?)));
     let found: Vec<(&str, &StepResponse)> = found.collect();
     let heading = "Step response";
     let svg = match found[..] {

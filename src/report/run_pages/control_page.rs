@@ -50,12 +50,7 @@ impl ControlReport<'_> {
     /// When there is nothing to draw, or drawing fails.
     pub fn plots(&self) -> Result<Vec<Plot>, ReportError> {
         let mut plots = vec![self.signals()?];
-        if let Some(step) = self
-            .run
-            .step
-            .as_ref()
-            .filter(|step| !step.positions_m.is_empty())
-        {
+        if let Some(step) = self.run.measured_step() {
             plots.push(self.step(step)?);
         }
         plots.extend(self.spectrum()?);
