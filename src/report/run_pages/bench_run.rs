@@ -21,7 +21,9 @@ const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a
 const LOOP_NYQUIST_CAPTION: &str = "L in the complex plane around -1, with frequencies. The distance of the curve from -1 is 1/|S|; \
     circles are 95 % confidence regions.";
 const SENSITIVITY_CAPTION: &str = "S from reference to error and T from reference to displacement. The peak of S is the inverse \
-    of the modulus margin; dashed: its limit, the inverse of the least allowed modulus margin.";
+    of the modulus margin.";
+const SENSITIVITY_LIMIT_CAPTION: &str =
+    " Dashed: the limit of |S|, the inverse of the least allowed modulus margin.";
 const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, the predicted one the smallest of all \
     crossings. ± is the 95 % confidence interval.";
 
@@ -197,7 +199,7 @@ impl<'a> BenchRun<'a> {
             drawn(
                 PlotKind::Sensitivity,
                 "Sensitivities",
-                SENSITIVITY_CAPTION,
+                &sensitivity_caption(sensitivities.min_modulus_margin),
                 measured_sensitivity_svg(&sensitivities)?,
             ),
         ])
@@ -210,6 +212,15 @@ impl<'a> BenchRun<'a> {
             &[("Missing ticks filled in".into(), filled)],
         )
     }
+}
+
+/// A least allowed modulus margin of 0 is none, and no limit is drawn.
+fn sensitivity_caption(min_modulus_margin: f64) -> String {
+    let limit = match min_modulus_margin > 0.0 {
+        true => SENSITIVITY_LIMIT_CAPTION,
+        false => "",
+    };
+    [SENSITIVITY_CAPTION, limit].concat()
 }
 
 fn evidence(analysis: &Analysis) -> Vec<(String, String)> {
