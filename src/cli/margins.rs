@@ -18,7 +18,7 @@ use crate::config::{Config, ProbeSettings, Purpose};
 use crate::control::{ClosedLoop, Margins, Pole, listed_poles};
 use crate::experiment::{LoopModel, Stage, check_calibration, closed_loop};
 use crate::report::number::angular_frequency;
-use crate::report::{LoopPlot, Picture, ReportError, loop_svg, plant_conditions};
+use crate::report::{LoopPlot, Picture, ReportError, joined, loop_svg, plant_conditions};
 use crate::util::decimal::Decimal;
 
 /// The bench and the controller.
@@ -118,7 +118,7 @@ fn drawn(
     };
     let time = time_text(config, margins);
     let title = format!("{}: {} controller", config.title, config.control.controller);
-    let subtitle = format!("{}; {time}", plant_conditions(&config.plant, &[]));
+    let subtitle = joined(&[&plant_conditions(&config.plant, &[]), &time]);
     Ok(Picture {
         svg: loop_svg(&plot, &title, &subtitle)?,
         caption: "L = P C by the model with its margins, as Bode plot and in the complex plane with -1; S from reference to error and T from reference to displacement.".into(),

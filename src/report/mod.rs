@@ -44,10 +44,11 @@ pub use amplitudes::{AmplitudeOverview, amplitudes_svg};
 pub use bode::bode_svg;
 pub use campaign::{PictureError, campaign_picture};
 pub use chart::{
-    Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours, sheet_svg,
+    Anchor, Chart, Mark, Pen, Row, Scale, ScaleKind, SeriesPoint, Stroke, Symbol, colours,
+    sheet_svg,
 };
 pub use coherence::coherence_svg;
-pub use conditions::plant_conditions;
+pub use conditions::{joined, plant_conditions};
 pub use design_page::{BINDING_COLUMNS, DesignPage, PLANT_COLUMNS, binding_cells, plant_cells};
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;

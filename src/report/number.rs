@@ -17,6 +17,13 @@ pub fn plain(value: f64, digits: usize) -> String {
     format!("{:.digits$}", Decimal(value)).replace('-', "\u{2212}")
 }
 
+/// A number above 0 with this many significant digits: `0.0341`, `34.1` and `1640` with three.
+pub fn significant(value: f64, digits: i32) -> String {
+    let before_point = libm::log10(value).floor().clamp(-12.0, 12.0) as i32;
+    let decimals = (digits - 1 - before_point).clamp(0, 15);
+    format!("{value:.*}", decimals.unsigned_abs() as usize)
+}
+
 /// A number and half the width of its interval: `29.274373 ± 0.000062`.
 pub fn interval(value: f64, half: f64) -> String {
     let digits = decimals(half);
@@ -51,6 +58,18 @@ mod tests {
         assert_eq!(interval(-1234.5, 67.0), "\u{2212}1234 ± 67");
         assert_eq!(interval(-0.5, 0.0), "\u{2212}0.500000 ± 0.000000");
         assert_eq!(interval(0.5, f64::INFINITY), "0.500000 ± without bound");
+    }
+
+    #[test]
+    fn keeps_the_significant_digits_of_a_number() {
+        for (value, text) in [
+            (0.034_08, "0.0341"),
+            (34.08, "34.1"),
+            (1640.4, "1640"),
+            (100.0, "100"),
+        ] {
+            assert_eq!(significant(value, 3), text);
+        }
     }
 
     #[test]

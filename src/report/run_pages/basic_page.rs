@@ -11,6 +11,7 @@ use crate::experiment::{BasicResults, Overview};
 use crate::identify::Estimate;
 use crate::recording::Recording;
 use crate::report::ReportError;
+use crate::report::conditions::lines;
 use crate::report::html::{escaped, facts, row, section};
 use crate::report::number::plain;
 
@@ -38,8 +39,9 @@ impl BasicReport<'_> {
             true => String::new(),
             false => signals_section(self.overview)?,
         };
-        let started = run_facts::metadata(self.recording, "started");
-        let subtitle = format!("{} Hz; {started}", self.config.servo.rate_hz);
+        let rate = format!("{} Hz", self.config.servo.rate_hz);
+        let conditions = run_facts::conditions(self.recording, self.config);
+        let subtitle = lines(&[&rate, &conditions]);
         let body = [
             run_facts::heading(self.recording, title, &subtitle),
             run_facts::ending(self.recording),

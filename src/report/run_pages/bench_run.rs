@@ -5,12 +5,14 @@ use super::loop_marks::{marks, peak_mark};
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
+use crate::excitation::AmplitudeCurve;
 use crate::experiment::{Analysis, ClosedResponses, Description};
 use crate::identify::Unit;
 use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
+use crate::report::conditions::lines;
 use crate::report::html::row;
-use crate::report::number::angular_frequency;
+use crate::report::number::{angular_frequency, significant};
 use crate::report::{
     MagnitudeAxis, MeasuredLoopPlot, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
     measured_nyquist_svg, measured_sensitivity_svg,
@@ -26,6 +28,10 @@ const SENSITIVITY_LIMIT_CAPTION: &str =
     " Dashed: the limit of |S|, the inverse of the least allowed modulus margin.";
 const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, the predicted one the smallest of all \
     crossings. ± is the 95 % confidence interval.";
+
+const MA_PER_A: f64 = 1e3;
+/// Significant digits of an amplitude.
+const DIGITS: i32 = 3;
 
 /// An analysed run.
 #[derive(Clone, Debug)]
@@ -125,21 +131,25 @@ impl<'a> BenchRun<'a> {
         let (excitation, rate_hz) = (&self.excitation, self.rate_hz);
         let amplitude = self.amplitude().unwrap_or_default();
         let conditions = run_facts::conditions(self.recording, self.config);
-        format!("{shown};\n{excitation} at {rate_hz} Hz{amplitude};\n{conditions}")
+        let excitation = format!("{excitation} at {rate_hz} Hz{amplitude}");
+        lines(&[shown, &excitation, &conditions])
     }
 
-    /// The amplitude of an excitation in open loop: one, or the smallest and the largest over frequency.
+    /// The amplitude of an excitation in open loop: one, or the smallest and the largest within its band. All frequencies of a
+    /// multisine together reach the largest one.
     fn amplitude(&self) -> Option<String> {
         let chosen = self.config.chosen_excitation();
         if self.analysis.closed.is_some() || !chosen.design.has_amplitude_curve() {
             return None;
         }
-        let currents_a = self.config.chirp.amplitude.iter().map(|p| p.current_a);
-        let low_a = currents_a.clone().reduce(f64::min)?;
-        let high_a = currents_a.reduce(f64::max)?;
-        Some(match low_a < high_a {
-            true => format!(", {low_a:.3} to {high_a:.3} A"),
-            false => format!(", {high_a:.3} A"),
+        let chirp = &self.config.chirp;
+        let (low_hz, high_hz) = chirp.band_hz();
+        let (low_a, high_a) = AmplitudeCurve::of_current(&chirp.amplitude).range(low_hz, high_hz);
+        let [low_ma, high_ma] = [low_a, high_a].map(|a| significant(MA_PER_A * a, DIGITS));
+        Some(match (chosen.design.is_broadband(), low_ma == high_ma) {
+            (true, _) => format!(", at most {high_ma} mA"),
+            (false, true) => format!(", {high_ma} mA"),
+            (false, false) => format!(", {low_ma} to {high_ma} mA"),
         })
     }
 

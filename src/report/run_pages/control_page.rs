@@ -7,6 +7,7 @@ use crate::config::Config;
 use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
+use crate::report::conditions::{joined, lines};
 use crate::report::html::{facts, note, picture, row, section};
 use crate::report::number::{angular_frequency, interval, plain};
 use crate::report::{
@@ -86,13 +87,13 @@ impl ControlReport<'_> {
     /// Controller, reference, and the conditions of the run.
     fn subtitle(&self) -> String {
         let (config, control) = (self.config, &self.config.control);
-        format!(
-            "{} controller at {} Hz; {};\n{}",
+        let controller = format!(
+            "{} controller at {} Hz; {}",
             control.controller,
             config.servo.rate_hz,
             control.reference.design().describe(),
-            run_facts::conditions(self.recording, config)
-        )
+        );
+        lines(&[&controller, &run_facts::conditions(self.recording, config)])
     }
 
     fn heading(&self) -> String {
@@ -317,7 +318,7 @@ impl ControlReport<'_> {
             true => "stable",
             false => "UNSTABLE",
         };
-        format!("{stability} by the model; {}", self.subtitle())
+        joined(&[&format!("{stability} by the model"), &self.subtitle()])
     }
 }
 

@@ -5,7 +5,7 @@ use crate::config::{Config, SettingDifference, changed_settings};
 use crate::experiment::{Description, Ending, TripSummary};
 use crate::recording::{Recording, event_text};
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
-use crate::report::plant_conditions;
+use crate::report::{joined, plant_conditions};
 
 /// Entries of the recording's metadata that the page shows.
 const METADATA: [&str; 11] = [
@@ -34,13 +34,11 @@ pub(super) fn metadata<'a>(recording: &'a Recording, name: &str) -> &'a str {
 
 /// Operating point and mass asymmetry of the plant, devices or simulation, and the time of the start.
 pub(super) fn conditions(recording: &Recording, config: &Config) -> String {
-    let parts = [
-        plant_conditions(&config.plant, &[]),
-        devices(recording),
-        metadata(recording, "started").to_string(),
-    ];
-    let parts = parts.into_iter().filter(|part| !part.is_empty());
-    parts.collect::<Vec<String>>().join("; ")
+    joined(&[
+        &plant_conditions(&config.plant, &[]),
+        &devices(recording),
+        metadata(recording, "started"),
+    ])
 }
 
 /// The devices that moved and measured the stage.
