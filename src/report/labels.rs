@@ -2,6 +2,8 @@
 
 use nalgebra::Complex;
 
+use super::number::significant;
+
 /// A point of a response: frequency in hertz and value.
 pub(super) type ResponsePoint = (f64, Complex<f64>);
 
@@ -25,8 +27,7 @@ pub(super) fn spread(
 
 /// A frequency with four digits.
 pub(super) fn frequency_text(frequency_hz: f64) -> String {
-    let digits = 3 - libm::floor(libm::log10(frequency_hz)).clamp(-3.0, 3.0) as i32;
-    format!("{frequency_hz:.*} Hz", digits.unsigned_abs() as usize)
+    format!("{} Hz", significant(frequency_hz, 4))
 }
 
 #[cfg(test)]

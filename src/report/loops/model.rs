@@ -7,6 +7,7 @@ use crate::control::{Crossing, Margins};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREEN, GREY, ORANGE, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::report::labels::frequency_text;
 use crate::report::trace::{self, Line, Trace};
 use crate::util::units::hz;
 
@@ -60,7 +61,10 @@ impl LoopPlot<'_> {
         Some(MarkedPlace {
             frequency_hz,
             loop_gain: -Complex::new(cosine, sine),
-            text: format!("phase margin {margin_deg:.1}° at {frequency_hz:.1} Hz"),
+            text: format!(
+                "phase margin {margin_deg:.1}° at {}",
+                frequency_text(frequency_hz)
+            ),
         })
     }
 
@@ -72,7 +76,10 @@ impl LoopPlot<'_> {
         Some(MarkedPlace {
             frequency_hz,
             loop_gain: Complex::new(-libm::pow(10.0, -margin_db / 20.0), 0.0),
-            text: format!("gain margin {margin_db:.1} dB at {frequency_hz:.1} Hz"),
+            text: format!(
+                "gain margin {margin_db:.1} dB at {}",
+                frequency_text(frequency_hz)
+            ),
         })
     }
 
@@ -276,7 +283,10 @@ fn nyquist(plot: &LoopPlot<'_>, heading: &str, middle: f64, half: f64) -> Chart 
     }
     if let Some((frequency_hz, peak)) = plot.sensitivity_peak() {
         let margin = 1.0 / peak;
-        let name = format!("modulus margin {margin:.3} at {frequency_hz:.1} Hz");
+        let name = format!(
+            "modulus margin {margin:.3} at {}",
+            frequency_text(frequency_hz)
+        );
         let circle = circle(CRITICAL, margin);
         chart = chart.line(&name, Pen::dashed(GREEN), circle);
     }
@@ -331,13 +341,13 @@ fn sensitivities(plot: &LoopPlot<'_>) -> Chart {
         chart = chart.line(&name, Pen::dashed(VERMILION), plot.level(limit));
     }
     if let Some((frequency_hz, peak)) = plot.sensitivity_peak() {
-        let name = format!("peak of |S| {peak:.2} at {frequency_hz:.1} Hz");
+        let name = format!("peak of |S| {peak:.2} at {}", frequency_text(frequency_hz));
         chart = chart.points(&name, VERMILION, Symbol::Dot, vec![(frequency_hz, peak)]);
     }
     let bandwidth_rad_s = plot.margins.sensitivity_bandwidth_rad_s;
     if let Some(bandwidth_rad_s) = bandwidth_rad_s.filter(|_| plot.margins.stable) {
         let bandwidth_hz = hz(bandwidth_rad_s);
-        let name = format!("|S| = 0.707 at {bandwidth_hz:.1} Hz");
+        let name = format!("|S| = 0.707 at {}", frequency_text(bandwidth_hz));
         let dot = vec![(bandwidth_hz, std::f64::consts::FRAC_1_SQRT_2)];
         chart = chart.points(&name, GREEN, Symbol::Ring, dot);
     }
