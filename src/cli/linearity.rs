@@ -25,9 +25,9 @@ use crate::experiment::linearity::{
 };
 use crate::experiment::{self, Run, RunSummary, Runner};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use crate::report::MagnitudeAxis;
 use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
-use crate::report::{AmplitudeOverview, MagnitudeAxis, plant_conditions};
 use crate::util::progress::Progress;
 use crate::util::quantity::Ratio;
 
@@ -98,7 +98,7 @@ struct Report {
     /// without modes, or if no parameter differs but a run was not completed.
     shifted: Option<bool>,
     why: String,
-    /// Picture and page of modes and distortion over the amplitude; null if no run was completed.
+    /// Picture and page of modes and distortion over the amplitude; null unless two runs were analysed.
     overview: Option<AmplitudeFiles>,
 }
 
@@ -231,23 +231,14 @@ fn overview(report: &Report, plans: &[AmplitudePlan]) -> Result<Option<Amplitude
     let (Some(first), Some(plan)) = (report.runs.first(), plans.first()) else {
         return Ok(None);
     };
-    let linearity = report.runs.iter().map(|run| run.outputs.linearity.as_ref());
-    let linearity: Vec<_> = linearity.collect();
-    let drawn = AmplitudeOverview {
-        scales: &report.scales,
-        modes: &report.modes,
-        linearity: &linearity,
-    };
-    let config = &plan.config;
-    let title = format!("{}: {} amplitudes", config.title, report.scales.len());
-    let conditions = plant_conditions(&config.plant, &[]);
-    let subtitle = format!("{}; {conditions}", config.chosen_excitation().describe());
+    let runs = report.runs.iter().map(|run| (run.scale, &run.outputs));
+    let runs: Vec<(f64, &AnalysisOutputs)> = runs.collect();
     let results = ResultFiles {
         beside: Path::new(&first.run.recording),
         existing: ExistingFile::Replace,
     };
-    let files = AmplitudeFiles::write(&drawn, &title, &subtitle, results)?;
-    Ok(Some(files))
+    let files = AmplitudeFiles::write(&runs, &report.modes, &plan.config, results)?;
+    Ok(files)
 }
 
 fn text(report: &Report, plans: &[AmplitudePlan]) -> String {

@@ -1,15 +1,15 @@
 //! Modes, noise and distortion over the amplitude of the excitation.
 
 use super::ReportError;
-use super::chart::colours::{BLUE, Colour, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION};
+use super::chart::colours::{BLUE, Colour, GREY, VERMILION, series_colour};
 use super::chart::{Chart, Mark, Pen, Row, Scale, SeriesPoint, sheet_svg};
+use super::labels::frequency_text;
 use crate::experiment::linearity::ModeOverAmplitude;
 use crate::identify::linearity::{BandLinearity, Linearity};
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 
 const HEIGHT: f64 = 270.0;
 const PERCENT: f64 = 100.0;
-const COLOURS: [Colour; 6] = [BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY];
 
 /// The same excitation at several amplitudes.
 #[derive(Clone, Copy, Debug)]
@@ -20,6 +20,19 @@ pub struct AmplitudeOverview<'a> {
     pub modes: &'a [ModeOverAmplitude],
     /// Noise and distortion of each run, if it has an analysis.
     pub linearity: &'a [Option<&'a Linearity>],
+    /// The excited band in hertz. Modes outside of it are not drawn: their parameters are extrapolated.
+    pub band_hz: (f64, f64),
+}
+
+impl<'a> AmplitudeOverview<'a> {
+    /// The modes in the excited band with their numbers.
+    fn modes(&self) -> impl Iterator<Item = (usize, &'a ModeOverAmplitude)> {
+        let (low_hz, high_hz) = self.band_hz;
+        let modes = self.modes.iter();
+        modes
+            .filter(move |mode| (low_hz..=high_hz).contains(&mode.frequency_hz()))
+            .enumerate()
+    }
 }
 
 /// The power of a part of the output over that of the output.
@@ -85,7 +98,7 @@ fn compliance(mode: &FittedMode) -> Estimate {
 /// A parameter of each mode, relative to its value in the first run that has the mode.
 fn deviations(overview: &AmplitudeOverview<'_>, label: &str, parameter: Parameter) -> Chart {
     let mut chart = chart(overview, label).line("", Pen::solid(GREY).thin(), zero(overview));
-    for (index, mode) in overview.modes.iter().enumerate() {
+    for (index, mode) in overview.modes() {
         let first = mode.by_run.iter().flatten().next().map(parameter);
         let Some(reference) = first.filter(|first| first.value != 0.0) else {
             continue;
@@ -107,8 +120,7 @@ fn damping(overview: &AmplitudeOverview<'_>) -> Chart {
         value: PERCENT * fitted.damping_ratio.value,
         sigma: PERCENT * fitted.damping_ratio.sigma,
     };
-    let modes = overview.modes.iter().enumerate();
-    modes.fold(
+    overview.modes().fold(
         chart(overview, "Damping ratio (%)"),
         |chart, (index, mode)| chart.mark(series(overview, index, mode, &percent)),
     )
@@ -134,8 +146,6 @@ fn series(
     mode: &ModeOverAmplitude,
     parameter: &dyn Fn(&FittedMode) -> Estimate,
 ) -> Mark {
-    let first = mode.by_run.iter().flatten().next();
-    let frequency_hz = first.map_or(0.0, |fitted| fitted.frequency_hz().value);
     let runs = overview.scales.iter().zip(&mode.by_run);
     let mut points = Vec::new();
     let mut starts = true;
@@ -153,8 +163,11 @@ fn series(
         starts = fitted.is_none();
     }
     Mark::Series {
-        name: format!("mode at {frequency_hz:.2} Hz (band: 95 %)"),
-        pen: Pen::solid(COLOURS[index % COLOURS.len()]),
+        name: format!(
+            "mode at {} (band: 95 %)",
+            frequency_text(mode.frequency_hz())
+        ),
+        pen: Pen::solid(series_colour(index)),
         points,
         dots: true,
     }

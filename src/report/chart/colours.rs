@@ -16,6 +16,8 @@ pub const PURPLE: Colour = Colour(204, 121, 167);
 pub const SKY: Colour = Colour(86, 180, 233);
 /// Orange.
 pub const ORANGE: Colour = Colour(230, 159, 0);
+/// Colours of curves of one kind, in their order.
+const SERIES: [Colour; 6] = [BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY];
 /// Nearly black, for text and for curves beside coloured ones.
 pub const INK: Colour = Colour(40, 40, 40);
 /// Grey, for what is shown for comparison only.
@@ -46,6 +48,11 @@ const DARK: [(Colour, Colour); 8] = [
     (BLUE, Colour(79, 168, 220)),
     (VERMILION, Colour(255, 138, 60)),
 ];
+
+/// The colour of the curve with this index among curves of one kind.
+pub(in crate::report) fn series_colour(index: usize) -> Colour {
+    SERIES[index % SERIES.len()]
+}
 
 /// A style element that changes the colours of the picture where the viewer prefers dark mode.
 pub(in crate::report) fn dark_style() -> String {
