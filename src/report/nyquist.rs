@@ -7,7 +7,7 @@ use super::chart::colours::INK;
 use super::chart::{Chart, Row, Scale, Symbol, sheet_svg};
 use super::ellipse::{self, SIGMAS_95_PLANE};
 use super::labels::{ResponsePoint, frequency_text, spread};
-use super::trace::{self, BAND_SIGMAS, Line, Trace, has_gap_before};
+use super::trace::{self, BAND_SIGMAS, Line, Trace};
 use crate::identify::{Frf, Unit};
 
 /// Largest number of circles.
@@ -133,12 +133,12 @@ fn visible_circles(line: &Line, frf: &Frf, indices: &[usize]) -> Vec<(Complex<f6
     circles
 }
 
-/// The curve, with gaps where frequencies, or magnitudes above the noise, are missing.
+/// The curve, with gaps where frequencies, or magnitudes above the noise, are missing, and where the points are too far apart for a line.
 fn points(line: &Line, indices: &[usize], factor: f64) -> Vec<(f64, f64)> {
     const GAP: (f64, f64) = (f64::NAN, f64::NAN);
     let mut points = Vec::new();
     for &k in indices {
-        if line.measured.is_some_and(|frf| has_gap_before(frf, k)) {
+        if line.starts(k) {
             points.push(GAP);
         }
         let known = line.measured.is_none_or(|frf| is_known(frf, k));

@@ -253,10 +253,13 @@ impl<'a> Line<'a> {
             y,
             band: (y - half_width, y + half_width),
             faint: !self.certain[k],
-            starts: k == 0
-                || self.is_points
-                || self.measured.is_some_and(|frf| has_gap_before(frf, k)),
+            starts: self.starts(k),
         }
+    }
+
+    /// Whether no line joins a point with the one before it.
+    pub fn starts(&self, k: usize) -> bool {
+        k == 0 || self.is_points || self.measured.is_some_and(|frf| has_gap_before(frf, k))
     }
 
     /// The points (frequency, phase) whose phase is valid.
