@@ -60,7 +60,9 @@ pub use loops::{
     measured_bode_svg, measured_nyquist_svg, measured_sensitivity_svg, sensitivity_svg,
 };
 pub use magnitude::MagnitudeAxis;
-pub use model_pictures::{CnmpMap, locus_svg, map_svg, model_step_svg, study_svg, veering_svg};
+pub use model_pictures::{
+    CnmpMap, locus_svg, map_svg, model_step_svg, study_svg, veering_caption, veering_svg,
+};
 pub use nyquist::nyquist_svg;
 pub use overlay::{StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg, step_svg};
 pub use picture_page::Picture;

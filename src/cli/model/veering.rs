@@ -13,7 +13,7 @@ use super::{evenly_spread_rows, meeting_text};
 use crate::config::{Config, Purpose};
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
-use crate::report::{Picture, ReportError, plant_conditions, veering_svg};
+use crate::report::{Picture, ReportError, plant_conditions, veering_caption, veering_svg};
 use crate::util::decimal::Decimal;
 use crate::util::units::hz;
 
@@ -63,7 +63,7 @@ fn drawn(report: &Report, config: &Config) -> Result<Picture, ReportError> {
     let conditions = plant_conditions(&config.plant, &[vary]);
     Ok(Picture {
         svg: veering_svg(&report.veering, vary, &title, &conditions)?,
-        caption: meeting_text(&report.veering.point),
+        caption: veering_caption(&report.veering.point, vary),
         title,
     })
 }

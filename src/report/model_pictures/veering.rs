@@ -1,12 +1,16 @@
 //! Two close modes as a setting varies: their frequencies, and those of all modes.
 
-use super::{colour, setting_label};
-use crate::model::veering::report::VeeringReport;
+use super::{colour, setting_label, setting_text};
+use crate::model::veering::report::{VeeringPoint, VeeringReport};
 use crate::report::ReportError;
 use crate::report::chart::colours::INK;
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::report::labels::frequency_text;
+use crate::report::number::significant;
 
 const HEIGHT: f64 = 400.0;
+/// Smallest gap that is written.
+const MIN_GAP_HZ: f64 = 1e-3;
 
 /// The frequencies of the two modes over the setting, with the place where they are closest, and beside it those of all modes, as an
 /// SVG document.
@@ -38,13 +42,32 @@ pub fn veering_svg(
         })
     };
     let closest = (point.value, point.frequency_hz);
-    let gap = format!("gap {:.3} Hz at {:.5}", point.gap_hz, point.value);
+    let gap = format!("gap {}", gap_text(point.gap_hz));
     let close = modes(chart("The close modes", vary), &|mode| pair.contains(&mode));
     let close = close
         .points("closest approach", INK, Symbol::Cross, vec![closest])
         .text(closest, (0.0, -18.0), &gap);
     let all = modes(chart("All modes", vary), &|_| true);
     sheet_svg(title, subtitle, &[Row::new(HEIGHT, vec![close, all])])
+}
+
+/// What the picture shows, and how the two modes meet.
+pub fn veering_caption(point: &VeeringPoint, vary: &str) -> String {
+    let [first, second] = point.modes;
+    let (verb, frequency) = (point.meeting.verb(), frequency_text(point.frequency_hz));
+    let (place, gap) = (setting_text(vary, point.value), gap_text(point.gap_hz));
+    format!(
+        "Natural frequencies of modes {first} and {second} over {vary}, and beside them those of all modes. The two {verb} at \
+         {place} (cross): mean frequency {frequency}, gap {gap}."
+    )
+}
+
+/// The gap of two modes that cross is not exactly 0.
+fn gap_text(gap_hz: f64) -> String {
+    match gap_hz < MIN_GAP_HZ {
+        true => format!("below {MIN_GAP_HZ} Hz"),
+        false => format!("{} Hz", significant(gap_hz, 3)),
+    }
 }
 
 fn chart(heading: &str, vary: &str) -> Chart {
