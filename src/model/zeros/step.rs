@@ -14,6 +14,7 @@ use serde::Serialize;
 
 use super::{ModalSum, ModalTerm, ZeroCounts};
 use crate::util::numeric::bisect;
+use crate::util::units::hz;
 
 /// Samples in the shortest period.
 const SAMPLES_PER_PERIOD: f64 = 64.0;
@@ -91,6 +92,12 @@ impl<'a> StepResponse<'a> {
     pub fn position_m(&self, time_s: f64) -> f64 {
         let parts = self.sum.terms().iter().map(|term| position(term, time_s));
         self.sum.constant_m_per_n() + parts.sum::<f64>()
+    }
+
+    /// The undamped natural frequency of each mode in hertz; 0 for the rigid body.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        let terms = self.sum.terms().iter();
+        terms.map(|term| hz(term.omega_rad_s)).collect()
     }
 
     /// The contribution of each mode to it, in m/N.

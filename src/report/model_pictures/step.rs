@@ -5,6 +5,7 @@ use crate::model::zeros::{StepFeatures, StepResponse};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
+use crate::report::labels::frequency_text;
 use crate::util::numeric::linspace;
 
 const HEIGHT: f64 = 420.0;
@@ -37,6 +38,14 @@ pub fn model_step_svg(
     sheet_svg(title, subtitle, &[Row::new(HEIGHT, charts)])
 }
 
+/// Modes are named by frequency: the response has only the observable ones, so that their numbers differ from those of other results.
+fn part_name(frequency_hz: f64) -> String {
+    match frequency_hz > 0.0 {
+        true => format!("part of the mode at {}", frequency_text(frequency_hz)),
+        false => "part of the rigid body".into(),
+    }
+}
+
 fn chart(heading: &str, response: &StepResponse<'_>, features: &StepFeatures, end_s: f64) -> Chart {
     let times_s: Vec<f64> = linspace(0.0, end_s, TIMES).collect();
     let place = |t: f64| (MILLI * t, MICRO * response.position_m(t));
@@ -47,12 +56,11 @@ fn chart(heading: &str, response: &StepResponse<'_>, features: &StepFeatures, en
         Pen::solid(GREY).thin(),
         vec![(0.0, 0.0), (MILLI * end_s, 0.0)],
     );
-    for mode in 0..parts.first().map_or(0, Vec::len) {
+    for (mode, frequency_hz) in response.frequencies_hz().into_iter().enumerate() {
         let points = times_s.iter().zip(&parts);
         let points = points.map(|(t, parts)| (MILLI * t, MICRO * parts[mode]));
-        let name = format!("part of mode {}", mode + 1);
         chart = chart.line(
-            &name,
+            &part_name(frequency_hz),
             Pen::dashed(colour(mode + 1)).thin(),
             points.collect(),
         );
