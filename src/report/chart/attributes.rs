@@ -32,7 +32,7 @@ fn axis(which: &str, scale: &Scale, axis: &Axis) -> String {
 
 fn kind(kind: ScaleKind) -> &'static str {
     match kind {
-        ScaleKind::Linear => "linear",
+        ScaleKind::Linear | ScaleKind::Count => "linear",
         ScaleKind::Logarithmic => "log",
         ScaleKind::Degrees => "degrees",
         ScaleKind::Blank => "blank",

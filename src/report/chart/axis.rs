@@ -80,7 +80,10 @@ impl Axis {
         match (self.kind, direction) {
             (ScaleKind::Blank, _) => Vec::new(),
             (ScaleKind::Degrees, _) => self.degree_ticks(),
-            (ScaleKind::Linear, _) => self.even_ticks(direction.spacing()),
+            (ScaleKind::Linear, _) => self.linear_ticks(self.even_step(direction.spacing())),
+            (ScaleKind::Count, _) => {
+                self.linear_ticks(self.even_step(direction.spacing()).max(1.0))
+            }
             (ScaleKind::Logarithmic, Direction::Horizontal) => self.frequency_ticks(),
             (ScaleKind::Logarithmic, Direction::Vertical) => self.magnitude_ticks(),
         }
@@ -89,9 +92,10 @@ impl Axis {
         .collect()
     }
 
-    fn even_ticks(&self, spacing: f64) -> Vec<Tick> {
+    /// The step of ticks that are at least `spacing` pixels apart.
+    fn even_step(&self, spacing: f64) -> f64 {
         let count = ((self.end - self.start).abs() / spacing).max(1.0);
-        self.linear_ticks(nice_step((self.high - self.low) / count))
+        nice_step((self.high - self.low) / count)
     }
 
     /// Ticks with plain numbers.

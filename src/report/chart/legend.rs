@@ -8,8 +8,9 @@ use super::canvas::{Canvas, TextStyle, rectangle};
 use super::colours::{Colour, INK};
 use super::header::{CHARACTER, TEXT_SIZE};
 use super::mark::{Mark, Pen, SeriesPoint, Symbol};
-use super::plot_area::{BAND, draw_arrow, draw_symbol};
+use super::plot_area::BAND;
 use super::series::dashes;
+use super::symbols::{draw_arrow, draw_symbol};
 use crate::report::ReportError;
 
 /// Width of the sample in front of a name.

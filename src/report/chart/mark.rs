@@ -165,13 +165,24 @@ pub enum Mark {
     Text {
         /// The point.
         at: (f64, f64),
-        /// Pixels from the point to the middle of the text, to the right and down.
+        /// Pixels from the point to the anchor of the text, to the right and down.
         offset: (f64, f64),
+        /// The part of the text that is placed there.
+        anchor: Anchor,
         /// The text.
         text: String,
         /// Its colour.
         colour: Colour,
     },
+}
+
+/// The part of a text whose place is given; vertically it is always the middle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Anchor {
+    /// Its left end.
+    Start,
+    /// Its middle.
+    Middle,
 }
 
 impl Mark {

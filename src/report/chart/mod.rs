@@ -3,6 +3,7 @@
 //! ```text
 //! Chart (Scale, Mark) -> sheet (rows, header, legend) -> plot_area (axes, marks) -> canvas (SVG)
 //!                                                         attributes: scales and names for plot.js
+//!                                                         symbols: points and arrow heads
 //!                                                         axis: value to pixel, ticks
 //!                                                         frame, series: clipped and thinned to what a screen shows
 //! ```
@@ -21,8 +22,9 @@ mod plot_area;
 mod scale;
 mod series;
 mod sheet;
+mod symbols;
 
-pub use mark::{Mark, Pen, SeriesPoint, Stroke, Symbol};
+pub use mark::{Anchor, Mark, Pen, SeriesPoint, Stroke, Symbol};
 pub use scale::{Scale, ScaleKind};
 pub use sheet::{Row, sheet_svg};
 
@@ -158,9 +160,25 @@ impl Chart {
 
     /// Adds text, centred `offset` pixels to the right of and below a point.
     pub fn text(self, at: (f64, f64), offset: (f64, f64), text: &str) -> Chart {
+        self.anchored_text(at, offset, Anchor::Middle, text)
+    }
+
+    /// Adds text that begins `offset` pixels to the right of and below a point.
+    pub fn text_from(self, at: (f64, f64), offset: (f64, f64), text: &str) -> Chart {
+        self.anchored_text(at, offset, Anchor::Start, text)
+    }
+
+    fn anchored_text(
+        self,
+        at: (f64, f64),
+        offset: (f64, f64),
+        anchor: Anchor,
+        text: &str,
+    ) -> Chart {
         self.mark(Mark::Text {
             at,
             offset,
+            anchor,
             text: text.into(),
             colour: INK,
         })

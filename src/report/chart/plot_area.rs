@@ -9,9 +9,10 @@ use super::canvas::{Canvas, TextStyle, rectangle};
 use super::colours::{Colour, FINE_GRID, FRAME, GRID};
 use super::frame::Frame;
 use super::header::{CHARACTER, TEXT_SIZE};
-use super::mark::{Mark, Pen, SeriesPoint, Symbol};
+use super::mark::{Anchor, Mark, Pen, SeriesPoint, Symbol};
 use super::scale::Scale;
-use super::series::{self, Sample, dashes};
+use super::series::{self, Sample};
+use super::symbols::{arrow_heads, draw_arrow, draw_stroke, draw_symbol};
 use crate::report::ReportError;
 
 /// Pixels from the frame to the middle of the label of the vertical axis.
@@ -20,6 +21,9 @@ const LABEL: TextStyle = TextStyle::new(13.0, HPos::Center, VPos::Center).upward
 const NUMBER_BELOW: TextStyle = TextStyle::new(12.0, HPos::Center, VPos::Top);
 const NUMBER_LEFT: TextStyle = TextStyle::new(12.0, HPos::Right, VPos::Center);
 const TEXT: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Center, VPos::Center);
+const TEXT_FROM: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Left, VPos::Center);
+/// Pixels between a text and the frame at its sides, and between its middle and the frame above and below.
+const TEXT_ROOM: (f64, f64) = (3.0, 0.6 * TEXT_SIZE + 2.0);
 
 /// Opacity of a band, and of the faint part of a series.
 pub(super) const BAND: f64 = 0.22;
@@ -28,12 +32,8 @@ const FAINT: f64 = 0.3;
 const ISOLATED_BAND: f64 = 0.5;
 /// A series with dots and fewer points than this has a dot at each.
 const FEW_POINTS: usize = 150;
-/// Radius of these dots, and of a symbol.
+/// Radius of these dots.
 const DOT: f64 = 2.0;
-const SYMBOL: f64 = 4.5;
-/// Pixels between the arrow heads of a directed line, and their length.
-const ARROW_SPACING: f64 = 170.0;
-const ARROW_LENGTH: f64 = 7.0;
 
 /// A frame with two axes.
 pub(super) struct PlotArea {
@@ -129,9 +129,14 @@ impl PlotArea {
             Mark::Text {
                 at,
                 offset,
+                anchor,
                 text,
                 colour,
-            } => self.draw_text(canvas, self.place(at), *offset, text, *colour),
+            } => {
+                let (x, y) = self.place(at);
+                let place = (x + offset.0, y + offset.1);
+                self.draw_text(canvas, place, *anchor, text, *colour)
+            }
         }
     }
 
@@ -271,26 +276,32 @@ impl PlotArea {
     fn draw_text(
         &self,
         canvas: &Canvas,
-        at: (f64, f64),
-        offset: (f64, f64),
+        place: (f64, f64),
+        anchor: Anchor,
         text: &str,
         colour: Colour,
     ) -> Result<(), ReportError> {
-        if at.0.is_nan() || at.1.is_nan() {
+        if place.0.is_nan() || place.1.is_nan() {
             return Ok(());
         }
         let frame = self.frame;
-        let half_width = 0.5 * CHARACTER * TEXT_SIZE * text.chars().count() as f64 + 3.0;
-        let half_height = 0.6 * TEXT_SIZE + 2.0;
-        let x = moved_inside(at.0 + offset.0, (frame.left, frame.right), half_width);
-        let y = moved_inside(at.1 + offset.1, (frame.top, frame.bottom), half_height);
-        canvas.text(text, (x, y), TEXT.colour(colour))
+        let width = CHARACTER * TEXT_SIZE * text.chars().count() as f64;
+        let (style, left, right) = match anchor {
+            Anchor::Start => (TEXT_FROM, 0.0, width),
+            Anchor::Middle => (TEXT, 0.5 * width, 0.5 * width),
+        };
+        let x = moved_between(
+            place.0,
+            frame.left + left + TEXT_ROOM.0,
+            frame.right - right - TEXT_ROOM.0,
+        );
+        let y = moved_between(place.1, frame.top + TEXT_ROOM.1, frame.bottom - TEXT_ROOM.1);
+        canvas.text(text, (x, y), style.colour(colour))
     }
 }
 
-/// The nearest value at least `distance` inside two ends; the middle where there is none.
-fn moved_inside(value: f64, ends: (f64, f64), distance: f64) -> f64 {
-    let (low, high) = (ends.0 + distance, ends.1 - distance);
+/// The nearest value between two ends; their middle where there is none.
+fn moved_between(value: f64, low: f64, high: f64) -> f64 {
     if low < high {
         value.clamp(low, high)
     } else {
@@ -312,18 +323,6 @@ fn draw_number(
 
 fn opacity(faint: bool) -> f64 {
     if faint { FAINT } else { 1.0 }
-}
-
-fn draw_stroke(
-    canvas: &Canvas,
-    pen: Pen,
-    opacity: f64,
-    points: &[(f64, f64)],
-) -> Result<(), ReportError> {
-    let dashes = dashes(pen.stroke, points);
-    dashes
-        .iter()
-        .try_for_each(|dash| canvas.line(dash, pen.colour.mix(opacity), pen.width))
 }
 
 /// The bands of single points between gaps, whose outline has no area.
@@ -367,72 +366,4 @@ fn isolated(places: &[(f64, f64)]) -> impl Iterator<Item = (f64, f64)> {
     let indices = (0..places.len())
         .filter(move |k| is_finite(*k) && !is_finite(*k + 1) && !(*k > 0 && is_finite(*k - 1)));
     indices.map(|k| places[k])
-}
-
-/// A line with a head; a dot where it is shorter than its head.
-pub(super) fn draw_arrow(
-    canvas: &Canvas,
-    pen: Pen,
-    from: (f64, f64),
-    to: (f64, f64),
-) -> Result<(), ReportError> {
-    draw_stroke(canvas, pen, 1.0, &[from, to])?;
-    let length = 5.0 + 1.5 * pen.width;
-    match arrow_head(from, to, length, 0.4) {
-        Some(head) => canvas.area(&head, pen.colour.into()),
-        None => canvas.dot(to, pen.width, pen.colour.into()),
-    }
-}
-
-/// A triangle with its tip at the end of a segment; `slope` is half its width over its length.
-fn arrow_head(from: (f64, f64), to: (f64, f64), length: f64, slope: f64) -> Option<Points> {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let distance = libm::hypot(dx, dy);
-    if !distance.is_finite() || distance < length {
-        return None;
-    }
-    let (ux, uy) = (length * dx / distance, length * dy / distance);
-    let corner = |side: f64| (to.0 - ux - side * slope * uy, to.1 - uy + side * slope * ux);
-    Some(vec![to, corner(1.0), corner(-1.0)])
-}
-
-/// Arrow heads along a line.
-fn arrow_heads(points: &[(f64, f64)]) -> Vec<Points> {
-    let (mut since_last, mut heads) = (0.55 * ARROW_SPACING, Vec::new());
-    for pair in points.windows(2) {
-        let length = libm::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
-        since_last += length;
-        if since_last > ARROW_SPACING && length > 0.0 {
-            heads.extend(middle_arrow_head(pair[0], pair[1], length));
-            since_last = 0.0;
-        }
-    }
-    heads
-}
-
-/// An arrow head in the middle of a segment of given length.
-fn middle_arrow_head(from: (f64, f64), to: (f64, f64), length: f64) -> Option<Points> {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let (ux, uy) = (dx / length * ARROW_LENGTH, dy / length * ARROW_LENGTH);
-    let middle = (from.0 + 0.5 * dx, from.1 + 0.5 * dy);
-    let start = (middle.0 - ux, middle.1 - uy);
-    let tip = (middle.0 + 0.5 * ux, middle.1 + 0.5 * uy);
-    arrow_head(start, tip, ARROW_LENGTH, 0.5)
-}
-
-pub(super) fn draw_symbol(
-    canvas: &Canvas,
-    colour: Colour,
-    symbol: Symbol,
-    (x, y): (f64, f64),
-) -> Result<(), ReportError> {
-    match symbol {
-        Symbol::Dot => canvas.dot((x, y), 3.2, colour.into()),
-        Symbol::Ring => canvas.ring((x, y), SYMBOL, colour, 1.6),
-        Symbol::Cross => {
-            let (left, right, top, bottom) = (x - SYMBOL, x + SYMBOL, y - SYMBOL, y + SYMBOL);
-            canvas.line(&[(left, top), (right, bottom)], colour.into(), 1.8)?;
-            canvas.line(&[(left, bottom), (right, top)], colour.into(), 1.8)
-        }
-    }
 }

@@ -22,6 +22,8 @@ pub enum ScaleKind {
     Logarithmic,
     /// Linear, with ticks at multiples of 30 or 90 degrees.
     Degrees,
+    /// Linear, with ticks at whole numbers.
+    Count,
     /// Linear, without ticks: for schematic drawings.
     Blank,
 }
@@ -59,6 +61,11 @@ impl Scale {
     /// A linear axis in degrees.
     pub fn degrees(label: &str) -> Scale {
         Scale::new(label, ScaleKind::Degrees)
+    }
+
+    /// A linear axis of a number of things.
+    pub fn count(label: &str) -> Scale {
+        Scale::new(label, ScaleKind::Count)
     }
 
     /// A linear axis without ticks.

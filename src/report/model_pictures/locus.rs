@@ -2,19 +2,22 @@
 
 use nalgebra::Complex;
 
-use super::{colour, setting_label};
+use super::{colour, setting_label, setting_number};
 use crate::model::zeros::Locus;
 use crate::report::ReportError;
 use crate::report::chart::colours::{GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use crate::report::number::plain;
+use crate::report::labels::spread;
 
 const PLANE_HEIGHT: f64 = 420.0;
 const PARTS_HEIGHT: f64 = 260.0;
 /// Zeros beyond this multiple of the magnitude that 90 % of them do not exceed are not drawn: they pass through infinity.
 const FAR: f64 = 1.5;
-/// Values of the setting that are written at the first track.
+/// Values of the setting that are written at a track, and their least distance as a ratio of the largest magnitude.
 const LABELS: usize = 6;
+const LABEL_DISTANCE: f64 = 0.12;
+/// Pixels from a point to the left end of its text.
+const LABEL_OFFSET: (f64, f64) = (9.0, 0.0);
 /// The real or the imaginary part of a zero.
 type Part = fn(Complex<f64>) -> f64;
 
@@ -76,12 +79,12 @@ fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) 
             }
         }
     }
-    chart = with_values(chart, locus, tracks);
+    chart = with_values(chart, locus, tracks, limit_rad_s);
     let changes = locus.changes.iter().map(|change| change.s);
     let near = changes.filter(|s| s.norm() <= limit_rad_s);
     let places: Vec<(f64, f64)> = near.map(|s| (s.re, s.im)).collect();
     let (first, last) = (locus.values[0], locus.values[locus.values.len() - 1]);
-    let [first, last] = [first, last].map(|value| plain(value, 6));
+    let [first, last] = [first, last].map(setting_number);
     chart.heading = format!("From {first} (ring) to {last} (dot)");
     match places.is_empty() {
         true => chart,
@@ -90,7 +93,12 @@ fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) 
 }
 
 /// Values of the setting at the track that moves most.
-fn with_values(mut chart: Chart, locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>]) -> Chart {
+fn with_values(
+    mut chart: Chart,
+    locus: &Locus,
+    tracks: &[Vec<Option<Complex<f64>>>],
+    limit_rad_s: f64,
+) -> Chart {
     let length = |track: &[Option<Complex<f64>>]| -> f64 {
         let steps = track
             .windows(2)
@@ -101,12 +109,10 @@ fn with_values(mut chart: Chart, locus: &Locus, tracks: &[Vec<Option<Complex<f64
     let Some(track) = longest else {
         return chart;
     };
-    let step = (locus.values.len() / LABELS).max(1);
-    for k in (0..locus.values.len()).step_by(step) {
-        if let Some(s) = track[k] {
-            let text = format!("{:.4}", locus.values[k]);
-            chart = chart.text((s.re, s.im), (34.0, 0.0), &text);
-        }
+    let places = track.iter().zip(&locus.values);
+    let places = places.filter_map(|(s, value)| Some((*value, (*s)?)));
+    for (value, s) in spread(places, LABEL_DISTANCE * limit_rad_s, LABELS) {
+        chart = chart.text_from((s.re, s.im), LABEL_OFFSET, &setting_number(value));
     }
     chart
 }

@@ -13,9 +13,8 @@ const BAR_STRENGTH: f64 = 0.6;
 /// Settings and interactions that are drawn, the strongest first.
 const SETTINGS: usize = 12;
 const INTERACTIONS: usize = 6;
-/// Height of a bar with its name in pixels, and mean width of a character.
+/// Height of a bar with its name in pixels.
 const BAR_HEIGHT: f64 = 38.0;
-const CHARACTER: f64 = 6.7;
 
 /// Histograms of the number of CNMP pairs, without and with damping if that was counted, with 95 % confidence intervals; below them the
 /// Sobol indices: the share of the variance of "has pairs" that each setting explains alone, and pairs of settings beyond that. As an
@@ -35,19 +34,21 @@ pub fn study_svg(answer: &Answer, title: &str, subtitle: &str) -> Result<String,
         .iter()
         .map(|(heading, counted)| histogram(heading, counted));
     let mut rows = vec![Row::new(HISTOGRAM_HEIGHT, histograms.collect())];
-    let shares: Vec<(usize, Chart)> = counted
+    let shares = counted
         .iter()
-        .filter_map(|(heading, counted)| shares(heading, counted))
-        .collect();
-    let bars = shares.iter().map(|(bars, _)| *bars).max().unwrap_or(0);
-    let charts = shares.into_iter().map(|(_, chart)| chart).collect();
-    rows.push(Row::new(BAR_HEIGHT * bars as f64, charts));
+        .map(|(heading, counted)| (*heading, shares(counted)));
+    let shares: Vec<(&str, Vec<Share>)> = shares.filter(|(_, bars)| !bars.is_empty()).collect();
+    let bars = shares.iter().map(|(_, bars)| bars.len()).max().unwrap_or(0);
+    let charts = shares
+        .iter()
+        .map(|(heading, bars)| share_chart(heading, bars));
+    rows.push(Row::new(BAR_HEIGHT * bars as f64, charts.collect()));
     sheet_svg(title, subtitle, &rows)
 }
 
 fn histogram(heading: &str, counted: &Counted) -> Chart {
     let last = counted.probabilities.len() as f64;
-    let x = Scale::linear("Number of pairs of CNMP zeros").within(-0.6, last - 0.4);
+    let x = Scale::count("Number of pairs of CNMP zeros").within(-0.6, last - 0.4);
     let y = Scale::linear("Probability (%)").within(0.0, 1.05 * PERCENT);
     let chart = Chart::new(heading, x, y);
     let mut name = "share of the draws";
@@ -81,38 +82,86 @@ fn bar((left, bottom): (f64, f64), (right, top): (f64, f64)) -> Vec<(f64, f64)> 
     vec![(left, bottom), (right, bottom), (right, top), (left, top)]
 }
 
-/// The number of bars, and the chart of the shares; `None` with too few draws.
-fn shares(heading: &str, counted: &Counted) -> Option<(usize, Chart)> {
-    let settings = counted.settings.iter().take(SETTINGS);
-    let mut bars: Vec<(String, f64, Colour)> = settings
-        .filter_map(|effect| Some((effect.key.clone(), effect.share?, BLUE)))
-        .collect();
-    if bars.is_empty() {
-        return None;
+/// What explains a share of the variance.
+#[derive(Clone, Copy, PartialEq)]
+enum Effect {
+    Setting,
+    Interaction,
+}
+
+impl Effect {
+    fn colour(self) -> Colour {
+        match self {
+            Effect::Setting => BLUE,
+            Effect::Interaction => ORANGE,
+        }
     }
-    let interactions = counted.interactions.iter().take(INTERACTIONS);
-    bars.extend(interactions.map(|i| (i.keys.join(" × "), i.share, ORANGE)));
-    let largest = bars.iter().map(|(_, share, _)| *share).fold(0.01, f64::max);
-    let count = bars.len();
-    let x = Scale::linear("Share of the variance (%)").within(0.0, 1.1 * PERCENT * largest);
-    let y = Scale::blank("").within(-(count as f64), 0.0);
+
+    fn legend_name(self) -> &'static str {
+        match self {
+            Effect::Setting => "setting alone",
+            Effect::Interaction => "two settings together",
+        }
+    }
+}
+
+/// A bar of the chart of shares.
+struct Share {
+    name: String,
+    percent: f64,
+    effect: Effect,
+}
+
+/// Settings and interactions with their shares of the variance; empty with too few draws.
+fn shares(counted: &Counted) -> Vec<Share> {
+    let settings = counted.settings.iter().take(SETTINGS);
+    let mut shares: Vec<Share> = settings
+        .filter_map(|effect| Some(Share::new(&effect.key, effect.share?, Effect::Setting)))
+        .collect();
+    if !shares.is_empty() {
+        let interactions = counted.interactions.iter().take(INTERACTIONS);
+        shares.extend(
+            interactions.map(|i| Share::new(&i.keys.join(" × "), i.share, Effect::Interaction)),
+        );
+    }
+    shares
+}
+
+impl Share {
+    fn new(name: &str, ratio: f64, effect: Effect) -> Share {
+        Share {
+            name: name.into(),
+            percent: PERCENT * ratio,
+            effect,
+        }
+    }
+}
+
+fn share_chart(heading: &str, shares: &[Share]) -> Chart {
+    let largest = shares.iter().map(|share| share.percent).fold(1.0, f64::max);
+    let x = Scale::linear("Share of the variance (%)").within(0.0, 1.1 * largest);
+    let y = Scale::blank("").within(-(shares.len() as f64), 0.0);
     let heading = format!("{heading}: Sobol indices of \"has CNMP zeros\"");
-    let mut names = [(BLUE, "setting alone"), (ORANGE, "two settings together")];
-    let chart = (0..).zip(bars).fold(
-        Chart::new(&heading, x, y),
-        |chart, (row, (key, share, colour))| {
-            let top = -f64::from(row);
-            let outline = bar((0.0, top - 0.95), (PERCENT * share.max(0.0), top - 0.5));
-            let name = names.iter_mut().find(|(of, _)| *of == colour);
-            let name = name.map_or("", |(_, name)| std::mem::take(name));
-            let text = format!("{key}  {:.1} %", PERCENT * share);
-            let half_width = 0.5 * CHARACTER * text.chars().count() as f64;
-            chart.area(name, colour, BAR_STRENGTH, outline).text(
-                (0.0, top - 0.27),
-                (half_width + 4.0, 0.0),
-                &text,
-            )
-        },
-    );
-    Some((count, chart))
+    let mut chart = Chart::new(&heading, x, y);
+    let mut before = None;
+    for (row, share) in (0..).zip(shares) {
+        // Only the first bar of a kind has an entry in the legend.
+        let name = match before == Some(share.effect) {
+            true => "",
+            false => share.effect.legend_name(),
+        };
+        chart = with_share(chart, -f64::from(row), share, name);
+        before = Some(share.effect);
+    }
+    chart
+}
+
+/// A bar below `top` with its name above it.
+fn with_share(chart: Chart, top: f64, share: &Share, name: &str) -> Chart {
+    let percent = share.percent;
+    let outline = bar((0.0, top - 0.95), (percent.max(0.0), top - 0.5));
+    let text = format!("{}  {percent:.1} %", share.name);
+    chart
+        .area(name, share.effect.colour(), BAR_STRENGTH, outline)
+        .text_from((0.0, top - 0.27), (4.0, 0.0), &text)
 }
