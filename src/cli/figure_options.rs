@@ -44,6 +44,7 @@ impl PictureOptions {
         if self.files().next().is_none() {
             return Ok(());
         }
+        self.check()?;
         let picture = picture().map_err(|error| CliError::Failed(error.to_string()))?;
         if let Some(path) = &self.svg {
             write(path, &picture.svg)?;
@@ -51,6 +52,21 @@ impl PictureOptions {
         match &self.html {
             Some(path) => write(path, &picture.html()),
             None => Ok(()),
+        }
+    }
+
+    /// Two pictures cannot have one file.
+    fn check(&self) -> Result<(), CliError> {
+        let (Some(svg), Some(html)) = (&self.svg, &self.html) else {
+            return Ok(());
+        };
+        let is_same = std::path::absolute(svg).ok() == std::path::absolute(html).ok();
+        match is_same {
+            true => Err(CliError::Usage(format!(
+                "--svg and --html are both {}; give two different files",
+                svg.display()
+            ))),
+            false => Ok(()),
         }
     }
 
