@@ -73,12 +73,12 @@ fn residual(scale: MagnitudeScale, frf: &Frf, fitted: &[Complex<f64>]) -> Chart 
     let residual: Vec<f64> = differences.map(|(h, fit)| (h - fit).norm()).collect();
     let axis = scale.axis("|H − fit|", residual_range(frf, &residual));
     panel(axis)
-        .mark(expected(scale, frf))
-        .mark(left(scale, frf, &residual))
+        .mark(noise_mark(scale, frf))
+        .mark(residual_mark(scale, frf, &residual))
 }
 
 /// What noise leaves: the median, with the band that contains 95 %.
-fn expected(scale: MagnitudeScale, frf: &Frf) -> Mark {
+fn noise_mark(scale: MagnitudeScale, frf: &Frf) -> Mark {
     let points = frf.frequency_hz.iter().zip(&frf.magnitude_sigma);
     let points = points.enumerate().map(|(k, (x, sigma))| {
         let [low, median, high] = RAYLEIGH.map(|quantile| quantile * sigma);
@@ -98,7 +98,7 @@ fn expected(scale: MagnitudeScale, frf: &Frf) -> Mark {
     }
 }
 
-fn left(scale: MagnitudeScale, frf: &Frf, residual: &[f64]) -> Mark {
+fn residual_mark(scale: MagnitudeScale, frf: &Frf, residual: &[f64]) -> Mark {
     let points = frf.frequency_hz.iter().zip(residual);
     let points = points.enumerate().map(|(k, (x, y))| {
         scale.point(SeriesPoint {

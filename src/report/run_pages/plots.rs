@@ -10,10 +10,10 @@ use crate::control;
 use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use crate::identify::verdict::{self, UncertainZero};
 use crate::model::zeros::ModalTerm;
+use crate::report::html::{picture, section};
 use crate::report::{
     Identification, OrderedMode, PoleZeroMap, ReportError, StabilityChart, Trace, UncertainPoint,
-    coherence_svg, has_ambiguous_phase, identification_svg, nyquist_svg, pole_zero_svg,
-    stability_svg,
+    coherence_svg, identification_svg, nyquist_svg, pole_zero_svg, stability_svg,
 };
 
 /// The part of a Nyquist plot around two close modes extends by this multiple of their distance to either side.
@@ -22,9 +22,7 @@ const SURROUNDINGS_RATIO: f64 = 1.5;
 const BODE_CAPTION: &str = "Magnitude, phase and coherence: measured (wide line) with a band of two sigma, the model of the \
     configuration and the fit of modes, where they exist. The line is faint where the band reaches zero magnitude.";
 const RESIDUAL_CAPTION: &str = " The residual is the distance of the measured response from the fit; noise alone leaves 95 % of it \
-    in the band.";
-const WRAPPED_CAPTION: &str = " The phase is not unwrapped, because neighbouring points differ by more than 120 degrees or are too \
-    noisy: whole turns are unknown.";
+    in the band. It is smaller where few points determine a mode, because the fit follows their noise.";
 const COHERENCE_CAPTION: &str = "The part of the output power that the input explains. Below: 1 − coherence, which is due to \
     noise, leakage and nonlinearity.";
 const NYQUIST_CAPTION: &str = "The response in the complex plane, where its magnitude exceeds two sigma; on the right the \
@@ -231,11 +229,7 @@ fn bode(report: &RecordReport<'_>, curves: &Curves) -> Result<Plot, ReportError>
 
 fn bode_caption(report: &RecordReport<'_>) -> String {
     let residual = report.fit.map_or("", |_| RESIDUAL_CAPTION);
-    let phase = match has_ambiguous_phase(report.frf) {
-        true => WRAPPED_CAPTION,
-        false => "",
-    };
-    [BODE_CAPTION, residual, phase].concat()
+    [BODE_CAPTION, residual].concat()
 }
 
 fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
