@@ -110,17 +110,11 @@ fn drawn(
         true => LoopModel::continuous(closed_loop, config, margins.clone()),
         false => LoopModel::of(closed_loop, config),
     };
-    let plot = LoopPlot {
-        frequency_hz: &model.frequency_hz,
-        loop_gain: &model.loop_gain,
-        margins: &model.margins,
-        min_modulus_margin: model.min_modulus_margin,
-    };
     let time = time_text(config, margins);
     let title = format!("{}: {} controller", config.title, config.control.controller);
     let subtitle = joined(&[&plant_conditions(&config.plant, &[]), &time]);
     Ok(Picture {
-        svg: loop_svg(&plot, &title, &subtitle)?,
+        svg: loop_svg(&LoopPlot::from(&model), &title, &subtitle)?,
         caption: "L = P C by the model with its margins, as Bode plot and in the complex plane with -1; S from reference to error and T from reference to displacement.".into(),
         title,
     })

@@ -1,6 +1,5 @@
 //! Plots and pages of a record. The plots of these tests are kept in `target/tmp` for inspection.
 
-mod asked;
 mod attributes;
 mod bode;
 mod comparison;
@@ -12,5 +11,6 @@ mod phase;
 mod pictures;
 mod pole_zero;
 mod run;
+mod run_kinds;
 
 use bench_test_support::{stage, svg, truth};

@@ -1,4 +1,4 @@
-//! Pages of all kinds of runs: what was asked, results, events.
+//! Pages of all kinds of runs: command and settings, results, events.
 
 use bench_test_support::program::{Bench, number};
 use serde_json::Value;
@@ -58,7 +58,7 @@ fn page_shows_name_command_and_settings_that_differ_from_the_profile() {
         &[
             "<title>new &lt;flexure&gt;</title>",
             "<h1>new &lt;flexure&gt;</h1>",
-            "<h2>What was asked</h2>",
+            "<h2>Command and settings</h2>",
             "bench control --slow --duration 1 --seed 4 --json --name &#39;new &lt;flexure&gt;&#39;",
             "<dd>5 % heavier</dd>",
             "<dd>anna</dd>",
@@ -100,7 +100,7 @@ fn page_of_an_excitation_has_its_analysis_without_other_files() {
             &page,
             &[
                 &verdict,
-                "What was asked",
+                "Command and settings",
                 "Frequency response",
                 "<h2>The loop</h2>",
                 "<h2>Events</h2>",
@@ -121,7 +121,7 @@ fn page_of_a_calibration_has_the_compliance_of_the_command_and_of_the_model() {
         &[
             "<h2>Static steps</h2>",
             &cell,
-            "What was asked",
+            "Command and settings",
             "<h2>Signals</h2>",
         ],
     );

@@ -4,6 +4,7 @@ use nalgebra::Complex;
 
 use super::plane::{CRITICAL, circle, level, plane, with_critical_point, with_unit_circle};
 use crate::control::{Crossing, Margins};
+use crate::experiment::LoopModel;
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREEN, GREY, ORANGE, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
@@ -37,6 +38,17 @@ pub struct LoopPlot<'a> {
     pub margins: &'a Margins,
     /// Least allowed modulus margin; 0 for none.
     pub min_modulus_margin: f64,
+}
+
+impl<'a> From<&'a LoopModel> for LoopPlot<'a> {
+    fn from(model: &'a LoopModel) -> LoopPlot<'a> {
+        LoopPlot {
+            frequency_hz: &model.frequency_hz,
+            loop_gain: &model.loop_gain,
+            margins: &model.margins,
+            min_modulus_margin: model.min_modulus_margin,
+        }
+    }
 }
 
 /// A place of the loop that a margin marks.

@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::outputs::{AnalysisOutputs, AnalysisStatus, OutputError, ResultFiles};
+use super::outputs::{AnalysisOutputs, AnalysisStatus};
+use super::result_files::{OutputError, ResultFiles};
 use crate::config::Config;
 use crate::experiment::linearity::ModeOverAmplitude;
 use crate::report::{AmplitudeOverview, Picture, amplitudes_svg, joined, plant_conditions};

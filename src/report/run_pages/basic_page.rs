@@ -46,7 +46,7 @@ impl BasicReport<'_> {
             run_facts::heading(self.recording, title, &subtitle),
             run_facts::ending(self.recording),
             results(self.results),
-            run_facts::asked(self.recording, self.config),
+            run_facts::command_and_settings(self.recording, self.config),
             signals,
             run_facts::events(self.recording),
             run_facts::scheduling(self.recording, &[]),

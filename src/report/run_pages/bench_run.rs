@@ -1,7 +1,7 @@
 //! The report of a run of the bench: with its model, its loop, its scheduling and its configuration.
 
 use super::distortion_plot::distortion_plot;
-use super::loop_marks::{marks, peak_mark};
+use super::loop_pictures::MeasuredLoop;
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
@@ -13,10 +13,7 @@ use crate::recording::Recording;
 use crate::report::conditions::lines;
 use crate::report::html::row;
 use crate::report::number::{angular_frequency, significant};
-use crate::report::{
-    MagnitudeAxis, MeasuredLoopPlot, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
-    measured_nyquist_svg, measured_sensitivity_svg,
-};
+use crate::report::{MagnitudeAxis, ReportError};
 
 const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a band of two sigma, and by the model. Dotted: |L| = 1 \
     and -180 degrees.";
@@ -105,7 +102,7 @@ impl<'a> BenchRun<'a> {
             title: self.title.clone(),
             subtitle: self
                 .subtitle("current set-point to displacement, with hold, amplifier and delay"),
-            record: format!("Recording {}", run_facts::file_name(self.recording)),
+            record: run_facts::record(self.recording),
             unit: Unit::MetresPerAmpere,
             residue_unit: "1/kg".into(),
             frf: &analysis.frf,
@@ -118,7 +115,7 @@ impl<'a> BenchRun<'a> {
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: evidence(analysis),
             further_plots: self.further_plots()?,
-            asked: run_facts::asked(self.recording, self.config),
+            command_and_settings: run_facts::command_and_settings(self.recording, self.config),
             before_plots: analysis.closed.as_ref().map_or_else(String::new, margins),
             after_plots: run_facts::events(self.recording)
                 + &self.scheduling()
@@ -168,50 +165,24 @@ impl<'a> BenchRun<'a> {
 
     /// L as Bode plot and Nyquist plot, S and T.
     fn loop_plots(&self, closed: &ClosedResponses) -> Result<[Plot; 3], ReportError> {
+        let min_modulus_margin = self.config.control.min_modulus_margin;
         let subtitle = self.subtitle("the sampled loop, with hold, amplifier and delay");
-        let (title, margins) = (&self.title, &closed.margins);
-        let plot = MeasuredLoopPlot {
+        let [bode, nyquist, sensitivities] = MeasuredLoop {
             loop_gain: &closed.loop_gain,
-            model: &closed.model_loop,
-            marks: &marks(margins, &closed.loop_gain),
-            modulus_margin: Some(margins.modulus_margin.value),
-            title,
-            subtitle: &subtitle,
-        };
-        let sensitivities = MeasuredSensitivityPlot {
             sensitivity: &closed.sensitivity,
             complementary: &closed.complementary,
-            model_loop: &closed.model_loop,
-            peak: Some(&peak_mark(margins, &closed.loop_gain)),
-            min_modulus_margin: self.config.control.min_modulus_margin,
-            title,
+            model: &closed.model_loop,
+            margins: Some(&closed.margins),
+            min_modulus_margin,
+            title: &self.title,
             subtitle: &subtitle,
-        };
-        let drawn = |kind, heading, caption: &str, svg| Plot {
-            kind,
-            heading,
-            caption: caption.into(),
-            svg,
-        };
+        }
+        .pictures()?;
+        let caption = sensitivity_caption(min_modulus_margin);
         Ok([
-            drawn(
-                PlotKind::Loop,
-                "Loop",
-                LOOP_CAPTION,
-                measured_bode_svg(&plot)?,
-            ),
-            drawn(
-                PlotKind::LoopNyquist,
-                "Nyquist plot of the loop",
-                LOOP_NYQUIST_CAPTION,
-                measured_nyquist_svg(&plot)?,
-            ),
-            drawn(
-                PlotKind::Sensitivity,
-                "Sensitivities",
-                &sensitivity_caption(sensitivities.min_modulus_margin),
-                measured_sensitivity_svg(&sensitivities)?,
-            ),
+            Plot::new(PlotKind::Loop, LOOP_CAPTION, bode),
+            Plot::new(PlotKind::LoopNyquist, LOOP_NYQUIST_CAPTION, nyquist),
+            Plot::new(PlotKind::Sensitivity, caption, sensitivities),
         ])
     }
 

@@ -8,7 +8,7 @@ use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, Tracking
 use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
 use crate::report::conditions::{joined, lines};
-use crate::report::html::{facts, note, picture, row, section};
+use crate::report::html::{facts, note, row, section};
 use crate::report::number::{angular_frequency, interval, plain};
 use crate::report::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
@@ -67,10 +67,10 @@ impl ControlReport<'_> {
         let body = [
             self.heading(),
             run_facts::ending(self.recording),
-            run_facts::asked(self.recording, self.config),
+            run_facts::command_and_settings(self.recording, self.config),
             self.figures(),
             self.whole_run(),
-            plots.iter().map(plot_section).collect(),
+            plots.iter().map(Plot::section).collect(),
             run_facts::events(self.recording),
             run_facts::scheduling(self.recording, &[]),
             run_facts::configuration(self.recording, title),
@@ -239,7 +239,7 @@ impl ControlReport<'_> {
             &trip.unwrap_or_default(),
         ]
         .concat();
-        Ok(drawn(PlotKind::Signals, "Signals", caption, svg))
+        Ok(Plot::new(PlotKind::Signals, caption, svg))
     }
 
     fn settling_band(&self, step: &StepResponse) -> SettlingBand {
@@ -252,12 +252,7 @@ impl ControlReport<'_> {
 
     fn step(&self, step: &StepResponse) -> Result<Plot, ReportError> {
         let svg = step_picture(step, &self.config.title)?;
-        Ok(drawn(
-            PlotKind::Step,
-            "Step response",
-            STEP_CAPTION.into(),
-            svg,
-        ))
+        Ok(Plot::new(PlotKind::Step, STEP_CAPTION, svg))
     }
 
     fn spectrum(&self) -> Result<Option<Plot>, ReportError> {
@@ -269,47 +264,34 @@ impl ControlReport<'_> {
             Some(_) => format!("{MEASURED_SPECTRUM_CAPTION} {PREDICTED_SPECTRUM_CAPTION}"),
             None => MEASURED_SPECTRUM_CAPTION.into(),
         };
-        Ok(Some(drawn(
-            PlotKind::Spectrum,
-            "Spectrum of the error",
-            caption,
-            svg,
-        )))
-    }
-
-    fn loop_plot(&self) -> LoopPlot<'_> {
-        let model = &self.run.model;
-        LoopPlot {
-            frequency_hz: &model.frequency_hz,
-            loop_gain: &model.loop_gain,
-            margins: &model.margins,
-            min_modulus_margin: model.min_modulus_margin,
-        }
+        Ok(Some(Plot::new(PlotKind::Spectrum, caption, svg)))
     }
 
     fn loop_bode(&self) -> Result<Plot, ReportError> {
-        let svg = loop_bode_svg(&self.loop_plot(), &self.config.title, &self.loop_subtitle())?;
-        Ok(drawn(PlotKind::Loop, "Loop", LOOP_CAPTION.into(), svg))
+        let svg = loop_bode_svg(
+            &LoopPlot::from(&self.run.model),
+            &self.config.title,
+            &self.loop_subtitle(),
+        )?;
+        Ok(Plot::new(PlotKind::Loop, LOOP_CAPTION, svg))
     }
 
     fn loop_nyquist(&self) -> Result<Plot, ReportError> {
-        let svg = loop_nyquist_svg(&self.loop_plot(), &self.config.title, &self.loop_subtitle())?;
-        Ok(drawn(
-            PlotKind::LoopNyquist,
-            "Nyquist plot of the loop",
-            NYQUIST_CAPTION.into(),
-            svg,
-        ))
+        let svg = loop_nyquist_svg(
+            &LoopPlot::from(&self.run.model),
+            &self.config.title,
+            &self.loop_subtitle(),
+        )?;
+        Ok(Plot::new(PlotKind::LoopNyquist, NYQUIST_CAPTION, svg))
     }
 
     fn sensitivity(&self) -> Result<Plot, ReportError> {
-        let svg = sensitivity_svg(&self.loop_plot(), &self.config.title, &self.loop_subtitle())?;
-        Ok(drawn(
-            PlotKind::Sensitivity,
-            "Sensitivities",
-            SENSITIVITY_CAPTION.into(),
-            svg,
-        ))
+        let svg = sensitivity_svg(
+            &LoopPlot::from(&self.run.model),
+            &self.config.title,
+            &self.loop_subtitle(),
+        )?;
+        Ok(Plot::new(PlotKind::Sensitivity, SENSITIVITY_CAPTION, svg))
     }
 
     /// The subtitle of the plots of the model.
@@ -320,22 +302,6 @@ impl ControlReport<'_> {
         };
         joined(&[&format!("{stability} by the model"), &self.subtitle()])
     }
-}
-
-fn drawn(kind: PlotKind, heading: &'static str, caption: String, svg: String) -> Plot {
-    Plot {
-        kind,
-        heading,
-        caption,
-        svg,
-    }
-}
-
-fn plot_section(plot: &Plot) -> String {
-    section(
-        plot.heading,
-        &picture(&plot.svg, plot.heading, &plot.caption),
-    )
 }
 
 fn envelope(extents: &[Extent]) -> Vec<(f64, f64, f64)> {

@@ -15,12 +15,8 @@ pub(super) fn distortion_plot(
     subtitle: &str,
 ) -> Result<Plot, ReportError> {
     let levels = DistortionLevels::from(&linearity.harmonics);
-    Ok(Plot {
-        kind: PlotKind::Linearity,
-        heading: "Distortion and noise",
-        caption: caption(linearity),
-        svg: distortion_svg(&levels, quantity, title, subtitle)?,
-    })
+    let svg = distortion_svg(&levels, quantity, title, subtitle)?;
+    Ok(Plot::new(PlotKind::Linearity, caption(linearity), svg))
 }
 
 fn caption(linearity: &Linearity) -> String {

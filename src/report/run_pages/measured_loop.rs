@@ -5,16 +5,12 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::loop_marks::{marks, peak_mark};
-use super::outputs::{OutputError, ResultFiles};
+use super::loop_pictures::MeasuredLoop;
+use super::result_files::{OutputError, ResultFiles};
 use crate::control::ClosedLoop;
 use crate::control::measured::MeasuredMargins;
 use crate::experiment::LoopCurves;
 use crate::identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
-use crate::report::{
-    MeasuredLoopPlot, MeasuredSensitivityPlot, measured_bode_svg, measured_nyquist_svg,
-    measured_sensitivity_svg,
-};
 
 /// A loop with a measured plant.
 #[derive(Clone)]
@@ -69,26 +65,18 @@ impl MeasuredLoopFiles {
             .map(|f| report.model.sampled_loop(TAU * f))
             .collect();
         let loop_gain = &curves.loop_gain;
-        let marks = report.margins.map_or(Vec::new(), |m| marks(m, loop_gain));
-        let peak = report.margins.map(|margins| peak_mark(margins, loop_gain));
-        let plot = MeasuredLoopPlot {
-            loop_gain,
-            model: &model,
-            marks: &marks,
-            modulus_margin: report.margins.map(|margins| margins.modulus_margin.value),
-            title: &report.title,
-            subtitle: &report.subtitle,
-        };
         let (s, t) = (&curves.sensitivity, &curves.complementary);
-        let sensitivity_plot = measured_sensitivity_svg(&MeasuredSensitivityPlot {
+        let [bode, nyquist, sensitivities] = MeasuredLoop {
+            loop_gain,
             sensitivity: s,
             complementary: t,
-            model_loop: &model,
-            peak: peak.as_ref(),
+            model: &model,
+            margins: report.margins,
             min_modulus_margin: report.min_modulus_margin,
             title: &report.title,
             subtitle: &report.subtitle,
-        })?;
+        }
+        .pictures()?;
         Ok(MeasuredLoopFiles {
             loop_csv: results.write_frf("loop", &curves.loop_gain, RATIO)?,
             sensitivity_csv: results.write_frf("sensitivity", s, RATIO)?,
@@ -99,9 +87,9 @@ impl MeasuredLoopFiles {
                 &curves.disturbance,
                 METRES_PER_AMPERE,
             )?,
-            loop_plot: results.write("loop", "svg", &measured_bode_svg(&plot)?)?,
-            nyquist_plot: results.write("nyquist", "svg", &measured_nyquist_svg(&plot)?)?,
-            sensitivity_plot: results.write("sensitivity", "svg", &sensitivity_plot)?,
+            loop_plot: results.write("loop", "svg", &bode)?,
+            nyquist_plot: results.write("nyquist", "svg", &nyquist)?,
+            sensitivity_plot: results.write("sensitivity", "svg", &sensitivities)?,
         })
     }
 

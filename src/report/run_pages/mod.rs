@@ -16,11 +16,13 @@ mod comparison;
 mod control_page;
 mod distortion_plot;
 mod external;
-mod loop_marks;
+mod loop_pictures;
 mod measured_loop;
 mod outputs;
 mod page;
+mod page_files;
 mod plots;
+mod result_files;
 mod run_differences;
 mod run_facts;
 
@@ -38,12 +40,11 @@ pub use comparison::{MAX_COMPARED, comparison_page};
 pub use control_page::ControlReport;
 pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
-pub use outputs::{
-    AnalysisOutputs, AnalysisStatus, ControlFiles, ExistingFile, LoopOutputs, ModalSummary,
-    OutputError, PageFiles, ResultFiles,
-};
+pub use outputs::{AnalysisOutputs, AnalysisStatus, LoopOutputs, ModalSummary};
 pub use page::page;
+pub use page_files::{ControlFiles, PageFiles};
 pub use plots::{Plot, PlotKind, plots};
+pub use result_files::{ExistingFile, OutputError, ResultFiles};
 
 /// The content of a report on an analysed record.
 #[derive(Clone, Debug)]
@@ -80,8 +81,8 @@ pub struct RecordReport<'a> {
     pub evidence: Vec<(String, String)>,
     /// Plots after those that every record has.
     pub further_plots: Vec<Plot>,
-    /// HTML section about what was asked for.
-    pub asked: String,
+    /// HTML section about the command and its settings.
+    pub command_and_settings: String,
     /// HTML sections before the plots.
     pub before_plots: String,
     /// HTML sections after the plots.

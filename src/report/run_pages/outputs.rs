@@ -1,172 +1,18 @@
 //! The files and the numbers of an analysed record: FRFs as CSV, plots, the page, modes, zeros and verdict.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
-use super::RecordReport;
 use super::bench_run::BenchRun;
-use super::control_page::ControlReport;
-use super::page::page;
-use super::plots::{PlotKind, plots};
+use super::page_files::PageFiles;
+use super::result_files::{OutputError, ResultFiles};
 use crate::experiment::certificate::{ResponseFile, SignCheck, certify};
-use crate::experiment::{Analysis, ClosedResponses, PlanError};
-use crate::identify::Frf;
+use crate::experiment::{Analysis, ClosedResponses};
 use crate::identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{FittedMode, ModalFit, ModelOrder};
 use crate::identify::verdict::{Cnmp, UncertainZero, Verdict};
-use crate::report::ReportError;
-use crate::util::atomic_file::{write_atomic, write_new};
-
-/// Why the files of an analysis cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum OutputError {
-    /// A plot cannot be drawn.
-    #[error(transparent)]
-    Plot(#[from] ReportError),
-    /// The certificate cannot be made.
-    #[error(transparent)]
-    Certificate(#[from] PlanError),
-    /// A file cannot be written.
-    #[error("cannot write {0}: {1}; free some space, or choose another folder with --out")]
-    File(PathBuf, std::io::Error),
-}
-
-/// What happens to an existing file with the name of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ExistingFile {
-    /// It is replaced: it is the same result of an earlier analysis of the same recording.
-    Replace,
-    /// It is kept, because it may be the result of another analysis: the new file is `STEM_what-2.ext`, `STEM_what-3.ext`, ...
-    Keep,
-}
-
-/// The files of the results of one analysis: `STEM_what.ext` beside a file, with its stem.
-#[derive(Clone, Copy, Debug)]
-pub struct ResultFiles<'a> {
-    /// The analysed file, or its name in the folder of the results.
-    pub beside: &'a Path,
-    /// What happens to existing files.
-    pub existing: ExistingFile,
-}
-
-impl ResultFiles<'_> {
-    /// Writes an FRF; `magnitude` names its magnitude column. Returns the path of the file.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
-    pub fn write_frf(&self, what: &str, frf: &Frf, magnitude: &str) -> Result<String, OutputError> {
-        self.write(what, "csv", &frf_csv::to_string(frf, magnitude))
-    }
-
-    /// Writes a file and returns its path.
-    pub(super) fn write(
-        &self,
-        what: &str,
-        extension: &str,
-        text: &str,
-    ) -> Result<String, OutputError> {
-        let stem = self.beside.file_stem().unwrap_or_default();
-        let name = format!("{}_{what}.{extension}", stem.to_string_lossy());
-        let path = self.beside.with_file_name(name);
-        let written = match self.existing {
-            ExistingFile::Replace => write_atomic(&path, text).map(|()| path.clone()),
-            ExistingFile::Keep => write_new(&path, text),
-        };
-        let written = written.map_err(|error| OutputError::File(path, error))?;
-        Ok(written.display().to_string())
-    }
-}
-
-/// Plots by kind; `None` where the data give none.
-pub type Plots = BTreeMap<&'static str, Option<String>>;
-
-/// The plots and the page of a record.
-#[derive(Clone, Debug, Serialize)]
-pub struct PageFiles {
-    /// The Bode plot.
-    pub plot: Option<String>,
-    /// All plots.
-    pub plots: Plots,
-    /// The page.
-    pub report: Option<String>,
-}
-
-impl Default for PageFiles {
-    fn default() -> Self {
-        PageFiles {
-            plot: None,
-            plots: PlotKind::ALL.map(|kind| (kind.name(), None)).into(),
-            report: None,
-        }
-    }
-}
-
-impl PageFiles {
-    /// Draws a record and writes its plots and its page.
-    ///
-    /// # Errors
-    /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(
-        report: &RecordReport<'_>,
-        results: ResultFiles<'_>,
-    ) -> Result<PageFiles, OutputError> {
-        let plots = plots(report)?;
-        let mut files = PageFiles::default();
-        for plot in &plots {
-            let path = results.write(plot.kind.name(), "svg", &plot.svg)?;
-            files.plots.insert(plot.kind.name(), Some(path));
-        }
-        files.plot = files.plots.get("bode").cloned().flatten();
-        let page = page(report, &plots);
-        files.report = Some(results.write("report", "html", &page)?);
-        Ok(files)
-    }
-}
-
-impl PageFiles {
-    /// Adds the plots and the page of a closed-loop run that has no analysis, because it did not come to its end.
-    pub fn extend(&mut self, files: Option<ControlFiles>) {
-        let Some(files) = files else {
-            return;
-        };
-        let drawn = files.plots.into_iter().filter(|(_, path)| path.is_some());
-        self.plots.extend(drawn);
-        self.report = files.report;
-    }
-}
-
-/// The plots and the page of a closed-loop run; the names in JSON must not change.
-#[derive(Clone, Debug, Serialize)]
-pub struct ControlFiles {
-    /// All plots.
-    pub plots: Plots,
-    /// The page.
-    pub report: Option<String>,
-}
-
-impl ControlFiles {
-    /// Draws a run and writes its plots and its page.
-    ///
-    /// # Errors
-    /// When a plot cannot be drawn, or a file cannot be written.
-    pub fn write(
-        report: &ControlReport<'_>,
-        results: ResultFiles<'_>,
-    ) -> Result<ControlFiles, OutputError> {
-        let drawn = report.plots()?;
-        let mut plots: Plots = PlotKind::CONTROL.map(|kind| (kind.name(), None)).into();
-        for plot in &drawn {
-            let path = results.write(plot.kind.name(), "svg", &plot.svg)?;
-            plots.insert(plot.kind.name(), Some(path));
-        }
-        let page = report.page(&drawn);
-        let report = Some(results.write("report", "html", &page)?);
-        Ok(ControlFiles { plots, report })
-    }
-}
 
 /// Modes, zeros and verdict; the names in JSON must not change.
 #[derive(Clone, Debug, Serialize)]

@@ -6,19 +6,22 @@ use super::{Plot, RecordReport};
 use crate::experiment::certificate::SIGNS_DIFFER;
 use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::identify::verdict::UncertainZero;
-use crate::report::html::{
-    document_with_plots, escaped, facts, note, picture, row, section, table,
-};
+use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::number::{interval, percent};
 
 /// The page as an HTML document.
 pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
-    let plots: String = plots.iter().map(plot).collect();
+    let plots: String = plots.iter().map(Plot::section).collect();
     let body = [
-        heading(report),
+        heading(
+            report.name.as_deref(),
+            &report.title,
+            &report.subtitle,
+            &report.record,
+        ),
         other_signs(report),
         verdict(report),
-        report.asked.clone(),
+        report.command_and_settings.clone(),
         modes(report),
         zeros(report),
         report.before_plots.clone(),
@@ -29,21 +32,14 @@ pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
     document_with_plots(title, &body.concat())
 }
 
-fn heading(report: &RecordReport<'_>) -> String {
-    let (title, subtitle) = (escaped(&report.title), escaped(&report.subtitle));
-    let record = escaped(&report.record);
-    let (heading, title) = match &report.name {
-        Some(name) => (escaped(name), format!("{title}<br>")),
+/// The heading: the name, if there is one, then the title, with `subtitle` and `record` below.
+pub(super) fn heading(name: Option<&str>, title: &str, subtitle: &str, record: &str) -> String {
+    let (heading, below) = match name {
+        Some(name) => (name, format!("{}<br>", escaped(title))),
         None => (title, String::new()),
     };
-    format!("<h1>{heading}</h1>\n<p class=\"quiet\">{title}{subtitle}<br>{record}</p>\n")
-}
-
-fn plot(plot: &Plot) -> String {
-    section(
-        plot.heading,
-        &picture(&plot.svg, plot.heading, &plot.caption),
-    )
+    let [heading, subtitle, record] = [heading, subtitle, record].map(escaped);
+    format!("<h1>{heading}</h1>\n<p class=\"quiet\">{below}{subtitle}<br>{record}</p>\n")
 }
 
 /// A warning in large letters, if the signs of the residues differ from those of the model.

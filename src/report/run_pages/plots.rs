@@ -85,6 +85,24 @@ impl PlotKind {
         PlotKind::Linearity,
     ];
 
+    /// The heading on the page.
+    pub fn heading(self) -> &'static str {
+        match self {
+            PlotKind::Bode => "Frequency response",
+            PlotKind::Coherence => "Coherence",
+            PlotKind::Nyquist => "Nyquist plot",
+            PlotKind::PoleZero => "Poles and zeros",
+            PlotKind::Stability => "Stability chart",
+            PlotKind::Loop => "Loop",
+            PlotKind::LoopNyquist => "Nyquist plot of the loop",
+            PlotKind::Sensitivity => "Sensitivities",
+            PlotKind::Linearity => "Distortion and noise",
+            PlotKind::Signals => "Signals",
+            PlotKind::Step => "Step response",
+            PlotKind::Spectrum => "Spectrum of the error",
+        }
+    }
+
     /// The name in files and JSON.
     pub fn name(self) -> &'static str {
         match self {
@@ -109,12 +127,27 @@ impl PlotKind {
 pub struct Plot {
     /// Its kind.
     pub kind: PlotKind,
-    /// Its heading on the page.
-    pub heading: &'static str,
     /// Its caption.
     pub caption: String,
     /// The SVG document.
     pub svg: String,
+}
+
+impl Plot {
+    /// A plot with its caption.
+    pub fn new(kind: PlotKind, caption: impl Into<String>, svg: String) -> Plot {
+        Plot {
+            kind,
+            caption: caption.into(),
+            svg,
+        }
+    }
+
+    /// The section of the plot on a page, as HTML.
+    pub(super) fn section(&self) -> String {
+        let heading = self.kind.heading();
+        section(heading, &picture(&self.svg, heading, &self.caption))
+    }
 }
 
 /// All plots that a record has data for.
@@ -219,12 +252,8 @@ fn bode(report: &RecordReport<'_>, curves: &Curves) -> Result<Plot, ReportError>
         curves: &curves.traces(),
         fitted: fit.map(|fit| &fit.at_measured[..]),
     };
-    Ok(Plot {
-        kind: PlotKind::Bode,
-        heading: "Frequency response",
-        caption: bode_caption(report),
-        svg: identification_svg(&plot, &report.title, &report.subtitle)?,
-    })
+    let svg = identification_svg(&plot, &report.title, &report.subtitle)?;
+    Ok(Plot::new(PlotKind::Bode, bode_caption(report), svg))
 }
 
 fn bode_caption(report: &RecordReport<'_>) -> String {
@@ -233,12 +262,8 @@ fn bode_caption(report: &RecordReport<'_>) -> String {
 }
 
 fn coherence(report: &RecordReport<'_>) -> Result<Plot, ReportError> {
-    Ok(Plot {
-        kind: PlotKind::Coherence,
-        heading: "Coherence",
-        caption: COHERENCE_CAPTION.into(),
-        svg: coherence_svg(report.frf, &report.title, &report.subtitle)?,
-    })
+    let svg = coherence_svg(report.frf, &report.title, &report.subtitle)?;
+    Ok(Plot::new(PlotKind::Coherence, COHERENCE_CAPTION, svg))
 }
 
 fn nyquist(
@@ -250,12 +275,8 @@ fn nyquist(
     let mut traces = vec![Trace::measured("measured", report.frf)];
     traces.extend(curves.traces());
     let (title, subtitle) = (&report.title, &report.subtitle);
-    Ok(Plot {
-        kind: PlotKind::Nyquist,
-        heading: "Nyquist plot",
-        caption: NYQUIST_CAPTION.into(),
-        svg: nyquist_svg(report.unit, &traces, part_hz, title, subtitle)?,
-    })
+    let svg = nyquist_svg(report.unit, &traces, part_hz, title, subtitle)?;
+    Ok(Plot::new(PlotKind::Nyquist, NYQUIST_CAPTION, svg))
 }
 
 /// The frequencies around two close modes, in hertz.
@@ -293,12 +314,12 @@ fn zero(zero: &UncertainZero) -> UncertainPoint {
 }
 
 fn pole_zero(report: &RecordReport<'_>, map: &PoleZeroMap) -> Result<Plot, ReportError> {
-    Ok(Plot {
-        kind: PlotKind::PoleZero,
-        heading: "Poles and zeros",
-        caption: pole_zero_caption(map.up_to_rad_s),
-        svg: pole_zero_svg(map, &report.title, &report.subtitle)?,
-    })
+    let svg = pole_zero_svg(map, &report.title, &report.subtitle)?;
+    Ok(Plot::new(
+        PlotKind::PoleZero,
+        pole_zero_caption(map.up_to_rad_s),
+        svg,
+    ))
 }
 
 fn pole_zero_caption(limit_rad_s: f64) -> String {
@@ -321,12 +342,8 @@ fn stability(report: &RecordReport<'_>, fit: &ModalFit) -> Result<Plot, ReportEr
         measured: report.frf,
         unit: report.unit,
     };
-    Ok(Plot {
-        kind: PlotKind::Stability,
-        heading: "Stability chart",
-        caption: STABILITY_CAPTION.into(),
-        svg: stability_svg(&chart, &report.title, &report.subtitle)?,
-    })
+    let svg = stability_svg(&chart, &report.title, &report.subtitle)?;
+    Ok(Plot::new(PlotKind::Stability, STABILITY_CAPTION, svg))
 }
 
 fn ordered_modes(order: &ModelOrder) -> Vec<OrderedMode> {

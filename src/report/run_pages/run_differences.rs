@@ -1,6 +1,7 @@
 //! The tables of a comparison of runs: settings, verdicts, modes, figures.
 
 use super::page::table_section;
+use super::run_facts::setting_cell;
 use crate::experiment::run_comparison::{
     Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
@@ -155,11 +156,10 @@ fn settings(other: &RunDifferences) -> String {
         .settings
         .iter()
         .map(|setting| {
-            let shown = |value: &Option<String>| value.clone().unwrap_or_else(|| "not set".into());
             row(&[
                 setting.key.clone(),
-                shown(&setting.reference),
-                shown(&setting.value),
+                setting_cell(setting.reference.as_deref()),
+                setting_cell(setting.value.as_deref()),
             ])
         })
         .collect();

@@ -1,6 +1,6 @@
 //! Sections of a page about the run itself: its scheduling and its configuration.
 
-use super::page::named;
+use super::page::{self, named};
 use crate::config::{Config, SettingDifference, changed_settings};
 use crate::experiment::{Description, Ending, TripSummary};
 use crate::recording::{Recording, event_text};
@@ -25,7 +25,7 @@ const METADATA: [&str; 11] = [
 /// Most events that a page lists.
 const MOST_EVENTS: usize = 200;
 /// Most characters of a value in the table of changed settings.
-const LONGEST_VALUE: usize = 80;
+const LONGEST_VALUE: usize = 36;
 
 /// An entry of the recording's metadata; empty if it is missing.
 pub(super) fn metadata<'a>(recording: &'a Recording, name: &str) -> &'a str {
@@ -55,32 +55,26 @@ fn devices(recording: &Recording) -> String {
     }
 }
 
-/// The name of the file.
-pub(super) fn file_name(recording: &Recording) -> String {
-    let file = recording.path().file_name().unwrap_or_default();
-    file.to_string_lossy().into_owned()
-}
-
 /// The page of a recording, with the name of the run as its title; `title` if it has none.
 pub(super) fn document(recording: &Recording, title: &str, body: &str) -> String {
     let name = Description::of(recording).name;
     document_with_plots(name.as_deref().unwrap_or(title), body)
 }
 
-/// The heading: the name of the run, if it has one, then the title of the configuration, with `subtitle` and file.
+/// The heading of the page of a recording.
 pub(super) fn heading(recording: &Recording, title: &str, subtitle: &str) -> String {
     let name = Description::of(recording).name;
-    let (heading, below) = match &name {
-        Some(name) => (name.as_str(), format!("{}<br>", escaped(title))),
-        None => (title, String::new()),
-    };
-    let (heading, subtitle) = (escaped(heading), escaped(subtitle));
-    let file = escaped(&file_name(recording));
-    format!("<h1>{heading}</h1>\n<p class=\"quiet\">{below}{subtitle}<br>Recording {file}</p>\n")
+    page::heading(name.as_deref(), title, subtitle, &record(recording))
 }
 
-/// What was asked: the command, its description, and the settings that differ from the profile.
-pub(super) fn asked(recording: &Recording, config: &Config) -> String {
+/// The name of the file, as the page states it.
+pub(super) fn record(recording: &Recording) -> String {
+    let file = recording.path().file_name().unwrap_or_default();
+    format!("Recording {}", file.to_string_lossy())
+}
+
+/// The command, its description, and the settings that differ from the profile.
+pub(super) fn command_and_settings(recording: &Recording, config: &Config) -> String {
     let description = Description::of(recording);
     let invocation = description.invocation.as_ref();
     let profile = invocation.map(|made| made.profile.clone());
@@ -98,7 +92,7 @@ pub(super) fn asked(recording: &Recording, config: &Config) -> String {
     ]);
     let settings = profile.map(|profile| changed(&profile, config));
     section(
-        "What was asked",
+        "Command and settings",
         &(facts(&pairs) + &settings.unwrap_or_default()),
     )
 }
@@ -119,15 +113,16 @@ fn changed(profile: &str, config: &Config) -> String {
 }
 
 fn setting_row(setting: &SettingDifference) -> String {
-    let shown = |value: &Option<String>| match value {
-        Some(value) => shortened(value),
-        None => "not set".into(),
-    };
     row(&[
         setting.key.clone(),
-        shown(&setting.value),
-        shown(&setting.reference),
+        setting_cell(setting.value.as_deref()),
+        setting_cell(setting.reference.as_deref()),
     ])
+}
+
+/// The value of a setting as the cell of a table.
+pub(super) fn setting_cell(value: Option<&str>) -> String {
+    value.map_or("not set".into(), shortened)
 }
 
 /// The beginning of a long value, for example of a table of measured points. The configuration has all of it.
@@ -145,7 +140,7 @@ pub(super) fn ending(recording: &Recording) -> String {
         Some(trip) => {
             let time_s = trip.tick as f64 * recording.period_s().unwrap_or_default();
             let (why, remedy) = (escaped(&trip.text), escaped(trip.remedy));
-            format!("<strong>tripped</strong><br>After {time_s:.4} s: {why}<br>{remedy}")
+            format!("<strong>tripped</strong><br>After {time_s:.4} s: {why}<br>Remedy: {remedy}")
         }
         None if ending == Ending::Completed => return String::new(),
         None => format!(
