@@ -1,9 +1,11 @@
 //! Plots and pages of a record. The plots of these tests are kept in `target/tmp` for inspection.
 
+mod amplitudes;
 mod attributes;
 mod bode;
 mod comparison;
 mod control;
+mod identification;
 mod model_pictures;
 mod nyquist;
 mod overlay;

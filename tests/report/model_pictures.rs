@@ -1,5 +1,6 @@
 //! Pictures of results of the model, written by `--svg` and `--html`.
 
+use bench::report::{CnmpMap, map_svg};
 use bench_test_support::program::Bench;
 use serde_json::json;
 
@@ -86,7 +87,7 @@ fn veering_shows_frequencies_over_the_parameter() {
         command: "model veering",
         labels: &["Natural frequency (Hz)", "plant.operating_point_m (m)"],
         curves: 2 + 1 + 4,
-        shows: &["closest approach", "gap"],
+        shows: &["closest: gap"],
     });
 }
 
@@ -97,7 +98,7 @@ fn step_shows_the_response_and_the_part_of_each_mode() {
         command: "model step",
         labels: &["Time since the step (ms)", "Displacement (µm/N)"],
         curves: 2 * (1 + 3),
-        shows: &["response", "part of mode 1"],
+        shows: &["response", "part of the mode at 29.27 Hz"],
     });
 }
 
@@ -132,6 +133,77 @@ fn margins_show_the_loop_with_its_margins() {
         curves: 4 + 2 * 6 + 4,
         shows: &["phase margin", "gain margin", "modulus margin", "-1"],
     });
+}
+
+/// The asymmetry rises upward: with pairs at the larger asymmetry only, their cell is the upper one.
+#[test]
+fn map_has_the_larger_asymmetry_above() {
+    let map = CnmpMap {
+        operating_points: &[0.08],
+        asymmetries: &[0.1, -0.1],
+        pairs: &[vec![1, 0]],
+    };
+    let svg = map_svg(&map, "Map", "").unwrap();
+    let centre = |colour: &str| -> f64 {
+        let cells = svg::points(&svg, "polygon", colour);
+        // The sample of the legend is small.
+        let size = |cell: &[(f64, f64)]| (cell[2].0 - cell[0].0).abs();
+        let largest = cells.iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+        let corners = largest.expect("a cell");
+        corners.iter().map(|(_, y)| y).sum::<f64>() / corners.len() as f64
+    };
+    let (one_pair, no_pair) = (centre("#56B4E9"), centre("#EAEAEA"));
+    assert!(one_pair < no_pair, "{one_pair} {no_pair}");
+}
+
+/// Labels along a track are apart: no two of them overlap.
+#[test]
+fn locus_labels_do_not_overlap() {
+    let bench = Bench::new();
+    for vary in [
+        "--vary plant.operating_point_m --from 0% --to 15%",
+        "--vary plant.mass_asymmetry --from -10% --to 10%",
+    ] {
+        text(
+            &bench,
+            &format!("model locus {vary} --count 61 --svg a.svg"),
+        );
+        let picture = bench.read("a.svg");
+        let marks: String = picture
+            .split("data-at=")
+            .skip(1)
+            .map(|part| {
+                part.split_once('\n')
+                    .unwrap()
+                    .1
+                    .split("</g>")
+                    .next()
+                    .unwrap()
+            })
+            .collect();
+        let labels = svg::words(&marks);
+        assert!((2..=6).contains(&labels.len()), "{}", labels.len());
+        for (k, a) in labels.iter().enumerate() {
+            for b in &labels[k + 1..] {
+                let apart =
+                    a.right < b.left || b.right < a.left || a.bottom < b.top || b.bottom < a.top;
+                assert!(apart, "{} and {}", a.text, b.text);
+            }
+        }
+    }
+}
+
+#[test]
+fn rejects_one_file_for_two_pictures() {
+    let bench = Bench::new();
+    let answer = bench.run("model step --svg a --html ./a");
+    assert_eq!(answer.code, 2);
+    assert!(
+        answer.err.contains("--svg and --html are both a"),
+        "{}",
+        answer.err
+    );
+    assert!(bench.files().is_empty());
 }
 
 #[test]

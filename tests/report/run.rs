@@ -125,6 +125,41 @@ fn identify_replaces_plots_and_page_of_the_run() {
     assert!(page.contains(&verdict) && run.page().contains(&verdict));
 }
 
+/// `bench model modes`: the modes R, u and v are at 29.274, 82.228 and 85.784 Hz.
+#[test]
+fn page_has_the_frequencies_of_the_modes() {
+    let page = run().page();
+    for frequency_hz in ["29.27", "82.2", "85.78"] {
+        assert!(
+            page.contains(&format!("<td class=\"n\">{frequency_hz}")),
+            "{frequency_hz}"
+        );
+    }
+}
+
+#[test]
+fn subtitle_has_the_amplitude_within_the_band_in_milliamperes() {
+    let amplitude =
+        "chirp.amplitude=[{frequency_hz=10.0,current_a=0.04},{frequency_hz=40.0,current_a=0.01}]";
+    let run = Run::of(&[
+        "chirp",
+        "--duration",
+        "5",
+        "--start",
+        "20",
+        "--stop",
+        "40",
+        "--set",
+        amplitude,
+        "--db",
+        "--json",
+    ]);
+    // Straight on logarithmic axes: 40 mA (10/20) = 20 mA at 20 Hz.
+    let page = run.page();
+    assert!(page.contains(" at 5000 Hz, 10.0 to 20.0 mA"));
+    assert!(page.contains("Magnitude (dB re 1 m/A)") && page.contains("|H − fit| (dB re 1 m/A)"));
+}
+
 #[test]
 fn identify_keeps_existing_results_in_another_folder() {
     let folder = tempfile::tempdir().unwrap();

@@ -13,9 +13,9 @@ const PLANE_HEIGHT: f64 = 420.0;
 const PARTS_HEIGHT: f64 = 260.0;
 /// Zeros beyond this multiple of the magnitude that 90 % of them do not exceed are not drawn: they pass through infinity.
 const FAR: f64 = 1.5;
-/// Values of the setting that are written at a track, and their least distance as a ratio of the largest magnitude.
+/// Values of the setting that are written along a track, and their least distance as a ratio of the size of the chart.
 const LABELS: usize = 6;
-const LABEL_DISTANCE: f64 = 0.12;
+const LABEL_DISTANCE: f64 = 0.09;
 /// Pixels from a point to the left end of its text.
 const LABEL_OFFSET: (f64, f64) = (9.0, 0.0);
 /// The real or the imaginary part of a zero.
@@ -79,7 +79,7 @@ fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) 
             }
         }
     }
-    chart = with_values(chart, locus, tracks, limit_rad_s);
+    chart = with_values(chart, locus, tracks);
     let changes = locus.changes.iter().map(|change| change.s);
     let near = changes.filter(|s| s.norm() <= limit_rad_s);
     let places: Vec<(f64, f64)> = near.map(|s| (s.re, s.im)).collect();
@@ -93,28 +93,41 @@ fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) 
 }
 
 /// Values of the setting at the track that moves most.
-fn with_values(
-    mut chart: Chart,
-    locus: &Locus,
-    tracks: &[Vec<Option<Complex<f64>>>],
-    limit_rad_s: f64,
-) -> Chart {
-    let length = |track: &[Option<Complex<f64>>]| -> f64 {
-        let steps = track
-            .windows(2)
-            .filter_map(|pair| Some((pair[1]? - pair[0]?).norm()));
-        steps.sum()
-    };
+fn with_values(mut chart: Chart, locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>]) -> Chart {
+    let size = size(tracks);
+    let scaled = |s: Complex<f64>| Complex::new(s.re / size.re, s.im / size.im);
+    let tracks = tracks.iter();
+    let tracks = tracks.map(|track| track.iter().map(|s| s.map(scaled)).collect());
+    let tracks: Vec<Vec<Option<Complex<f64>>>> = tracks.collect();
     let longest = tracks.iter().max_by(|a, b| length(a).total_cmp(&length(b)));
     let Some(track) = longest else {
         return chart;
     };
-    let places = track.iter().zip(&locus.values);
-    let places = places.filter_map(|(s, value)| Some((*value, (*s)?)));
-    for (value, s) in spread(places, LABEL_DISTANCE * limit_rad_s, LABELS) {
-        chart = chart.text_from((s.re, s.im), LABEL_OFFSET, &setting_number(value));
+    let distance = LABEL_DISTANCE.max(length(track) / LABELS as f64);
+    let places = locus.values.iter().zip(track);
+    let places = places.filter_map(|(value, s)| Some((*value, (*s)?)));
+    for (value, s) in spread(places, distance, LABELS) {
+        let at = (s.re * size.re, s.im * size.im);
+        chart = chart.text_from(at, LABEL_OFFSET, &setting_number(value));
     }
     chart
+}
+
+/// The extent of all tracks along both axes.
+fn size(tracks: &[Vec<Option<Complex<f64>>>]) -> Complex<f64> {
+    let points = || tracks.iter().flatten().flatten();
+    let extent = |part: Part| {
+        let low = points().map(|s| part(*s)).fold(f64::INFINITY, f64::min);
+        let high = points().map(|s| part(*s)).fold(f64::NEG_INFINITY, f64::max);
+        (high - low).max(f64::MIN_POSITIVE)
+    };
+    Complex::new(extent(|s| s.re), extent(|s| s.im))
+}
+
+fn length(track: &[Option<Complex<f64>>]) -> f64 {
+    let pairs = track.windows(2);
+    let steps = pairs.filter_map(|pair| Some((pair[1]? - pair[0]?).norm()));
+    steps.sum()
 }
 
 fn over_setting(

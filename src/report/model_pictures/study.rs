@@ -160,7 +160,7 @@ fn share_chart(heading: &str, shares: &[Share]) -> Chart {
 fn with_share(chart: Chart, top: f64, share: &Share, name: &str) -> Chart {
     let percent = share.percent;
     let outline = bar((0.0, top - 0.95), (percent.max(0.0), top - 0.5));
-    let text = format!("{}  {percent:.1} %", share.name);
+    let text = format!("{}: {percent:.1} %", share.name);
     chart
         .area(name, share.effect.colour(), BAR_STRENGTH, outline)
         .text_from((0.0, top - 0.27), (4.0, 0.0), &text)

@@ -42,11 +42,9 @@ pub fn veering_svg(
         })
     };
     let closest = (point.value, point.frequency_hz);
-    let gap = format!("gap {}", gap_text(point.gap_hz));
+    let name = format!("closest: gap {}", gap_text(point.gap_hz));
     let close = modes(chart("The close modes", vary), &|mode| pair.contains(&mode));
-    let close = close
-        .points("closest approach", INK, Symbol::Cross, vec![closest])
-        .text(closest, (0.0, -18.0), &gap);
+    let close = close.points(&name, INK, Symbol::Cross, vec![closest]);
     let all = modes(chart("All modes", vary), &|_| true);
     sheet_svg(title, subtitle, &[Row::new(HEIGHT, vec![close, all])])
 }
