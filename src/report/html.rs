@@ -28,7 +28,7 @@ ul.facts{padding-left:1.2rem;font-size:.95rem}
 .verdict.excluded{border-color:var(--good)}
 .verdict strong{font-size:1.4rem}
 .wide{overflow-x:auto}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem;font-size:.95rem}
+dl{display:grid;grid-template-columns:fit-content(50%) 1fr;gap:.2rem 1.2rem;font-size:.95rem}
 dt{color:var(--quiet)}
 dd{margin:0;overflow-wrap:anywhere}
 @media (max-width:700px){

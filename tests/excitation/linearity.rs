@@ -259,6 +259,10 @@ fn trip_ends_session_without_linearity_verdict() {
     );
     assert!(report["runs"][2]["frf_csv"].is_null() && report["runs"][1]["frf_csv"].is_string());
     assert!(report["shifted"].is_null(), "{}", report["why"]);
+    let overview = report["overview"]["plot"]
+        .as_str()
+        .expect("two runs were analysed");
+    assert!(bench.read(overview).contains(": 2 amplitudes"));
     assert!(
         report["why"]
             .as_str()

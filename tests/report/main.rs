@@ -6,6 +6,7 @@ mod bode;
 mod comparison;
 mod control;
 mod identification;
+mod loops;
 mod model_pictures;
 mod nyquist;
 mod overlay;

@@ -109,6 +109,25 @@ fn page_of_an_excitation_has_its_analysis_without_other_files() {
     }
 }
 
+/// The model predicts a travel of 477 um of a limit of 500 um, and peaks of the noise exceed 80 um, so that the run trips.
+#[test]
+fn page_of_a_tripped_excitation_begins_with_the_trip_and_its_remedy() {
+    let bench = Bench::new();
+    let run = bench.run(
+        "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operating-point 8% --excitation multisine \
+         --set multisine.period_s=8 --shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
+         --set sim.probe_noise_rms_m=2.3e-5 --set interlock.model_error_ratio=1 --json",
+    );
+    assert_eq!(run.code, 1, "{}", run.err);
+    let run = run.json();
+    let page = page_of(&bench, path(&run));
+    let remedy = run["trip"]["remedy"].as_str().expect("a text");
+    let remedy = format!("Remedy: {}", remedy.replace('\'', "&#39;"));
+    let trip = page.find(&remedy).expect("the remedy");
+    assert!(page.contains("<strong>tripped</strong>"));
+    assert!(trip < page.find("<h2>").expect("sections"));
+}
+
 #[test]
 fn page_of_a_calibration_has_the_compliance_of_the_command_and_of_the_model() {
     let bench = Bench::new();

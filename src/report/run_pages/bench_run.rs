@@ -115,6 +115,7 @@ impl<'a> BenchRun<'a> {
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
             evidence: evidence(analysis),
             further_plots: self.further_plots()?,
+            ending: run_facts::ending(self.recording),
             command_and_settings: run_facts::command_and_settings(self.recording, self.config),
             before_plots: analysis.closed.as_ref().map_or_else(String::new, margins),
             after_plots: run_facts::events(self.recording)

@@ -45,6 +45,7 @@ impl<'a> ExternalRecord<'a> {
             linearity.map(|linearity| distortion_plot(linearity, output, self.file, &subtitle));
         Ok(RecordReport {
             name: None,
+            ending: String::new(),
             command_and_settings: String::new(),
             title: self.file.to_string(),
             subtitle,

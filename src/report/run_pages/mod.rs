@@ -81,6 +81,8 @@ pub struct RecordReport<'a> {
     pub evidence: Vec<(String, String)>,
     /// Plots after those that every record has.
     pub further_plots: Vec<Plot>,
+    /// HTML paragraph about a run that did not come to its end.
+    pub ending: String,
     /// HTML section about the command and its settings.
     pub command_and_settings: String,
     /// HTML sections before the plots.

@@ -19,6 +19,7 @@ pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
             &report.subtitle,
             &report.record,
         ),
+        report.ending.clone(),
         other_signs(report),
         verdict(report),
         report.command_and_settings.clone(),
