@@ -144,7 +144,7 @@ fn subtitle_has_the_amplitude_within_the_band_in_milliamperes() {
     let run = Run::of(&[
         "chirp",
         "--duration",
-        "5",
+        "10",
         "--start",
         "20",
         "--stop",

@@ -17,7 +17,7 @@ const FAR: f64 = 1.5;
 const LABELS: usize = 6;
 const LABEL_DISTANCE: f64 = 0.09;
 /// Pixels from a point to the left end of its text.
-const LABEL_OFFSET: (f64, f64) = (9.0, 0.0);
+const LABEL_OFFSET: (f64, f64) = (6.0, -11.0);
 /// The real or the imaginary part of a zero.
 type Part = fn(Complex<f64>) -> f64;
 
