@@ -17,10 +17,15 @@ pub fn plain(value: f64, digits: usize) -> String {
     format!("{:.digits$}", Decimal(value)).replace('-', "\u{2212}")
 }
 
-/// A number above 0 with this many significant digits: `0.0341`, `34.1` and `1640` with three.
-pub fn significant(value: f64, digits: i32) -> String {
-    let before_point = libm::log10(value).floor().clamp(-12.0, 12.0) as i32;
-    let decimals = (digits - 1 - before_point).clamp(0, 15);
+/// A number that is not negative, with this many significant digits: `0.0341`, `34.1` and `1640` with three.
+pub fn significant(value: f64, digits: usize) -> String {
+    // The exponent of the rounded number: 9.999 becomes 10.0 and not 10.00.
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let exponent = scientific
+        .split_once('e')
+        .map_or("0", |(_, exponent)| exponent);
+    let before_point = exponent.parse::<i32>().unwrap_or(0);
+    let decimals = (digits as i32 - 1 - before_point).clamp(0, 15);
     format!("{value:.*}", decimals.unsigned_abs() as usize)
 }
 
@@ -67,6 +72,8 @@ mod tests {
             (34.08, "34.1"),
             (1640.4, "1640"),
             (100.0, "100"),
+            (9.9999, "10.0"),
+            (0.0, "0.00"),
         ] {
             assert_eq!(significant(value, 3), text);
         }

@@ -28,7 +28,7 @@ const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, 
 
 const MA_PER_A: f64 = 1e3;
 /// Significant digits of an amplitude.
-const DIGITS: i32 = 3;
+const DIGITS: usize = 3;
 
 /// An analysed run.
 #[derive(Clone, Debug)]
