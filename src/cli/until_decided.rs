@@ -108,10 +108,8 @@ impl SequenceCommand<'_> {
             + &wrap(&end_text(report.sequence, report.motion_s), 2)
             + &analysis_output::text(&report.made);
         close(sequence.last, &report, self.bench.json, &text)?;
-        Ok(match report.sequence {
-            SequenceEnd::Interrupted => Outcome::Failed,
-            _ => outcome(&report.run, &report.made),
-        })
+        let last = outcome(&report.run, &report.made);
+        Ok(sequence_outcome(report.sequence, &report.shots, last))
     }
 }
 
@@ -135,6 +133,16 @@ fn shots(
     let mut make_run = |plan: &Plan| runner.run(plan, "chirp");
     let sequence = until_decided(base, limits, &mut make_run, &mut watch)?;
     printed.map(|()| sequence)
+}
+
+/// The outcome of a sequence, given that of its last run. Losses of earlier chirps count as well, because the verdict uses the data of
+/// all chirps.
+fn sequence_outcome(end: SequenceEnd, shots: &[ShotSummary], last: Outcome) -> Outcome {
+    match (end, last) {
+        (SequenceEnd::Interrupted, _) => Outcome::Failed,
+        (_, Outcome::Done) if shots.iter().any(ShotSummary::has_losses) => Outcome::Impaired,
+        _ => last,
+    }
 }
 
 /// Analysis, plots and page of all shots.
@@ -177,10 +185,15 @@ fn band_text(shot: &Shot) -> String {
 
 fn shot_text(number: usize, summary: &ShotSummary) -> String {
     let band = band_text(&summary.shot);
-    wrap(
-        &format!("chirp {number}: {band}: {}", summary.cnmp.name()),
-        0,
-    )
+    let losses = match summary.has_losses() {
+        true => format!(
+            ", {} overruns, {} lost records",
+            summary.overruns, summary.lost_records
+        ),
+        false => String::new(),
+    };
+    let verdict = summary.cnmp.name();
+    wrap(&format!("chirp {number}: {band}: {verdict}{losses}"), 0)
 }
 
 fn end_text(end: SequenceEnd, motion_s: f64) -> String {
@@ -198,4 +211,43 @@ fn end_text(end: SequenceEnd, motion_s: f64) -> String {
         SequenceEnd::Interrupted => "stopped before the verdict was certain".into(),
     };
     format!("{motion_s:.1} s of motion: {why}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::verdict::Cnmp;
+
+    fn shot(overruns: u64, lost_records: u64) -> ShotSummary {
+        ShotSummary {
+            shot: Shot {
+                low_hz: 10.0,
+                high_hz: 100.0,
+                duration_s: 3.0,
+            },
+            recording: "shot.mcap".into(),
+            overruns,
+            lost_records,
+            cnmp: Cnmp::Excluded,
+            why: String::new(),
+        }
+    }
+
+    fn exit_of(end: SequenceEnd, shots: &[ShotSummary]) -> Outcome {
+        sequence_outcome(end, shots, Outcome::Done)
+    }
+
+    #[test]
+    fn losses_of_an_earlier_chirp_make_the_result_impaired() {
+        let end = SequenceEnd::Decided;
+        assert_eq!(exit_of(end, &[shot(0, 0), shot(0, 0)]), Outcome::Done);
+        assert_eq!(exit_of(end, &[shot(1, 0), shot(0, 0)]), Outcome::Impaired);
+        assert_eq!(exit_of(end, &[shot(0, 1), shot(0, 0)]), Outcome::Impaired);
+    }
+
+    #[test]
+    fn interrupted_sequence_fails_also_with_losses() {
+        let end = SequenceEnd::Interrupted;
+        assert_eq!(exit_of(end, &[shot(1, 0)]), Outcome::Failed);
+    }
 }

@@ -5,7 +5,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bench::config::Config;
-use bench::experiment::sequential::{SequenceEnd, ShotSummary, default_max_motion_s};
+use bench::experiment::sequential::{
+    SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
+};
+use bench::experiment::{Plan, Runner, Setup};
 use bench::identify::verdict::{Cnmp, MAX_LOOKS};
 use bench::recording::Recording;
 use bench_test_support::identified::{config, truth};
@@ -105,6 +108,36 @@ fn sequence_keeps_to_its_limit_of_motion() {
         "{:?}",
         ended.end
     );
+}
+
+#[test]
+fn losses_of_each_shot_are_counted() {
+    let config = settings(&HARD);
+    let folder = tempfile::tempdir().expect("a folder");
+    let max_motion_s = default_max_motion_s(&config).expect("a model");
+    let stop = AtomicBool::new(false);
+    let limits = SequenceLimits {
+        max_motion_s,
+        stop: &stop,
+    };
+    let runner = Runner::new(Setup::simulated(folder.path().into()));
+    let mut made = 0;
+    // Records that the loop lost at the end of the first run, after the last one that was recorded.
+    let mut make_run = |plan: &Plan| {
+        let mut run = runner.run(plan, "shot")?;
+        made += 1;
+        run.ended.lost_records = if made == 1 { 3 } else { 0 };
+        Ok(run)
+    };
+    let sequence = until_decided(&config, limits, &mut make_run, &mut |_| {}).expect("shots");
+    let lost: Vec<u64> = sequence
+        .shots
+        .iter()
+        .map(|shot| shot.lost_records)
+        .collect();
+    assert!(lost.len() >= 2 && lost[0] == 3, "{lost:?}");
+    assert!(lost[1..].iter().all(|lost| *lost == 0), "{lost:?}");
+    assert!(sequence.shots.iter().all(|shot| shot.overruns == 0));
 }
 
 #[test]

@@ -13,6 +13,7 @@ use crate::excitation::AmplitudeCurve;
 use crate::experiment::analysis::{Analysis, VerdictScope};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::run::Run;
+use crate::experiment::run_summary::RunSummary;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
 use crate::model::plant::{self, ModalModel};
@@ -63,7 +64,7 @@ impl<'a> SequentialExperiment<'a> {
         base: &'a Config,
         limits: SequenceLimits<'a>,
         planned: &PlannedShot,
-        run: &Run,
+        run: &mut Run,
     ) -> Result<(SequentialExperiment<'a>, ShotSummary), ExperimentError> {
         let modal = ModalModel::of(&plant::build(&base.plant)?)?;
         let mut evidence = Evidence::default();
@@ -74,7 +75,7 @@ impl<'a> SequentialExperiment<'a> {
             amplitude: AmplitudeCurve::of_current(&planned.config.chirp.amplitude),
         };
         let analysis = evidence.analysis(base)?;
-        let summary = summary(planned, run, &analysis);
+        let summary = summary(planned, run, &analysis)?;
         let experiment = SequentialExperiment {
             base,
             limits,
@@ -92,11 +93,11 @@ impl<'a> SequentialExperiment<'a> {
     pub(super) fn add(
         &mut self,
         planned: &PlannedShot,
-        run: &Run,
+        run: &mut Run,
     ) -> Result<ShotSummary, ExperimentError> {
         self.evidence.add(&run.path, &planned.config)?;
         self.analysis = self.evidence.analysis(self.base)?;
-        let summary = summary(planned, run, &self.analysis);
+        let summary = summary(planned, run, &self.analysis)?;
         self.shots.push(summary.clone());
         Ok(summary)
     }
@@ -178,13 +179,20 @@ impl<'a> SequentialExperiment<'a> {
 }
 
 /// A shot with the verdict of all data up to it.
-fn summary(planned: &PlannedShot, run: &Run, analysis: &Analysis) -> ShotSummary {
-    ShotSummary {
+fn summary(
+    planned: &PlannedShot,
+    run: &mut Run,
+    analysis: &Analysis,
+) -> Result<ShotSummary, ExperimentError> {
+    let run = RunSummary::of(run)?;
+    Ok(ShotSummary {
         shot: planned.shot,
-        recording: run.path.display().to_string(),
+        recording: run.recording,
+        overruns: run.overruns,
+        lost_records: run.lost_records,
         cnmp: analysis.verdict.cnmp,
         why: analysis.verdict.why.clone(),
-    }
+    })
 }
 
 /// The first shot again, twice as long after each look.

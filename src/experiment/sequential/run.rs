@@ -74,7 +74,8 @@ pub fn until_decided(
             config: planned.config,
         });
     }
-    let (mut experiment, mut summary) = SequentialExperiment::after(base, limits, &planned, &run)?;
+    let (mut experiment, mut summary) =
+        SequentialExperiment::after(base, limits, &planned, &mut run)?;
     loop {
         watch(&summary);
         planned = match experiment.next()? {
@@ -86,7 +87,7 @@ pub fn until_decided(
         if !is_complete(&run) {
             return Ok(ended(experiment, SequenceEnd::Interrupted, run, planned));
         }
-        summary = experiment.add(&planned, &run)?;
+        summary = experiment.add(&planned, &mut run)?;
     }
 }
 

@@ -15,10 +15,21 @@ pub struct ShotSummary {
     pub shot: Shot,
     /// Its recording.
     pub recording: String,
+    /// Scheduled ticks that were not served.
+    pub overruns: u64,
+    /// Records lost between loop and recording.
+    pub lost_records: u64,
     /// The verdict of this and all earlier shots.
     pub cnmp: Cnmp,
     /// The reasons.
     pub why: String,
+}
+
+impl ShotSummary {
+    /// Whether ticks were not served or records were lost.
+    pub fn has_losses(&self) -> bool {
+        self.overruns + self.lost_records > 0
+    }
 }
 
 /// Why a sequence ended.

@@ -60,8 +60,8 @@ fn another_shot_reduces_the_uncertainty_of_a_zero_as_predicted() {
             stop: &stop,
         };
         let first = PlannedShot::first(&base, limits.max_motion_s).expect("a plan");
-        let run = run_of(&runner, &first);
-        let experiment = SequentialExperiment::after(&base, limits, &first, &run);
+        let mut run = run_of(&runner, &first);
+        let experiment = SequentialExperiment::after(&base, limits, &first, &mut run);
         let (mut experiment, _) = experiment.expect("a response");
         let (zero, quantity) = real_part(&experiment, 530.0);
         let fit = experiment.analysis.fit.as_ref().expect("modes");
@@ -79,8 +79,8 @@ fn another_shot_reduces_the_uncertainty_of_a_zero_as_predicted() {
         let predicted = information.sigma(&after, &quantity.gradient);
         assert!(predicted < 0.8 * zero.real_part().sigma, "the shot counts");
         let planned = experiment.planned(shot).expect("a plan");
-        let run = run_of(&runner, &planned);
-        experiment.add(&planned, &run).expect("a response");
+        let mut run = run_of(&runner, &planned);
+        experiment.add(&planned, &mut run).expect("a response");
         let (reached, _) = real_part(&experiment, zero.s.im);
         ratios.push(reached.real_part().sigma / predicted);
     }
