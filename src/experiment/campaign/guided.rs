@@ -256,7 +256,7 @@ impl<O: Operator + ?Sized, R: LoadedRig> GuidedCampaign<'_, O, R> {
         Question {
             text: format!(
                 "{number}: Y1o = {displacement_mm:.3} mm ({operating_point:.2} % of L), m2/m3 - 1 = {asymmetry:+.2} %\n  \
-                 {instructions}\n  then keep clear: the stage is measured at rest, and a chirp moves it"
+                 {instructions}\n  then keep clear until the next question: the stage is measured at rest, and one or more chirps move it"
             ),
             may_read: true,
             may_confirm: false,
