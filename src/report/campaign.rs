@@ -50,7 +50,7 @@ pub fn campaign_picture(title: &str, evaluation: &Evaluation<'_>) -> Result<Stri
         rows.push(Row::new(150.0, vec![likelihood(offset)]));
     }
     rows.insert(0, Row::new(400.0, maps));
-    let subtitle = "one chirp at each point; the asymmetry is the intended one, without the initial asymmetry of the stage";
+    let subtitle = "a verdict at each measured point; the asymmetry is the intended one, without the initial asymmetry of the stage";
     Ok(sheet_svg(title, subtitle, &rows)?)
 }
 

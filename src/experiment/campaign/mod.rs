@@ -1,4 +1,4 @@
-//! A campaign: one chirp at each point of a grid of operating points and mass asymmetries (section 5.2.2, Fig 5-10), and the
+//! A campaign: chirps at each point of a grid of operating points and mass asymmetries (section 5.2.2, Fig 5-10), and the
 //! evaluation of all verdicts together.
 //!
 //! ```text

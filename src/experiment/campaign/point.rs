@@ -12,7 +12,7 @@ use crate::identify::modal::FittedMode;
 use crate::identify::verdict::Cnmp;
 use crate::recording::{Recording, RecordingError};
 
-/// Verdict, modes and zeros of the chirp at one point.
+/// Verdict, modes and zeros of the chirps at one point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointResult {
