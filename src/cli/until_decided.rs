@@ -18,6 +18,7 @@ use crate::experiment::sequential::{
     first_shot_config, until_decided,
 };
 use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
+use crate::identify::verdict::MAX_LOOKS;
 use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
@@ -199,6 +200,9 @@ fn shot_text(number: usize, summary: &ShotSummary) -> String {
 fn end_text(end: SequenceEnd, motion_s: f64) -> String {
     let why = match end {
         SequenceEnd::Decided => "the verdict is certain".into(),
+        SequenceEnd::ChirpLimitReached => format!(
+            "the verdict is not certain after {MAX_LOOKS} chirps, which is the limit; raise shape.travel_m or shape.current_ratio, or make one long chirp without --until-decided (--duration)"
+        ),
         SequenceEnd::LimitReached => {
             "the verdict is not certain at the limit; allow more with --max-duration".into()
         }
@@ -249,5 +253,13 @@ mod tests {
     fn interrupted_sequence_fails_also_with_losses() {
         let end = SequenceEnd::Interrupted;
         assert_eq!(exit_of(end, &[shot(1, 0)]), Outcome::Failed);
+    }
+
+    #[test]
+    fn remedy_after_the_last_permitted_chirp_is_not_more_motion() {
+        let text = end_text(SequenceEnd::ChirpLimitReached, 9.0);
+        assert!(text.contains("after 8 chirps") && !text.contains("--max-duration"));
+        let text = end_text(SequenceEnd::LimitReached, 9.0);
+        assert!(text.contains("--max-duration"));
     }
 }

@@ -129,7 +129,7 @@ impl<'a> SequentialExperiment<'a> {
         } else if self.limits.stop.load(Ordering::Relaxed) {
             Some(SequenceEnd::Interrupted)
         } else if looks >= MAX_LOOKS {
-            Some(SequenceEnd::LimitReached)
+            Some(SequenceEnd::ChirpLimitReached)
         } else if looks >= MIN_LOOKS && self.is_undecidable() {
             Some(SequenceEnd::Undecidable)
         } else {

@@ -38,8 +38,10 @@ impl ShotSummary {
 pub enum SequenceEnd {
     /// The verdict is certain.
     Decided,
-    /// The motion or the number of looks reached its limit.
+    /// The motion reached its limit.
     LimitReached,
+    /// The number of shots reached [`MAX_LOOKS`](crate::identify::verdict::MAX_LOOKS).
+    ChirpLimitReached,
     /// More motion is predicted to be necessary than is allowed.
     NeedsMoreMotion {
         /// The predicted motion in seconds.
