@@ -1,6 +1,6 @@
 //! Why a controller is refused.
 
-use super::import::ImportError;
+use super::import_error::ImportError;
 use super::section::SectionError;
 use super::transfer::TransferError;
 use crate::config::ConfigError;

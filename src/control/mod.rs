@@ -23,6 +23,7 @@ mod controller;
 mod error;
 mod file;
 mod import;
+mod import_error;
 mod inverse;
 mod landmarks;
 mod law;
@@ -46,10 +47,8 @@ pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use error::ControllerError;
 pub use file::{ControllerFile, ControllerText, LawFile, SectionSettings};
-pub use import::{
-    FormatError, ImportError, ImportOptions, Imported, NumericArray, Value, Variables, import,
-    read_variables,
-};
+pub use import::{ImportOptions, Imported, NumericArray, Value, Variables, import, read_variables};
+pub use import_error::{FormatError, ImportError};
 pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};

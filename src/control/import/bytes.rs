@@ -1,6 +1,6 @@
 //! Numbers in a slice of bytes, without a read beyond its end.
 
-use super::error::FormatError;
+use crate::control::import_error::FormatError;
 
 /// A position in bytes of one byte order.
 #[derive(Clone, Debug)]

@@ -3,9 +3,9 @@
 use nalgebra::Complex;
 use serde_json::Value as Json;
 
-use super::error::FormatError;
 use super::names::is_root_list;
 use super::value::{MAX_ENTRIES, NumericArray, Value, Variables};
+use crate::control::import_error::FormatError;
 
 /// The variables of a JSON object.
 pub(super) fn variables(bytes: &[u8]) -> Result<Variables, FormatError> {

@@ -9,8 +9,8 @@ use flate2::read::ZlibDecoder;
 use nalgebra::Complex;
 
 use super::bytes::{Bytes, float, signed, unsigned};
-use super::error::FormatError;
 use super::value::{NumericArray, Value, Variables, entry_count};
+use crate::control::import_error::FormatError;
 
 const HEADER_BYTES: usize = 128;
 /// Largest decompressed size of all variables together in bytes.

@@ -4,7 +4,6 @@
 //! structure. The result is a controller file with the table `[tf]`, `[zpk]` or `[ss]` and the numbers as they were saved.
 
 mod bytes;
-mod error;
 mod json;
 mod mat;
 mod names;
@@ -17,10 +16,10 @@ use std::path::Path;
 
 use super::error::ControllerError;
 use super::file::ControllerText;
+use super::import_error::{FormatError, ImportError};
 use super::transfer::{Cascade, TransferError, TransferSettings};
 use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
 
-pub use error::{FormatError, ImportError};
 pub use select::ImportOptions;
 pub use value::{NumericArray, Value, Variables};
 

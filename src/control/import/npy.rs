@@ -3,8 +3,8 @@
 use nalgebra::Complex;
 
 use super::bytes::{Bytes, float, signed, unsigned};
-use super::error::FormatError;
 use super::value::{NumericArray, Value, entry_count};
+use crate::control::import_error::FormatError;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 

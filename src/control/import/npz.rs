@@ -4,9 +4,9 @@ use std::io::{Cursor, Read};
 
 use zip::ZipArchive;
 
-use super::error::FormatError;
 use super::npy;
 use super::value::{Value, Variables};
+use crate::control::import_error::FormatError;
 
 /// Largest array file in bytes: a matrix of order 64 of complex numbers, and its header.
 const MAX_ARRAY_BYTES: u64 = 1 << 17;
