@@ -21,8 +21,11 @@
 //! | modal fit and model order | [`identify::modal`] |
 //! | the decision about CNMP zeros | [`identify::verdict`] |
 //! | one run: plan, run, analyse, replay | [`experiment`] |
+//! | short chirps until the verdict is certain | [`experiment::sequential`] |
 //! | a grid of chirps | [`experiment::campaign`] |
-//! | plots and pages | [`report`] |
+//! | recordings compared with each other | [`experiment::run_comparison`] |
+//! | signals and responses as files of other programs | [`export`] |
+//! | plots and pages | [`report`]; those of the model: [`report::model_pictures`] |
 //! | figures and tables of the thesis | `examples/thesis_figures/` |
 //!
 //! # Example
