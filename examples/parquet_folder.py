@@ -146,10 +146,14 @@ def add(folder, recording, bench):
             raise Refused("it is not a recording of `bench`: the metadata record `bench` is missing")
         attachments = {attachment.name: attachment.data for attachment in reader.iter_attachments()}
         row = run_row(recording.stem, metadata, attachments)
+        response = frequency_response(recording)
         partition = f"bench={checked_name(bench or row['host'])}/date={row['started'].date()}"
         path = lambda table: folder / table / partition / f"{recording.stem}.parquet"
         add_channels(reader, recording.stem, path)
-    add_frequency_response(recording, path("frf"))
+    if response is not None:
+        file = TableFile(path("frf"), response.schema)
+        file.write(response)
+        file.close()
     # Written last: a run in this table has all other tables.
     runs = TableFile(path("runs"), RUN_SCHEMA)
     runs.write(pa.Table.from_pylist([row], RUN_SCHEMA))
@@ -170,14 +174,20 @@ def add_channels(reader, run, path):
         table.close()
 
 
-def add_frequency_response(recording, path):
+def frequency_response(recording):
+    """The frequency response beside a recording as a table; None if there is none."""
     csv = recording.with_name(f"{recording.stem}_frf.csv")
-    if csv.exists():
+    if not csv.exists():
+        return None
+    remedy = f"write it again with `bench identify {recording}`, or remove it"
+    try:
         table = pyarrow.csv.read_csv(csv)
-        table = table.add_column(0, "run", pa.array([recording.stem] * len(table)))
-        file = TableFile(path, table.schema)
-        file.write(table)
-        file.close()
+    except pa.ArrowInvalid as error:
+        raise Refused(f"its frequency response {csv} is damaged ({error}); {remedy}") from error
+    numeric = (pa.types.is_floating, pa.types.is_integer, pa.types.is_null)
+    if not all(any(check(field.type) for check in numeric) for field in table.schema):
+        raise Refused(f"its frequency response {csv} is damaged (a column is not numeric); {remedy}")
+    return table.add_column(0, "run", pa.array([recording.stem] * len(table)))
 
 
 def checked_name(name):
