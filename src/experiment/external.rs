@@ -8,7 +8,7 @@ use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::verdict::{MAX_CHI2_PER_FREEDOM, Verdict};
+use crate::identify::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::identify::{
     EstimatorSettings, Frf, FrfDatum, Signals, distortion_ratio, excited_band_hz, frf_data, local,
     record_check, with_distortion,
@@ -27,6 +27,12 @@ const EARLY_SAMPLES: f64 = 0.5;
 const RELATIVE_ERROR: f64 = 0.01;
 /// A fit is far better if its chi-square is smaller by this factor.
 const FAR_BETTER: f64 = 10.0;
+/// More modes than these that cannot be determined are no modes.
+const MANY_MODES: usize = 8;
+/// The beginning of a record is one of this number of parts.
+const BEGINNING: usize = 200;
+/// An input whose RMS value at the beginning of a record exceeds this ratio of that of the record began before.
+const ACTIVE_RATIO: f64 = 0.3;
 /// A deviation of more standard deviations is not noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
 
@@ -124,6 +130,12 @@ pub fn analyse_external(
 ) -> Result<ExternalAnalysis, AnalysisError> {
     let chain = MeasurementChain::Input(input_path);
     signals.check()?;
+    // The lines of a periodic record are estimated one by one.
+    let stray_lines = match repetition {
+        Some(_) => Vec::new(),
+        None => record_check::stray_lines(signals),
+    };
+    let signals = &record_check::without(signals, &stray_lines);
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
@@ -140,8 +152,13 @@ pub fn analyse_external(
         .or_else(|| implausible(signals.rate_hz, &frf, &data, &fit, &chain));
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
-        None => judge(&fit, &data, &chain, VerdictScope::up_to(judged_up_to_rad_s))?,
+        None => {
+            let verdict = judge(&fit, &data, &chain, VerdictScope::up_to(judged_up_to_rad_s))?;
+            let hint = hint(&verdict, signals, repetition.is_some(), &fit);
+            verdict.with(hint)
+        }
     };
+    let verdict = verdict.with(listed(&stray_lines));
     Ok(ExternalAnalysis {
         frf,
         fit,
@@ -191,9 +208,61 @@ fn response(
 
 /// The defects of the record, which modes would be fitted to.
 fn defective(signals: &Signals, is_periodic: bool) -> Option<String> {
-    let defects = record_check::defects(signals, is_periodic);
-    let texts: Vec<String> = defects.iter().map(ToString::to_string).collect();
+    listed(&record_check::defects(signals, is_periodic))
+}
+
+fn listed(items: &[impl ToString]) -> Option<String> {
+    let texts: Vec<String> = items.iter().map(ToString::to_string).collect();
     (!texts.is_empty()).then(|| texts.join("; "))
+}
+
+/// What else may be the cause of an undecided verdict.
+fn hint(
+    verdict: &Verdict,
+    signals: &Signals,
+    is_periodic: bool,
+    fit: &Result<ModalFit, FitError>,
+) -> Option<String> {
+    if verdict.cnmp != Cnmp::Undecided {
+        return None;
+    }
+    not_a_sum_of_modes(fit).or_else(|| begins_within_excitation(signals, is_periodic))
+}
+
+/// Modes whose residues nearly cancel take the place of what is no sum of modes.
+fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
+    let found = match fit {
+        Ok(fit) => {
+            let (count, (low_hz, high_hz)) = fit.cancelling_modes()?;
+            format!(
+                "the residues of {count} modes from {low_hz:.2} to {high_hz:.2} Hz nearly cancel"
+            )
+        }
+        Err(FitError::Undetermined { modes }) if *modes > MANY_MODES => {
+            format!("{modes} modes are needed")
+        }
+        Err(_) => return None,
+    };
+    Some(format!(
+        "{found}: the response may be no sum of modes with real residues, as with a filter or an additional lag between the columns; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
+    ))
+}
+
+fn begins_within_excitation(signals: &Signals, is_periodic: bool) -> Option<String> {
+    let input = &signals.input_a;
+    let first = &input[..(input.len() / BEGINNING).max(1)];
+    let ratio = rms(first) / rms(input);
+    (!is_periodic && ratio > ACTIVE_RATIO).then(|| {
+        format!(
+            "the input is already {:.0} % of its RMS value at the beginning of the record; begin the record before the excitation, with the plant at rest",
+            100.0 * ratio
+        )
+    })
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    (squares / values.len() as f64).sqrt()
 }
 
 /// Whether the fit describes the data.

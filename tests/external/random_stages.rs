@@ -162,3 +162,34 @@ fn defect_is_named_with_its_time_and_its_remedy_gives_the_verdict() {
         &["moves at the first sample", "begin the record before"],
     );
 }
+
+#[test]
+fn sinusoid_of_the_mains_is_stated_and_does_not_change_the_verdict() {
+    let bench = Bench::new();
+    if stages(&bench).is_none() {
+        return;
+    }
+    for stage in 0..4 {
+        let verdict = identify(&bench, &file(stage))["cnmp"].clone();
+        let mut lines = rows(&bench.read(file(stage)));
+        let end = lines.len();
+        let value = |row: &[String], column: usize| row[column].parse::<f64>().expect("a number");
+        let square = lines[1..]
+            .iter()
+            .map(|row| value(row, 2).powi(2))
+            .sum::<f64>();
+        let height = (square / end as f64).sqrt();
+        for k in 1..end {
+            let time_s = value(&lines[k], 0);
+            add(&mut lines, k..k + 1, height * (TAU * 50.0 * time_s).sin());
+        }
+        bench.write("mains.csv", text(&lines));
+        let answer = identify(&bench, "mains.csv");
+        assert_eq!(answer["cnmp"], verdict, "{stage}: {answer}");
+        let why = answer["why"].as_str().expect("a reason");
+        assert!(
+            why.contains("at 50.000 Hz from beginning to end"),
+            "{stage}: {why}"
+        );
+    }
+}

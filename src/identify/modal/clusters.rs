@@ -34,6 +34,17 @@ pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -
     }
 }
 
+/// The largest cluster of three or more modes whose residues cancel: number, lowest and highest frequency in hertz.
+pub(super) fn cancelling(modes: &[ModalTerm]) -> Option<(usize, (f64, f64))> {
+    let mut modes = modes.to_vec();
+    modes.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+    let clusters = clusters(&modes).into_iter();
+    let largest = clusters.max_by_key(|cluster| cluster.count)?;
+    let last = largest.first + largest.count - 1;
+    let hz = |k: usize| modes[k].omega_rad_s / std::f64::consts::TAU;
+    (largest.count > 2).then(|| (largest.count, (hz(largest.first), hz(last))))
+}
+
 /// Neighbours in a list of modes of rising frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Cluster {

@@ -3,6 +3,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
+use super::clusters::cancelling;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
 use crate::model::plant::Sign;
 use crate::model::zeros::ModalTerm;
@@ -136,6 +137,11 @@ impl ModalFit {
             .free()
             .iter()
             .position(|free| *free == parameter)
+    }
+
+    /// The number of neighbouring modes, three or more, whose residues nearly cancel, and their lowest and highest frequency in hertz.
+    pub fn cancelling_modes(&self) -> Option<(usize, (f64, f64))> {
+        cancelling(&self.parameters.modes)
     }
 
     /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data

@@ -6,12 +6,14 @@ mod defect;
 mod ends;
 mod plateaus;
 mod prediction;
+mod stray_lines;
 
 use super::Signals;
 pub use defect::Defect;
 use ends::motion_at_ends;
 use plateaus::{clipped, repeated};
 use prediction::Prediction;
+pub use stray_lines::{StrayLine, stray_lines, without};
 
 /// The first defect of each kind. A periodic record does not begin and end at rest.
 pub fn defects(signals: &Signals, is_periodic: bool) -> Vec<Defect> {
@@ -99,6 +101,46 @@ mod tests {
             panic!("{found:?}")
         };
         assert!(time_s == 15.0 && (height + 0.5).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn sinusoid_of_the_whole_record_is_found_and_subtracted() {
+        let sound = signals();
+        assert_eq!(stray_lines(&sound), []);
+        let (hz, height, phase) = (50.0123, 0.05, 0.7);
+        let mut disturbed = sound.clone();
+        for (n, y) in disturbed.output_m.iter_mut().enumerate() {
+            *y += height * (std::f64::consts::TAU * hz * n as f64 / RATE_HZ + phase).cos();
+        }
+        let found = stray_lines(&disturbed);
+        let [line] = found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((line.frequency_hz - hz).abs() < 1e-4, "{line:?}");
+        assert!(
+            (line.amplitude.norm() / height - 1.0).abs() < 1e-2,
+            "{line:?}"
+        );
+        let cleaned = without(&disturbed, &found);
+        let left = cleaned.output_m.iter().zip(&sound.output_m);
+        let left = left.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / sound.len() as f64;
+        // 2 % of the line's 0.035.
+        assert!(left.sqrt() < 7e-4, "{}", left.sqrt());
+    }
+
+    #[test]
+    fn line_of_the_input_is_no_stray_line() {
+        let mut signals = signals();
+        for (n, (u, y)) in signals
+            .input_a
+            .iter_mut()
+            .zip(&mut signals.output_m)
+            .enumerate()
+        {
+            let line = 0.05 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
+            (*u, *y) = (*u + line, *y + line);
+        }
+        assert_eq!(stray_lines(&signals), []);
     }
 
     #[test]
