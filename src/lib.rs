@@ -25,7 +25,7 @@
 //! | a grid of chirps | [`experiment::campaign`] |
 //! | recordings compared with each other | [`experiment::run_comparison`] |
 //! | signals and responses as files of other programs | [`export`] |
-//! | plots and pages | [`report`]; those of the model: [`report::model_pictures`] |
+//! | plots and pages of runs, loops and the model | [`report`] |
 //! | figures and tables of the thesis | `examples/thesis_figures/` |
 //!
 //! # Example
