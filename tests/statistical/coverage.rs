@@ -172,9 +172,8 @@ impl Count {
     }
 }
 
-/// Coverage that is reached, in percent. The intervals of the modes are somewhat too narrow: the vibration of the floor has peaks at the
-/// modes, where the noise is known from few data.
-const LEAST_PERCENT: [f64; 5] = [90.0, 90.0, 90.0, 93.0, 93.0];
+/// Coverage that is reached, in percent: 92.0 to 96.8 with 200 seeds of the first cells. Near a mode the noise is known from few data.
+const LEAST_PERCENT: f64 = 92.0;
 
 /// Frequency, damping ratio, residue, Re z, Im z.
 type Counts = [Count; 5];
@@ -296,10 +295,10 @@ fn intervals_of_modes_and_zeros_of_runs_contain_the_truth() {
         let counts = counts(cell, seeds.unwrap_or(20));
         let percents = counts.map(Count::percent);
         println!("{:30} {percents:5.1?} of {}", cell.name, counts[0].all);
-        for (count, least) in counts.into_iter().zip(LEAST_PERCENT) {
+        for count in counts {
             // Four standard deviations of a binomial count.
             let sigma = 100.0 * (0.95 * 0.05 / f64::from(count.all.max(1))).sqrt();
-            let (low, high) = (least - 4.0 * sigma, (97.0 + 4.0 * sigma).min(100.0));
+            let (low, high) = (LEAST_PERCENT - 4.0 * sigma, (97.0 + 4.0 * sigma).min(100.0));
             if !(low..=high).contains(&count.percent()) || count.all == 0 {
                 outside.push(format!("{}: {counts:?}", cell.name));
             }
