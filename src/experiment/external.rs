@@ -29,9 +29,7 @@ const RELATIVE_ERROR: f64 = 0.01;
 const FAR_BETTER: f64 = 10.0;
 /// More modes than these that cannot be determined are no modes.
 const MANY_MODES: usize = 8;
-/// The beginning of a record is one of this number of parts.
-const BEGINNING: usize = 200;
-/// An input whose RMS value at the beginning of a record exceeds this ratio of that of the record began before.
+/// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
 const ACTIVE_RATIO: f64 = 0.3;
 /// A deviation of more standard deviations is not noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
@@ -135,7 +133,7 @@ pub fn analyse_external(
         Some(_) => Vec::new(),
         None => record_check::stray_lines(signals),
     };
-    let signals = &record_check::without(signals, &stray_lines);
+    let signals: &Signals = &record_check::without(signals, &stray_lines);
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
@@ -249,20 +247,13 @@ fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
 }
 
 fn begins_within_excitation(signals: &Signals, is_periodic: bool) -> Option<String> {
-    let input = &signals.input_a;
-    let first = &input[..(input.len() / BEGINNING).max(1)];
-    let ratio = rms(first) / rms(input);
+    let ratio = record_check::input_ratio_at_start(signals);
     (!is_periodic && ratio > ACTIVE_RATIO).then(|| {
         format!(
-            "the input is already {:.0} % of its RMS value at the beginning of the record; begin the record before the excitation, with the plant at rest",
+            "at the first samples the RMS value of the input is already {:.0} % of that of the whole record; begin the record before the excitation, with the plant at rest",
             100.0 * ratio
         )
     })
-}
-
-fn rms(values: &[f64]) -> f64 {
-    let squares: f64 = values.iter().map(|value| value * value).sum();
-    (squares / values.len() as f64).sqrt()
 }
 
 /// Whether the fit describes the data.

@@ -17,21 +17,13 @@ const MAX_STARTS: usize = 12;
 
 /// The solution with fewer modes in each cluster whose residues cancel, if that is as good.
 pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -> Solution {
-    let mut best = solution;
-    let mut first = 0;
-    loop {
-        best.parameters = best.parameters.by_rising_frequency();
-        let clusters = clusters(&best.parameters.modes);
-        let Some(cluster) = clusters.into_iter().find(|cluster| cluster.first >= first) else {
-            // The parts of a solution have the order of its modes.
-            return Solution::new(problem, best.parameters);
-        };
-        let replaced = with_fewer(problem, &best, cluster);
-        first = cluster.first + replaced.as_ref().map_or(cluster.count, |(_, count)| *count);
-        if let Some((next, _)) = replaced {
-            best = next;
-        }
-    }
+    let parameters = solution.parameters.by_rising_frequency();
+    // From the last cluster on: the positions of the others remain.
+    let clusters = clusters(&parameters.modes).into_iter().rev();
+    let solution = Solution::new(problem, parameters);
+    clusters.fold(solution, |best, cluster| {
+        with_fewer(problem, &best, cluster).unwrap_or(best)
+    })
 }
 
 /// The largest cluster of three or more modes whose residues cancel: number, lowest and highest frequency in hertz.
@@ -81,17 +73,13 @@ fn cancels(modes: &[ModalTerm]) -> bool {
     modes.len() > 1 && magnitudes > CANCELLATION * sum.abs()
 }
 
-/// The solution with the fewest modes in place of a cluster, and their number, if chi^2 does not increase significantly.
-fn with_fewer(
-    problem: Problem<'_>,
-    solution: &Solution,
-    cluster: Cluster,
-) -> Option<(Solution, usize)> {
+/// The solution with the fewest modes in place of a cluster, if chi^2 does not increase significantly.
+fn with_fewer(problem: Problem<'_>, solution: &Solution, cluster: Cluster) -> Option<Solution> {
     let limit_per_mode = problem.significant_decrease() * problem.misfit(solution.chi2);
     (1..cluster.count).find_map(|count| {
         let best = best_of(problem, &solution.parameters, cluster, count)?;
         let removed = (cluster.count - count) as f64;
-        (best.chi2 - solution.chi2 <= removed * limit_per_mode).then_some((best, count))
+        (best.chi2 - solution.chi2 <= removed * limit_per_mode).then_some(best)
     })
 }
 

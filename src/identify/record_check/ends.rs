@@ -10,6 +10,15 @@ const END_INTERVALS: usize = 8;
 const MOVING_RATIO: f64 = 0.1;
 const MOVING_SIGMAS: f64 = 8.0;
 
+/// The start of a record is one of this number of parts.
+const PARTS: usize = 200;
+
+/// The RMS value of the input at the start of the record as a ratio of that of the whole record.
+pub fn input_ratio_at_start(signals: &Signals) -> f64 {
+    let input = &signals.input_a;
+    rms(&input[..input.len().div_ceil(PARTS)]) / rms(input)
+}
+
 /// Motion of the output at its ends, where its noise has the given standard deviation.
 pub(super) fn motion_at_ends(signals: &Signals, noise: f64) -> Vec<Defect> {
     let output = &signals.output_m;

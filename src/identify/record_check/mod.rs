@@ -10,6 +10,7 @@ mod stray_lines;
 
 use super::Signals;
 pub use defect::Defect;
+pub use ends::input_ratio_at_start;
 use ends::motion_at_ends;
 use plateaus::{clipped, repeated};
 use prediction::Prediction;
@@ -130,17 +131,24 @@ mod tests {
 
     #[test]
     fn line_of_the_input_is_no_stray_line() {
+        let line = |n: usize| 0.2 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
         let mut signals = signals();
-        for (n, (u, y)) in signals
-            .input_a
-            .iter_mut()
-            .zip(&mut signals.output_m)
-            .enumerate()
-        {
-            let line = 0.05 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
-            (*u, *y) = (*u + line, *y + line);
+        for (n, y) in signals.output_m.iter_mut().enumerate() {
+            *y += line(n);
+        }
+        assert_eq!(stray_lines(&signals).len(), 1, "in the output alone");
+        for (n, u) in signals.input_a.iter_mut().enumerate() {
+            *u += line(n);
         }
         assert_eq!(stray_lines(&signals), []);
+    }
+
+    #[test]
+    fn input_that_began_before_the_record_is_active_at_its_start() {
+        let whole = signals();
+        assert!(input_ratio_at_start(&whole) < 0.01);
+        let begun = input_ratio_at_start(&whole.slice(10_000..25_000));
+        assert!((0.5..2.0).contains(&begun), "{begun}");
     }
 
     #[test]

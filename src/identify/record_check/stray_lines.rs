@@ -6,6 +6,7 @@
 //!
 //! A mode that a sweep excites has this amplitude in a part of the record only. A line of the input has one in the output, too.
 
+use std::borrow::Cow;
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
@@ -69,7 +70,10 @@ pub fn stray_lines(signals: &Signals) -> Vec<StrayLine> {
 }
 
 /// The signals with an output without the lines.
-pub fn without(signals: &Signals, lines: &[StrayLine]) -> Signals {
+pub fn without<'a>(signals: &'a Signals, lines: &[StrayLine]) -> Cow<'a, Signals> {
+    if lines.is_empty() {
+        return Cow::Borrowed(signals);
+    }
     let mut cleaned = signals.clone();
     for line in lines {
         let omega = TAU * line.frequency_hz / signals.rate_hz;
@@ -77,7 +81,7 @@ pub fn without(signals: &Signals, lines: &[StrayLine]) -> Signals {
             *y -= (line.amplitude * Complex::cis(omega * n as f64)).re;
         }
     }
-    cleaned
+    Cow::Owned(cleaned)
 }
 
 /// The power of a signal with a Hann window in each bin.
