@@ -4,35 +4,21 @@ use serde::Serialize;
 
 use super::analysis::{VerdictScope, judge, response_band_hz};
 use super::analysis_error::AnalysisError;
+use super::plausibility::{describes, hint, implausible};
 use crate::identify::harmonics::{InputSignal, harmonics};
 use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
+use crate::identify::verdict::Verdict;
 use crate::identify::{
     EstimatorSettings, Frf, FrfDatum, Signals, distortion_ratio, excited_band_hz, frf_data, local,
     record_check, with_distortion,
 };
 
-/// Half of the frequencies must have at least this coherence.
-const MIN_COHERENCE: f64 = 0.5;
-/// At the end of the band a mechanical response does not grow with a higher power of frequency than this, unless the next mode
-/// lies just above it.
-const MAX_SLOPE: f64 = 1.0;
-/// The slope is measured over this fraction of the band, in ln f, at its end.
-const SLOPE_PART: f64 = 0.25;
-/// An output is early if it precedes its input by more than this fraction of a sample and by more than [`CERTAIN_SIGMAS`].
-const EARLY_SAMPLES: f64 = 0.5;
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
 const RELATIVE_ERROR: f64 = 0.01;
 /// A fit is far better if its chi-square is smaller by this factor.
 const FAR_BETTER: f64 = 10.0;
-/// More modes than these that cannot be determined are no modes.
-const MANY_MODES: usize = 8;
-/// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
-const ACTIVE_RATIO: f64 = 0.3;
-/// A deviation of more standard deviations is not noise.
-const CERTAIN_SIGMAS: f64 = 5.0;
 
 /// The analysis of external signals.
 #[derive(Clone, Debug)]
@@ -214,53 +200,6 @@ fn listed(items: &[impl ToString]) -> Option<String> {
     (!texts.is_empty()).then(|| texts.join("; "))
 }
 
-/// What else may be the cause of an undecided verdict.
-fn hint(
-    verdict: &Verdict,
-    signals: &Signals,
-    is_periodic: bool,
-    fit: &Result<ModalFit, FitError>,
-) -> Option<String> {
-    if verdict.cnmp != Cnmp::Undecided {
-        return None;
-    }
-    not_a_sum_of_modes(fit).or_else(|| begins_within_excitation(signals, is_periodic))
-}
-
-/// Modes whose residues nearly cancel take the place of what is no sum of modes.
-fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
-    let found = match fit {
-        Ok(fit) => {
-            let (count, (low_hz, high_hz)) = fit.cancelling_modes()?;
-            format!(
-                "the residues of {count} modes from {low_hz:.2} to {high_hz:.2} Hz nearly cancel"
-            )
-        }
-        Err(FitError::Undetermined { modes }) if *modes > MANY_MODES => {
-            format!("{modes} modes are needed")
-        }
-        Err(_) => return None,
-    };
-    Some(format!(
-        "{found}: the response may be no sum of modes with real residues, as with a filter or an additional lag between the columns; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
-    ))
-}
-
-fn begins_within_excitation(signals: &Signals, is_periodic: bool) -> Option<String> {
-    let ratio = record_check::input_ratio_at_start(signals);
-    (!is_periodic && ratio > ACTIVE_RATIO).then(|| {
-        format!(
-            "at the first samples the RMS value of the input is already {:.0} % of that of the whole record; begin the record before the excitation, with the plant at rest",
-            100.0 * ratio
-        )
-    })
-}
-
-/// Whether the fit describes the data.
-fn describes(fit: &ModalFit) -> bool {
-    fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
-}
-
 /// The modes of averaged periods. Odd distortion at the omitted lines counts as noise. If the modes do not describe the data, they are
 /// fitted again with distortion of the roughness added to the noise.
 /// (Without periods, the noise is estimated from neighbouring frequencies and already includes distortion.)
@@ -320,109 +259,4 @@ fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain)
     let parameters = fit.covariance.nrows();
     let freedom = (2 * data.len()).saturating_sub(parameters).max(1);
     squares.sum::<f64>() / freedom as f64
-}
-
-/// The reason, if the signals cannot be input and output of a mechanical system.
-fn implausible(
-    rate_hz: f64,
-    frf: &Frf,
-    data: &[FrfDatum],
-    fit: &Result<ModalFit, FitError>,
-    chain: &MeasurementChain,
-) -> Option<String> {
-    incoherent(frf, fit)
-        .or_else(|| growing(frf, fit))
-        .or_else(|| inverse_fits(data, fit, chain))
-        .or_else(|| early(rate_hz, fit.as_ref().ok()?))
-}
-
-/// Whether modes describe the inverse of the response, but not the response.
-fn inverse_fits(
-    data: &[FrfDatum],
-    fit: &Result<ModalFit, FitError>,
-    chain: &MeasurementChain,
-) -> Option<String> {
-    if fit.as_ref().is_ok_and(describes) {
-        return None;
-    }
-    let mut inverse: Vec<FrfDatum> = data.iter().map(inverse_datum).collect();
-    inverse.retain(|datum| datum.variance.is_normal());
-    let inverse_fit = modal::fit(&inverse, chain).ok()?;
-    describes(&inverse_fit).then(|| SWAPPED.into())
-}
-
-const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output; exchange --input and --output, which are swapped";
-
-fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
-    FrfDatum {
-        response: datum.response.inv(),
-        variance: datum.variance / datum.response.norm_sqr().powi(2),
-        ..*datum
-    }
-}
-
-/// Modes that describe the response may lie in less than half of the band.
-fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
-    if fit.as_ref().is_ok_and(describes) {
-        return None;
-    }
-    let median = frf.median_coherence()?;
-    (median < MIN_COHERENCE).then(|| {
-        format!(
-            "the input explains {:.0} % of the output's power, or less, at half of the frequencies: the columns are not input and output of one system, or most of the band was not excited; select columns that belong together, or the band that was excited (--band)",
-            100.0 * median
-        )
-    })
-}
-
-/// A displacement falls with frequency above its modes; a force as output would grow. Frequencies at which the output is noise do not
-/// count. Below a mode at the end of the band a displacement grows as well.
-fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
-    let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
-    let from_hz = last_hz * (first_hz / last_hz).powf(SLOPE_PART);
-    if ends_with_a_mode(fit, from_hz, *last_hz) {
-        return None;
-    }
-    let significant = (0..frf.len()).filter(|k| frf.coherence[*k] >= MIN_COHERENCE);
-    let end = significant
-        .filter(|k| frf.frequency_hz[*k] >= from_hz)
-        .map(|k| (frf.frequency_hz[k].ln(), frf.response[k].norm().ln()));
-    let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
-    (slope > MAX_SLOPE).then(|| {
-        format!(
-            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
-        )
-    })
-}
-
-/// Whether the highest mode of a fit that describes the data lies between two frequencies. (The inverse of a response needs a mode
-/// beyond the band.)
-fn ends_with_a_mode(fit: &Result<ModalFit, FitError>, from_hz: f64, to_hz: f64) -> bool {
-    let Some(fit) = fit.as_ref().ok().filter(|fit| describes(fit)) else {
-        return false;
-    };
-    let modes = fit.modes();
-    let last_hz = modes.last().map_or(0.0, |mode| mode.frequency_hz().value);
-    (from_hz..=to_hz).contains(&last_hz)
-}
-
-/// The slope of the least-squares line.
-fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
-    let count = points.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (x0, y0) = (mean(|p| p.0), mean(|p| p.1));
-    let square: f64 = points.iter().map(|(x, _)| (x - x0) * (x - x0)).sum();
-    let product: f64 = points.iter().map(|(x, y)| (x - x0) * (y - y0)).sum();
-    (square > 0.0).then(|| product / square)
-}
-
-fn early(rate_hz: f64, fit: &ModalFit) -> Option<String> {
-    let delay = fit.delay_s();
-    let limit_s = (EARLY_SAMPLES / rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
-    (-delay.value > limit_s).then(|| {
-        format!(
-            "the output precedes the input by {:.3} ms; exchange --input and --output if they are swapped, or check that they were sampled at the same times",
-            -delay.value * 1e3
-        )
-    })
 }

@@ -44,6 +44,7 @@ mod open_bench;
 mod overview;
 mod plan;
 mod plan_error;
+mod plausibility;
 mod prediction;
 mod read_run;
 mod recorded_rig;
