@@ -25,6 +25,8 @@ const BEST_PARTS: usize = 4;
 const STEADY_RATIO: f64 = 0.3;
 /// A line exceeds the median power of the frequencies around by this factor. Noise does so with the probability 2^-60.
 const LINE_POWER: f64 = 60.0;
+/// The input has a line from this factor on: the plant may amplify the frequencies around by less than the line.
+const INPUT_LINE_POWER: f64 = 10.0;
 /// Nearest and farthest of the frequencies around a line, in bins. The window widens a line to three bins.
 const AROUND: (usize, usize) = (4, 20);
 /// Smallest number of periods in a part of the record.
@@ -59,7 +61,8 @@ pub fn stray_lines(signals: &Signals) -> Vec<StrayLine> {
     let (output, input) = (power(&signals.output_m), power(&signals.input_a));
     let first = (MIN_PERIODS * PARTS).max(AROUND.1);
     let end = output.len().saturating_sub(AROUND.1);
-    let is_stray = |k: &usize| is_line(&output, *k) && !is_line(&input, *k);
+    let is_stray =
+        |k: &usize| is_line(&output, *k, LINE_POWER) && !is_line(&input, *k, INPUT_LINE_POWER);
     let mut bins: Vec<usize> = (first..end).filter(is_stray).collect();
     bins.sort_by(|a, b| output[*b].total_cmp(&output[*a]));
     let lines = bins
@@ -101,15 +104,15 @@ fn windowed(samples: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Whether a bin is a local maximum far above the bins around.
-fn is_line(power: &[f64], bin: usize) -> bool {
+/// Whether a bin is a local maximum and exceeds the median of the bins around by a factor.
+fn is_line(power: &[f64], bin: usize, factor: f64) -> bool {
     let (near, far) = AROUND;
     let (below, above) = (bin - far..bin + 1 - near, bin + near..bin + far + 1);
     let mut around = [&power[below], &power[above]].concat();
     let middle = around.len() / 2;
     let (_, median, _) = around.select_nth_unstable_by(middle, f64::total_cmp);
     let is_peak = power[bin] >= power[bin - 1] && power[bin] > power[bin + 1];
-    is_peak && power[bin] > LINE_POWER * *median
+    is_peak && power[bin] > factor * *median
 }
 
 /// The line near a bin, if its amplitude is the same in most parts of the record.
