@@ -20,19 +20,6 @@ pub struct AmplitudeOverview<'a> {
     pub modes: &'a [ModeOverAmplitude],
     /// Noise and distortion of each run, if it has an analysis.
     pub linearity: &'a [Option<&'a Linearity>],
-    /// The excited band in hertz. Modes outside of it are not drawn: their parameters are extrapolated.
-    pub band_hz: (f64, f64),
-}
-
-impl<'a> AmplitudeOverview<'a> {
-    /// The modes in the excited band with their numbers.
-    fn modes(&self) -> impl Iterator<Item = (usize, &'a ModeOverAmplitude)> {
-        let (low_hz, high_hz) = self.band_hz;
-        let modes = self.modes.iter();
-        modes
-            .filter(move |mode| (low_hz..=high_hz).contains(&mode.frequency_hz()))
-            .enumerate()
-    }
 }
 
 /// The power of a part of the output over that of the output.
@@ -98,7 +85,7 @@ fn compliance(mode: &FittedMode) -> Estimate {
 /// A parameter of each mode, relative to its value in the first run that has the mode.
 fn deviations(overview: &AmplitudeOverview<'_>, label: &str, parameter: Parameter) -> Chart {
     let mut chart = chart(overview, label).line("", Pen::solid(GREY).thin(), zero(overview));
-    for (index, mode) in overview.modes() {
+    for (index, mode) in overview.modes.iter().enumerate() {
         let first = mode.by_run.iter().flatten().next().map(parameter);
         let Some(reference) = first.filter(|first| first.value != 0.0) else {
             continue;
@@ -120,7 +107,7 @@ fn damping(overview: &AmplitudeOverview<'_>) -> Chart {
         value: PERCENT * fitted.damping_ratio.value,
         sigma: PERCENT * fitted.damping_ratio.sigma,
     };
-    overview.modes().fold(
+    overview.modes.iter().enumerate().fold(
         chart(overview, "Damping ratio (%)"),
         |chart, (index, mode)| chart.mark(series(overview, index, mode, &percent)),
     )

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use bench::config::{Source, load};
-use bench::experiment::linearity::ModeOverAmplitude;
+use bench::experiment::linearity::{ModeOverAmplitude, compare_modes};
 use bench::identify::modal::{Estimate, FittedMode};
 use bench::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench::report::{AmplitudeOverview, ReportError, amplitudes_svg};
@@ -19,19 +19,20 @@ fn estimate(value: f64) -> Estimate {
     }
 }
 
-/// A mode whose frequency rises by 1 % at the last amplitude.
-fn mode(frequency_hz: f64) -> ModeOverAmplitude {
-    let fitted = |ratio: f64| FittedMode {
-        omega_rad_s: estimate(TAU * ratio * frequency_hz),
+/// Modes in an excited band of 5 to 200 Hz, whose frequencies rise by 1 % at the last amplitude.
+fn modes(frequencies_hz: &[f64]) -> Vec<ModeOverAmplitude> {
+    let fitted = |omega_rad_s: f64| FittedMode {
+        omega_rad_s: estimate(omega_rad_s),
         damping_ratio: estimate(0.005),
         residue_per_kg: estimate(0.5),
     };
-    ModeOverAmplitude {
-        by_run: [1.0, 1.0, 1.01].map(|ratio| Some(fitted(ratio))).into(),
-        frequency_shifts: true,
-        damping_shifts: false,
-        residue_shifts: false,
-    }
+    let run = |ratio: f64| {
+        frequencies_hz
+            .iter()
+            .map(|hz| fitted(TAU * ratio * hz))
+            .collect()
+    };
+    compare_modes(&[1.0, 1.0, 1.01].map(run), (5.0, 200.0), true).modes
 }
 
 fn drawn(scales: &[f64], modes: &[ModeOverAmplitude]) -> Result<String, ReportError> {
@@ -39,14 +40,13 @@ fn drawn(scales: &[f64], modes: &[ModeOverAmplitude]) -> Result<String, ReportEr
         scales,
         modes,
         linearity: &vec![None; scales.len()],
-        band_hz: (5.0, 200.0),
     };
     amplitudes_svg(&overview, "Stage", "")
 }
 
 #[test]
 fn shows_the_modes_of_the_excited_band_only() {
-    let svg = drawn(&SCALES, &[mode(2.5), mode(29.27), mode(85.8), mode(281.0)]).unwrap();
+    let svg = drawn(&SCALES, &modes(&[2.5, 29.27, 85.8, 281.0])).unwrap();
     let words: Vec<String> = svg::words(&svg).into_iter().map(|w| w.text).collect();
     let is_shown = |frequency: &str| {
         let name = format!("mode at {frequency} (band: 95 %)");
@@ -60,7 +60,7 @@ fn shows_the_modes_of_the_excited_band_only() {
 /// A deviation of 1 % at the last amplitude needs an axis with this number.
 #[test]
 fn deviations_are_in_percent_of_the_value_at_the_smallest_amplitude() {
-    let svg = drawn(&SCALES, &[mode(29.27)]).unwrap();
+    let svg = drawn(&SCALES, &modes(&[29.27])).unwrap();
     let words = svg::words(&svg);
     let label = words.iter().find(|w| w.text == "Frequency: deviation (%)");
     assert!(label.is_some());
@@ -85,7 +85,7 @@ fn overview_is_null_unless_two_runs_were_analysed() {
     let failed = AnalysisOutputs::run_incomplete();
     let config = load(&Source::default()).unwrap();
     for runs in [&[][..], &[(0.5, &failed), (1.0, &failed)]] {
-        let files = AmplitudeFiles::write(runs, &[mode(29.27)], &config, results).unwrap();
+        let files = AmplitudeFiles::write(runs, &modes(&[29.27]), &config, results).unwrap();
         assert!(files.is_none());
     }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

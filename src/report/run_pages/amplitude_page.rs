@@ -47,7 +47,6 @@ impl AmplitudeFiles {
             scales: &scales,
             modes,
             linearity: &linearity,
-            band_hz: config.chirp.band_hz(),
         };
         let title = format!("{}: {} amplitudes", config.title, scales.len());
         let picture = Picture {
