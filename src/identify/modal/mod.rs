@@ -40,7 +40,7 @@ pub use search::ModelOrder;
 use crate::identify::FrfDatum;
 pub use crate::identify::{Estimate, SIGMAS_95};
 pub(crate) use merge::merged;
-use prune::pruned;
+use prune::{pruned, without_least_certain};
 use refine::refine;
 use residual_noise::with_residual_noise;
 pub(crate) use sensitivity::{by_denominator, mechanics_derivative};
@@ -103,7 +103,7 @@ fn too_few(data: &[FrfDatum]) -> FitError {
     }
 }
 
-/// The fit of the needed modes, with the residual as noise; without orders and band.
+/// The fit of the needed modes, as many as the data determine with the residual as noise; without orders and band.
 fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
     let start = start.by_rising_frequency();
     let data = &merged(problem.data, &start);
@@ -112,7 +112,15 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     }
     let (chain, nodes) = (problem.chain, &problem.chain.nodes(data));
     let problem = Problem { chain, data, nodes };
-    with_covariance(problem, pruned(problem, start))
+    let mut parameters = pruned(problem, start);
+    loop {
+        match with_covariance(problem, parameters.clone()) {
+            Err(FitError::Undetermined { modes }) if modes > 1 => {
+                parameters = without_least_certain(problem, parameters);
+            }
+            result => return result,
+        }
+    }
 }
 
 /// The fit of given modes with its covariance; the residual counts as noise.

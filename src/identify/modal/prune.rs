@@ -17,9 +17,12 @@ pub(super) fn pruned(problem: Problem<'_>, parameters: ModalParameters) -> Modal
     let below = with_one_mode_below(problem, refine(problem, parameters, 0.0));
     let mut best = with_fewer_in_clusters(problem, below);
     while best.parameters.modes.len() > 1 {
-        let Some(index) = least_certain(problem, &best) else {
+        let Some((index, sigmas)) = least_certain(problem, &best) else {
             break;
         };
+        if sigmas >= CERTAIN_SIGMAS {
+            break;
+        }
         let mut fewer = best.parameters.clone();
         fewer.modes.remove(index);
         let next = refine(problem, fewer, 0.0);
@@ -29,6 +32,18 @@ pub(super) fn pruned(problem: Problem<'_>, parameters: ModalParameters) -> Modal
         best = next;
     }
     best.parameters
+}
+
+/// The parameters without the mode of least certain residue.
+pub(super) fn without_least_certain(
+    problem: Problem<'_>,
+    mut parameters: ModalParameters,
+) -> ModalParameters {
+    let solution = Solution::new(problem, parameters.clone());
+    if let Some((index, _)) = least_certain(problem, &solution) {
+        parameters.modes.remove(index);
+    }
+    refine(problem, parameters, 0.0).parameters
 }
 
 /// The solution with one mode in place of all below the data, if it is as good: with friction, a free body is fitted by several
@@ -65,13 +80,13 @@ fn combined(below: &[ModalTerm], low_rad_s: f64) -> ModalTerm {
     }
 }
 
-/// The mode whose residue is the smallest multiple of its standard deviation, if that is uncertain. If the data do not even
-/// determine the parameters, the mode of smallest residue.
-fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<usize> {
+/// The mode whose residue is the smallest multiple of its standard deviation, and that multiple. If the data do not even determine
+/// the parameters, the mode of smallest residue, and 0.
+fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<(usize, f64)> {
     let modes = solution.parameters.modes.iter();
     let sizes: Vec<f64> = modes.map(|mode| mode.residue_per_kg.abs()).collect();
     let Some(covariance) = solution.covariance(problem.data) else {
-        return index_of_smallest(&sizes);
+        return index_of_smallest(&sizes).map(|index| (index, 0.0));
     };
     let free = solution.parameters.free();
     // One residue for each mode, in the order of the modes.
@@ -81,7 +96,7 @@ fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<usize> {
         .zip(residues)
         .map(|(size, i)| size / covariance[(i, i)].sqrt())
         .collect();
-    index_of_smallest(&sigmas).filter(|least| sigmas[*least] < CERTAIN_SIGMAS)
+    index_of_smallest(&sigmas).map(|index| (index, sigmas[index]))
 }
 
 fn index_of_smallest(values: &[f64]) -> Option<usize> {
