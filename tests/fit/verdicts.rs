@@ -9,8 +9,8 @@ use crate::identified::{analysed, config, truth};
 use crate::synthetic::{frf_data, stage, term};
 
 #[test]
-fn unknown_delay_does_not_give_detected_cnmp_zeros() {
-    for extra_s in [2e-4, 1e-3, 4e-3] {
+fn unknown_delay_is_measured_and_does_not_change_the_verdict() {
+    for extra_s in [2e-4, 5e-4, 4e-3] {
         let sets = [
             "plant.operating_point_m=0.0032",
             "plant.mass_asymmetry=-0.05",
@@ -22,16 +22,16 @@ fn unknown_delay_does_not_give_detected_cnmp_zeros() {
         actual.probe.latency_s += extra_s;
         assert_eq!(truth(&actual), 0);
         let analysis = analysed(&actual, &assumed);
-        assert_ne!(
+        assert_eq!(
             analysis.verdict.cnmp,
-            Cnmp::Detected,
+            Cnmp::Excluded,
             "{:?}",
             analysis.verdict
         );
+        // At 1 kHz, aliases are a part of the response, whose phase an unknown delay of 0.5 ms changes by 180 degrees.
         let delay = analysis.fit.expect("modes").delay_s();
-        // The added delay, within the effect of the aliases at 1 kHz, whose phase changes in the opposite direction with a delay.
         assert!(
-            (delay.value - extra_s).abs() < 1e-6 + 0.02 * extra_s,
+            (delay.value - extra_s).abs() < 4.0 * delay.sigma && delay.sigma < 1e-7,
             "{extra_s}: {delay:?}"
         );
     }

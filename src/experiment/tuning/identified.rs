@@ -321,7 +321,7 @@ fn response(
     config: &Config,
 ) -> Result<IdentifiedResponse, FrfError> {
     let parameters = &fit.parameters;
-    let path = delayed(&SignalPath::from(config), parameters.delay_s);
+    let path = SignalPath::from(config).with_added_delay(parameters.delay_s);
     let modes = modes_of(fit, roles, |_| true);
     let whole = loop_plant(&path, &modes, parameters.remainder_m_per_n);
     Ok(IdentifiedResponse {
@@ -330,15 +330,6 @@ fn response(
         remainder_m_per_n: parameters.remainder_m_per_n,
         covariance: covariance(fit, roles),
     })
-}
-
-/// The signal path with the fitted delay.
-fn delayed(path: &SignalPath, delay_s: f64) -> SignalPath {
-    let delays = path.delays_s.iter();
-    SignalPath {
-        delays_s: delays.map(|delay| (delay + delay_s).max(0.0)).collect(),
-        ..path.clone()
-    }
 }
 
 /// |P_measured - P| + c sigma in m/A at the measured frequencies.

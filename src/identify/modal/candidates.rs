@@ -67,8 +67,8 @@ impl Trials<'_> {
 
     /// A mode with its best residue, and the decrease of chi^2.
     fn with_best_residue(&self, term: ModalTerm) -> (f64, ModalTerm) {
-        let Problem { chain, data, nodes } = self.problem;
-        let response = nodes.mean(&chain.mode(&term, nodes), &self.delays);
+        let Problem { data, nodes, .. } = self.problem;
+        let response = nodes.mean(&nodes.mode(&term), &self.delays);
         let (decrease, residue_per_kg) = Projection::new(self.solution, data, &response).result();
         let term = ModalTerm {
             residue_per_kg,
@@ -90,8 +90,8 @@ pub(super) fn first_mode_starts(
     solution: &Solution,
     term: ModalTerm,
 ) -> Vec<ModalParameters> {
-    let Problem { chain, data, nodes } = problem;
-    let response = nodes.mean(&chain.mode(&term, nodes), &nodes.delays(0.0));
+    let Problem { data, nodes, .. } = problem;
+    let response = nodes.mean(&nodes.mode(&term), &nodes.delays(0.0));
     let mut projection = Projection::new(solution, data, &response);
     let delays_s: Vec<f64> = delays_s(data, term).collect();
     let (first, step) = (delays_s[0], delay_step_s(data));

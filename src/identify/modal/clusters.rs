@@ -154,7 +154,7 @@ mod tests {
     /// The modes that replace those of an exact model of the data.
     fn replaced(modes: &[ModalTerm]) -> Vec<ModalTerm> {
         let (chain, data) = (&MeasurementChain::Direct, &data(modes));
-        let nodes = &chain.nodes(data);
+        let nodes = &chain.nodes(data, 0.0);
         let problem = Problem { chain, data, nodes };
         let parameters = ModalParameters {
             modes: modes.to_vec(),

@@ -47,12 +47,18 @@ impl InputPath {
 }
 
 /// The frequencies at which the model of each datum is evaluated, with that part of the model that its parameters do not change.
-pub(super) struct Nodes(Vec<DatumNodes>);
+pub(super) struct Nodes {
+    /// The chain, with an additional delay.
+    chain: MeasurementChain,
+    /// The additional delay: the aliases have it too. Only a change of the delay multiplies the response by exp(-s change).
+    delay_s: f64,
+    data: Vec<DatumNodes>,
+}
 
-/// A response without a delay at each node of each datum.
+/// A response at each node of each datum, with the delay of the nodes.
 pub(super) struct NodeResponse(Vec<[Complex<f64>; 2]>);
 
-/// exp(-s tau) at each node of each datum, for one delay tau.
+/// exp(-s change) at each node of each datum, for one change of the delay.
 pub(super) struct Delays(Vec<[Complex<f64>; 2]>);
 
 /// Two frequencies that have the first three moments of a datum, or one.
@@ -131,7 +137,7 @@ impl DatumNodes {
         ]
     }
 
-    /// A response at the nodes, without a delay; 0 in place of a second node that does not exist.
+    /// A response at the nodes; 0 in place of a second node that does not exist.
     fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> [Complex<f64>; 2] {
         let other = self.1.as_ref().map(&response);
         [response(&self.0), other.unwrap_or_default()]
@@ -153,14 +159,40 @@ pub(super) fn unit_phasor(angle: f64) -> Complex<f64> {
 }
 
 impl Nodes {
-    /// The delay at each node.
+    /// The nodes of `data` at a chain with an additional delay.
+    fn new(chain: &MeasurementChain, data: &[FrfDatum], delay_s: f64) -> Nodes {
+        let (chain, delay_s) = chain.with_added_delay(delay_s);
+        let far = chain.observed(FAR_RAD_S, 1.0);
+        let data = data
+            .iter()
+            .map(|datum| DatumNodes::new(&chain, &far, datum));
+        Nodes {
+            data: data.collect(),
+            chain,
+            delay_s,
+        }
+    }
+
+    /// What an additional delay of the whole chain changes at each node.
     pub(super) fn delays(&self, delay_s: f64) -> Delays {
-        Delays(self.0.iter().map(|nodes| nodes.delays(delay_s)).collect())
+        let change_s = delay_s - self.delay_s;
+        Delays(
+            self.data
+                .iter()
+                .map(|nodes| nodes.delays(change_s))
+                .collect(),
+        )
+    }
+
+    /// The response of a mode of residue 1, its own excluded.
+    pub(super) fn mode(&self, term: &ModalTerm) -> NodeResponse {
+        let mode = self.chain.observed(term.omega_rad_s, term.damping_ratio);
+        self.response(|node| mode.response(node.s, &node.chain))
     }
 
     fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> NodeResponse {
         NodeResponse(
-            self.0
+            self.data
                 .iter()
                 .map(|nodes| nodes.response(&response))
                 .collect(),
@@ -169,7 +201,7 @@ impl Nodes {
 
     /// The mean of a response over each datum, with the delay.
     pub(super) fn mean(&self, response: &NodeResponse, delays: &Delays) -> Vec<Complex<f64>> {
-        let data = self.0.iter().zip(&response.0).zip(&delays.0);
+        let data = self.data.iter().zip(&response.0).zip(&delays.0);
         data.map(|((nodes, response), delays)| nodes.mean(response, delays))
             .collect()
     }
@@ -189,24 +221,32 @@ impl MeasurementChain {
         MeasurementChain::Bench(SignalPath::from(config).with_mean_age())
     }
 
-    /// The nodes of `data`.
-    pub(super) fn nodes(&self, data: &[FrfDatum]) -> Nodes {
-        let far = self.observed(FAR_RAD_S, 1.0);
-        let nodes = data.iter().map(|datum| DatumNodes::new(self, &far, datum));
-        Nodes(nodes.collect())
+    /// The chain of a bench with an additional delay, as far as its whole delay is not negative, and the delay that was added. Nothing
+    /// is added to the other chains: their delay multiplies the response by exp(-s tau).
+    fn with_added_delay(&self, delay_s: f64) -> (MeasurementChain, f64) {
+        let MeasurementChain::Bench(path) = self else {
+            return (self.clone(), 0.0);
+        };
+        let delayed = path.with_added_delay(delay_s);
+        let added_s = delayed.mean_delay_s() - path.mean_delay_s();
+        (MeasurementChain::Bench(delayed), added_s)
+    }
+
+    /// The nodes of `data`, for delays of about `delay_s` beyond that of the chain.
+    pub(super) fn nodes(&self, data: &[FrfDatum], delay_s: f64) -> Nodes {
+        Nodes::new(self, data, delay_s)
     }
 
     /// One node at each frequency.
-    pub(super) fn nodes_at(&self, frequency_hz: &[f64]) -> Nodes {
-        let far = self.observed(FAR_RAD_S, 1.0);
-        let node = |frequency_hz: &f64| DatumNodes(Node::new(self, &far, *frequency_hz), None);
-        Nodes(frequency_hz.iter().map(node).collect())
-    }
-
-    /// The response of a mode of residue 1, its own excluded, without a delay.
-    pub(super) fn mode(&self, term: &ModalTerm, nodes: &Nodes) -> NodeResponse {
-        let mode = self.observed(term.omega_rad_s, term.damping_ratio);
-        nodes.response(|node| mode.response(node.s, &node.chain))
+    pub(super) fn nodes_at(&self, frequency_hz: &[f64], delay_s: f64) -> Nodes {
+        let datum = |frequency_hz: &f64| FrfDatum {
+            frequency_hz: *frequency_hz,
+            spread_hz: 0.0,
+            response: Complex::default(),
+            variance: 1.0,
+        };
+        let data: Vec<FrfDatum> = frequency_hz.iter().map(datum).collect();
+        self.nodes(&data, delay_s)
     }
 
     /// A mode of residue 1 at this chain.
@@ -229,7 +269,7 @@ impl MeasurementChain {
     /// The response of the mechanics alone in m/N: the data without hold, motor, amplifier and delays, and without another
     /// delay of `delay_s`. Aliases are not removed.
     pub(crate) fn mechanics(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
-        let nodes = self.nodes(data);
+        let nodes = self.nodes(data, delay_s);
         let chain = nodes.constant(&nodes.delays(delay_s));
         data.iter()
             .zip(chain)

@@ -84,7 +84,7 @@ pub fn fit_with_progress(
         return Err(too_few(data));
     };
     let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
-    let nodes = &chain.nodes(data);
+    let nodes = &chain.nodes(data, 0.0);
     let problem = Problem { chain, data, nodes };
     let orders = search::orders(problem, &mut |done| progress(SEARCH_PROGRESS * done))?;
     let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
@@ -110,7 +110,8 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     if 2 * data.len() <= start.free().len() {
         return Err(too_few(data));
     }
-    let (chain, nodes) = (problem.chain, &problem.chain.nodes(data));
+    let chain = problem.chain;
+    let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
     let mut parameters = pruned(problem, start);
     loop {

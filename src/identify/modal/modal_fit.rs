@@ -147,13 +147,13 @@ impl ModalFit {
     /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data
     /// (m/A through a bench, m/N directly).
     pub fn response(&self, chain: &MeasurementChain, frequency_hz: &[f64]) -> Vec<Complex<f64>> {
-        let nodes = chain.nodes_at(frequency_hz);
+        let nodes = chain.nodes_at(frequency_hz, self.parameters.delay_s);
         let delays = nodes.delays(self.parameters.delay_s);
         let mut sum = nodes.constant(&delays);
         sum.iter_mut()
             .for_each(|h| *h *= self.parameters.remainder_m_per_n);
         for term in &self.parameters.modes {
-            let mode = nodes.mean(&chain.mode(term, &nodes), &delays);
+            let mode = nodes.mean(&nodes.mode(term), &delays);
             sum.iter_mut()
                 .zip(mode)
                 .for_each(|(h, mode)| *h += mode * term.residue_per_kg);

@@ -121,7 +121,7 @@ impl Search<'_, '_> {
     /// A pass from each start: the result with the fewest and most significant modes.
     fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
-        let nodes = &problem.chain.nodes(data);
+        let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
         let starts = peak_starts(Problem { chain, data, nodes });
         let by_one = self.cost_of_run(pass, problem)?;
@@ -144,7 +144,7 @@ impl Search<'_, '_> {
     fn cost_of_run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
         let data = &pass.data(problem.data, &ModalParameters::default());
         self.run(pass, problem)?;
-        let nodes = &problem.chain.nodes(data);
+        let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
         let problem = Problem { chain, data, nodes };
         let chi2 = Solution::new(problem, self.parameters.clone()).chi2;
@@ -155,7 +155,8 @@ impl Search<'_, '_> {
     /// Adds modes, with the errors of a pass, as long as they are significant.
     fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
-        let (chain, nodes) = (problem.chain, &problem.chain.nodes(data));
+        let chain = problem.chain;
+        let nodes = &chain.nodes(data, self.parameters.delay_s);
         let problem = Problem { chain, data, nodes };
         let start = std::mem::take(&mut self.parameters);
         let mut solution = refine(problem, start, pass.tolerance);

@@ -44,8 +44,9 @@ impl ModalFit {
         chain: &MeasurementChain,
         frequency_hz: &[f64],
     ) -> Vec<DVector<Complex<f64>>> {
-        let nodes = chain.nodes_at(frequency_hz);
-        let path = nodes.constant(&nodes.delays(self.parameters.delay_s));
+        let delay_s = self.parameters.delay_s;
+        let nodes = chain.nodes_at(frequency_hz, delay_s);
+        let path = nodes.constant(&nodes.delays(delay_s));
         let response = self.response(chain, frequency_hz);
         let free = self.parameters.free();
         let at = |((f, path), response): ((&f64, Complex<f64>), Complex<f64>)| {

@@ -1,7 +1,7 @@
 //! A sum of modes compared with the data.
 //!
 //! ```text
-//! H(f) = exp(-j w tau) (R V_0(f) + sum of r_k V(f; w_k, zeta_k))        V: a mode of residue 1 through the measurement chain
+//! H(f) = R V_0(f) + sum of r_k V(f; w_k, zeta_k)        V: a mode of residue 1 through the measurement chain and a delay tau
 //! chi^2 = sum over data of 2 |H_b - H(f_b)|^2 / v_b                      v_b = E|error|^2
 //! ```
 
@@ -179,9 +179,7 @@ pub(super) fn node_responses(
     parameters: &ModalParameters,
 ) -> Vec<NodeResponse> {
     let modes = parameters.modes.iter();
-    modes
-        .map(|mode| problem.chain.mode(mode, problem.nodes))
-        .collect()
+    modes.map(|mode| problem.nodes.mode(mode)).collect()
 }
 
 /// The derivatives of a mode's response to its ln w and ln zeta.

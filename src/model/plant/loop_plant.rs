@@ -52,11 +52,24 @@ impl SignalPath {
 
     /// The same path with the mean delay alone: without the roll-off of a free-running probe.
     pub fn with_mean_age(&self) -> SignalPath {
-        let mean_s = self.delays_s.iter().sum::<f64>() / self.delays_s.len() as f64;
         SignalPath {
-            delays_s: vec![mean_s],
+            delays_s: vec![self.mean_delay_s()],
             ..self.clone()
         }
+    }
+
+    /// The same path with each delay increased, or decreased to 0 at least.
+    pub fn with_added_delay(&self, delay_s: f64) -> SignalPath {
+        let delays = self.delays_s.iter();
+        SignalPath {
+            delays_s: delays.map(|delay| (delay + delay_s).max(0.0)).collect(),
+            ..self.clone()
+        }
+    }
+
+    /// The mean delay in seconds.
+    pub fn mean_delay_s(&self) -> f64 {
+        self.delays_s.iter().sum::<f64>() / self.delays_s.len() as f64
     }
 
     fn discrete(&self, modes: &[Mode], span_s: f64) -> DiscretePlant {
