@@ -113,7 +113,8 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     let chain = problem.chain;
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
-    let mut parameters = pruned(problem, start);
+    // Modes that replace others may have moved past their neighbours.
+    let mut parameters = pruned(problem, start).by_rising_frequency();
     loop {
         match with_covariance(problem, parameters.clone()) {
             Err(FitError::Undetermined { modes }) if modes > 1 => {
