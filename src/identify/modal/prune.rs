@@ -17,12 +17,10 @@ pub(super) fn pruned(problem: Problem<'_>, parameters: ModalParameters) -> Modal
     let below = with_one_mode_below(problem, refine(problem, parameters, 0.0));
     let mut best = with_fewer_in_clusters(problem, below);
     while best.parameters.modes.len() > 1 {
-        let Some((index, sigmas)) = least_certain(problem, &best) else {
+        let least = least_certain(problem, &best);
+        let Some((index, _)) = least.filter(|(_, sigmas)| *sigmas < CERTAIN_SIGMAS) else {
             break;
         };
-        if sigmas >= CERTAIN_SIGMAS {
-            break;
-        }
         let mut fewer = best.parameters.clone();
         fewer.modes.remove(index);
         let next = refine(problem, fewer, 0.0);
