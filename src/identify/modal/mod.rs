@@ -105,7 +105,6 @@ fn too_few(data: &[FrfDatum]) -> FitError {
 
 /// The fit of the needed modes, as many as the data determine with the residual as noise; without orders and band.
 fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
-    let start = start.by_rising_frequency();
     let data = &merged(problem.data, &start);
     if 2 * data.len() <= start.free().len() {
         return Err(too_few(data));
@@ -113,8 +112,7 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     let chain = problem.chain;
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
-    // Modes that replace others may have moved past their neighbours.
-    let mut parameters = pruned(problem, start).by_rising_frequency();
+    let mut parameters = pruned(problem, start);
     loop {
         match with_covariance(problem, parameters.clone()) {
             Err(FitError::Undetermined { modes }) if modes > 1 => {
@@ -151,5 +149,8 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
         data: noisy,
         ..problem
     };
-    fit(&refine(problem, start, 0.0), noisy).ok_or(undetermined)
+    // A mode may have moved past its neighbours.
+    let refined = refine(problem, start, 0.0).parameters;
+    let in_order = Solution::new(problem, refined.by_rising_frequency());
+    fit(&in_order, noisy).ok_or(undetermined)
 }
