@@ -116,8 +116,12 @@ impl Node {
 }
 
 impl DatumNodes {
-    fn new(chain: &MeasurementChain, far: &ObservedMode, datum: &FrfDatum) -> DatumNodes {
-        let (frequency_hz, spread_hz) = (datum.frequency_hz, datum.spread_hz);
+    fn new(
+        chain: &MeasurementChain,
+        far: &ObservedMode,
+        frequency_hz: f64,
+        spread_hz: f64,
+    ) -> DatumNodes {
         let node = |frequency_hz| Node::new(chain, far, frequency_hz);
         match spread_hz == 0.0 {
             true => DatumNodes(node(frequency_hz), None),
@@ -159,13 +163,15 @@ pub(super) fn unit_phasor(angle: f64) -> Complex<f64> {
 }
 
 impl Nodes {
-    /// The nodes of `data` at a chain with an additional delay.
-    fn new(chain: &MeasurementChain, data: &[FrfDatum], delay_s: f64) -> Nodes {
+    /// The nodes at frequencies with their spreads in hertz, at a chain with an additional delay.
+    fn new(
+        chain: &MeasurementChain,
+        frequencies: impl Iterator<Item = (f64, f64)>,
+        delay_s: f64,
+    ) -> Nodes {
         let (chain, delay_s) = chain.with_added_delay(delay_s);
         let far = chain.observed(FAR_RAD_S, 1.0);
-        let data = data
-            .iter()
-            .map(|datum| DatumNodes::new(&chain, &far, datum));
+        let data = frequencies.map(|(hz, spread_hz)| DatumNodes::new(&chain, &far, hz, spread_hz));
         Nodes {
             data: data.collect(),
             chain,
@@ -173,7 +179,7 @@ impl Nodes {
         }
     }
 
-    /// What an additional delay of the whole chain changes at each node.
+    /// exp(-s change) at each node, for the change from the delay of the nodes to `delay_s` beyond the given chain.
     pub(super) fn delays(&self, delay_s: f64) -> Delays {
         let change_s = delay_s - self.delay_s;
         Delays(
@@ -234,19 +240,15 @@ impl MeasurementChain {
 
     /// The nodes of `data`, for delays of about `delay_s` beyond that of the chain.
     pub(super) fn nodes(&self, data: &[FrfDatum], delay_s: f64) -> Nodes {
-        Nodes::new(self, data, delay_s)
+        let frequencies = data
+            .iter()
+            .map(|datum| (datum.frequency_hz, datum.spread_hz));
+        Nodes::new(self, frequencies, delay_s)
     }
 
     /// One node at each frequency.
     pub(super) fn nodes_at(&self, frequency_hz: &[f64], delay_s: f64) -> Nodes {
-        let datum = |frequency_hz: &f64| FrfDatum {
-            frequency_hz: *frequency_hz,
-            spread_hz: 0.0,
-            response: Complex::default(),
-            variance: 1.0,
-        };
-        let data: Vec<FrfDatum> = frequency_hz.iter().map(datum).collect();
-        self.nodes(&data, delay_s)
+        Nodes::new(self, frequency_hz.iter().map(|hz| (*hz, 0.0)), delay_s)
     }
 
     /// A mode of residue 1 at this chain.

@@ -141,6 +141,8 @@ impl Solution {
             columns.add(response.iter().copied());
         }
         columns.add(self.constant.iter().copied());
+        // Aliases have another phase. Neglecting it changes the step and the covariance by their share of the response, not the
+        // minimum.
         let by_delay = self.residual.iter().zip(data).map(|(residual, datum)| {
             (residual - datum.response) * Complex::new(0.0, datum.omega_rad_s())
         });
