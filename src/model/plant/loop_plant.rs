@@ -145,7 +145,7 @@ impl LoopPlant {
         LoopPlant {
             held,
             taps,
-            delay_s: path.delays_s.iter().sum::<f64>() * share,
+            delay_s: path.mean_delay_s(),
         }
     }
 
