@@ -25,7 +25,8 @@ const BEST_PARTS: usize = 4;
 const STEADY_RATIO: f64 = 0.3;
 /// A line exceeds the median power of the frequencies around by this factor. Noise does so with the probability 2^-60.
 const LINE_POWER: f64 = 60.0;
-/// The input has a line from this factor on: the plant may amplify the frequencies around by less than the line.
+/// A bin of the input that exceeds the median by this factor explains a line of the output. It is lower than that of the output,
+/// because a sweep can raise the frequencies around. Noise exceeds it with the probability 2^-10.
 const INPUT_LINE_POWER: f64 = 10.0;
 /// Nearest and farthest of the frequencies around a line, in bins. The window widens a line to three bins.
 const AROUND: (usize, usize) = (4, 20);
