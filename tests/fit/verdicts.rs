@@ -5,7 +5,7 @@ use bench::identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
 use bench::model::plant::{self, ModalModel};
 use nalgebra::Complex;
 
-use crate::identified::{analysed, config, truth};
+use crate::identified::{analysed, config, measurable, model, truth};
 use crate::synthetic::{frf_data, stage, term};
 
 #[test]
@@ -29,7 +29,12 @@ fn unknown_delay_is_measured_and_does_not_change_the_verdict() {
             analysis.verdict
         );
         // At 1 kHz, aliases are a part of the response, whose phase an unknown delay of 0.5 ms changes by 180 degrees.
-        let delay = analysis.fit.expect("modes").delay_s();
+        let fit = analysis.fit.expect("modes");
+        let stage_modes = measurable(&model(&actual), &[]).len();
+        let all_modes = stage_modes + actual.sim.unmodelled.len();
+        assert_eq!(fit.modes().len(), all_modes, "{:?}", fit.modes());
+        // The seed is fixed. A sigma of 0.1 us is a ten-thousandth of a period.
+        let delay = fit.delay_s();
         assert!(
             (delay.value - extra_s).abs() < 4.0 * delay.sigma && delay.sigma < 1e-7,
             "{extra_s}: {delay:?}"
