@@ -1,9 +1,9 @@
 //! Linear systems with one input and one output as matrices: cascades of them, and the poles of a closed loop.
 
-use nalgebra::{Complex, DMatrix, Schur};
+use nalgebra::{Complex, DMatrix};
 
 use super::{Biquad, Section};
-use crate::model::plant::Mode;
+use crate::model::plant::{Mode, linear_algebra};
 
 /// x' (or x+) = A x + B u, y = C x + D u.
 #[derive(Clone, Debug, PartialEq)]
@@ -127,18 +127,11 @@ impl From<&Section> for StateSpace {
     }
 }
 
-/// The eigenvalues of a matrix. `None` if an entry is not finite or the iteration does not end.
+/// The eigenvalues of a matrix, balanced first. `None` if an entry is not finite or the iteration does not end.
 pub(super) fn eigenvalues(mut matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
-    if matrix.is_empty() {
-        return Some(Vec::new());
-    }
     let order = matrix.nrows();
     balance(&mut matrix, order);
-    if !matrix.iter().all(|x| x.is_finite()) {
-        return None;
-    }
-    let schur = Schur::try_new(matrix, f64::EPSILON, 100_000)?;
-    Some(schur.complex_eigenvalues().iter().copied().collect())
+    linear_algebra::eigenvalues(&matrix)
 }
 
 /// Scales rows and columns by powers of two until they have similar magnitudes (Osborne 1960). Such a similarity changes no

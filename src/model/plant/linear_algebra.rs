@@ -1,4 +1,4 @@
-//! The two eigenvalue problems of a plant: its modes and its zeros.
+//! Eigenvalue problems: the modes and the zeros of a plant, and the eigenvalues of any real matrix.
 
 use nalgebra::{Complex, DMatrix, DVector, Schur};
 
@@ -6,6 +6,17 @@ use super::PlantError;
 
 /// An eigenvalue iteration that takes more steps has failed; at these sizes it takes some ten.
 const MAX_ITERATIONS: usize = 10_000;
+/// Tolerances of the eigenvalue iteration, tried in this order: an entry below the diagonal is neglected if it is smaller, relative to
+/// its neighbours on the diagonal. With repeated eigenvalues, rounding keeps such entries above some units in the last place: of
+/// random matrices of order 10 with a threefold eigenvalue, 3 in 4 need more than the first, and all end with the last.
+const EIGENVALUE_TOLERANCES: [f64; 6] = [
+    f64::EPSILON,
+    4.0 * f64::EPSILON,
+    16.0 * f64::EPSILON,
+    64.0 * f64::EPSILON,
+    256.0 * f64::EPSILON,
+    1024.0 * f64::EPSILON,
+];
 /// A root of a pencil is infinite where its reciprocal is below this ratio of the largest.
 const INFINITE_RATIO: f64 = 1e-12;
 
@@ -54,12 +65,12 @@ pub(crate) fn pencil_roots(
         return Ok(Vec::new());
     }
     if let Some(reciprocal) = constant.clone().lu().solve(linear) {
-        let values = eigenvalues(-reciprocal).ok_or(no_convergence)?;
+        let values = eigenvalues(&-reciprocal).ok_or(no_convergence)?;
         return Ok(finite_reciprocals(&values));
     }
     let direct = linear.clone().lu().solve(constant);
     direct
-        .and_then(|direct| eigenvalues(-direct))
+        .and_then(|direct| eigenvalues(&-direct))
         .ok_or(no_convergence)
 }
 
@@ -71,11 +82,18 @@ fn finite_reciprocals(values: &[Complex<f64>]) -> Vec<Complex<f64>> {
     finite.map(|mu| mu.inv()).collect()
 }
 
-fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+/// The eigenvalues of a square matrix, those of another matrix that differs from it by the tolerance of the iteration at most. `None`
+/// if an entry is not finite or the iteration does not end.
+pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+    if matrix.is_empty() {
+        return Some(Vec::new());
+    }
     if matrix.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let schur = Schur::try_new(matrix, f64::EPSILON, MAX_ITERATIONS)?;
+    let schur = EIGENVALUE_TOLERANCES
+        .into_iter()
+        .find_map(|tolerance| Schur::try_new(matrix.clone(), tolerance, MAX_ITERATIONS))?;
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
@@ -93,4 +111,61 @@ pub(crate) fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
     };
     let reflection = DMatrix::identity(n, n) - projection;
     reflection.columns(1, n - 1).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1 (linear congruential generator of Knuth, MMIX).
+    fn random(seed: u64) -> impl FnMut() -> f64 {
+        let mut state = seed;
+        move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+        }
+    }
+
+    /// Bauer and Fike: an eigenvalue is moved by the error of the matrix times the condition of the eigenvectors at most. Each of the nine
+    /// neglected entries is at most 2 x 1024 units in the last place (4.6e-13) of the norm, and together 3 times that; the matrix itself
+    /// is rounded by about 20 units times the condition.
+    #[test]
+    fn eigenvalues_of_matrices_with_a_threefold_eigenvalue_are_found() {
+        for seed in 0..300 {
+            let mut random = random(seed);
+            let mut truth = [(); 8].map(|()| Complex::new(-500.0 + 300.0 * random(), 0.0));
+            (truth[1], truth[2]) = (truth[0], truth[0]);
+            let pair = Complex::new(-900.0, 3000.0);
+            let mut diagonal = DMatrix::zeros(10, 10);
+            for (k, value) in truth.iter().enumerate() {
+                diagonal[(k, k)] = value.re;
+            }
+            diagonal
+                .view_mut((8, 8), (2, 2))
+                .copy_from_slice(&[pair.re, -pair.im, pair.im, pair.re]);
+            let vectors = DMatrix::from_fn(10, 10, |_, _| random());
+            let inverse = vectors.clone().try_inverse().expect("regular");
+            let condition = vectors.norm() * inverse.norm();
+            let matrix = vectors * &diagonal * inverse;
+            let tolerance = (1.4e-12 + 4.4e-15 * condition) * condition * diagonal.norm();
+
+            let mut found = eigenvalues(&matrix).expect("the iteration ends");
+            for truth in truth.into_iter().chain([pair, pair.conj()]) {
+                let distances = found.iter().map(|value| (value - truth).norm()).enumerate();
+                let nearest = distances.min_by(|a, b| a.1.total_cmp(&b.1));
+                let (index, distance) = nearest.expect("ten eigenvalues");
+                assert!(distance < tolerance, "{seed}: {distance} of {tolerance}");
+                found.swap_remove(index);
+            }
+            assert!(found.is_empty());
+        }
+    }
+
+    #[test]
+    fn eigenvalues_of_a_matrix_that_is_not_finite_are_refused() {
+        assert_eq!(eigenvalues(&DMatrix::from_element(2, 2, f64::NAN)), None);
+        assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), Some(Vec::new()));
+    }
 }
