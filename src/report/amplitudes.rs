@@ -1,7 +1,7 @@
 //! Modes, noise and distortion over the amplitude of the excitation.
 
 use super::ReportError;
-use super::chart::colours::{BLUE, Colour, GREY, VERMILION, series_colour};
+use super::chart::colours::{BLUE, Colour, GREY, VERMILION};
 use super::chart::{Chart, Mark, Pen, Row, Scale, SeriesPoint, sheet_svg};
 use super::labels::frequency_text;
 use crate::experiment::linearity::ModeOverAmplitude;
@@ -154,7 +154,7 @@ fn series(
             "mode at {} (band: 95 %)",
             frequency_text(mode.frequency_hz())
         ),
-        pen: Pen::solid(series_colour(index)),
+        pen: Pen::of_series(index),
         points,
         dots: true,
     }

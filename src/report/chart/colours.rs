@@ -38,7 +38,7 @@ pub(super) const GRID: Colour = Colour(205, 205, 205);
 pub(super) const FINE_GRID: Colour = Colour(234, 234, 234);
 
 /// Colours in a dark viewer, by the colours on white.
-const DARK: [(Colour, Colour); 8] = [
+const DARK: [(Colour, Colour); 9] = [
     (PAPER, Colour(22, 24, 27)),
     (INK, Colour(230, 230, 230)),
     (SECONDARY_INK, Colour(168, 168, 168)),
@@ -47,11 +47,17 @@ const DARK: [(Colour, Colour); 8] = [
     (FINE_GRID, Colour(38, 42, 47)),
     (BLUE, Colour(79, 168, 220)),
     (VERMILION, Colour(255, 138, 60)),
+    (SKY, Colour(190, 228, 255)),
 ];
 
 /// The colour of the curve with this index among curves of one kind.
 pub(in crate::report) fn series_colour(index: usize) -> Colour {
     SERIES[index % SERIES.len()]
+}
+
+/// Whether curves with lower indices have used each colour.
+pub(super) fn is_colour_repeated(index: usize) -> bool {
+    index >= SERIES.len()
 }
 
 /// A style element that changes the colours of the picture where the viewer prefers dark mode.

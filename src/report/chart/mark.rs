@@ -1,6 +1,6 @@
 //! The marks of a chart.
 
-use super::colours::Colour;
+use super::colours::{Colour, is_colour_repeated, series_colour};
 
 /// How a line is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,15 @@ impl Pen {
     /// A dashed line.
     pub const fn dashed(colour: Colour) -> Pen {
         Pen::new(colour, Stroke::Dashed)
+    }
+
+    /// The line of the curve with this index among curves of one kind: dashed where its colour is repeated.
+    pub(in crate::report) fn of_series(index: usize) -> Pen {
+        let colour = series_colour(index);
+        match is_colour_repeated(index) {
+            false => Pen::solid(colour),
+            true => Pen::dashed(colour),
+        }
     }
 
     /// A dotted line.
