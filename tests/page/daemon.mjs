@@ -5,6 +5,7 @@ import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { chromium } from "playwright-core";
+import { changeStates } from "./mock.mjs";
 
 const PROGRAM = resolve(process.env.BENCH_PROGRAM ?? "target/release/bench");
 /** A folder with the files of the page, to try changes without building. */
@@ -53,9 +54,16 @@ export function browser() {
   return chromium.launch({ executablePath: BROWSER, args: ["--no-sandbox", "--enable-precise-memory-info"] });
 }
 
-/** A page; its faults are collected: errors on the console, refused requests, and requests to other hosts. */
-export async function openPage(chrome, url, size, colorScheme = "light") {
+const fileName = (url) => url.pathname === "/" ? "index.html" : url.pathname.slice("/page/".length);
+const isFileOfPage = (url) => url.pathname === "/" || url.pathname.startsWith("/page/");
+
+/**
+ * A page; its faults are collected: errors on the console, refused requests, and requests to other hosts.
+ * `change` may change each live state before the page gets it.
+ */
+export async function openPage(chrome, url, size, colorScheme = "light", change) {
   const context = await chrome.newContext({ viewport: size, colorScheme });
+  if (change) await changeStates(context, change);
   const page = await context.newPage();
   page.faults = [];
   // A refused request is also an error on the console, without its address.
@@ -63,7 +71,9 @@ export async function openPage(chrome, url, size, colorScheme = "light") {
   page.on("response", (answer) => { if (answer.status() >= 400) page.faults.push(`${answer.status()} ${new URL(answer.url()).pathname}`); });
   page.on("pageerror", (error) => page.faults.push(error.message));
   page.on("request", (request) => { if (new URL(request.url()).host !== new URL(url).host) page.faults.push(`another host: ${request.url()}`); });
-  if (SOURCE) await page.route("**/page/*", (route) => route.fulfill({ path: join(SOURCE, new URL(route.request().url()).pathname.slice("/page/".length)) }));
+  // A page that is not served by the daemon needs the permission to reach it.
+  if (SOURCE) await context.grantPermissions(["local-network-access"]);
+  if (SOURCE) await page.route(isFileOfPage, (route) => route.fulfill({ path: join(SOURCE, fileName(new URL(route.request().url()))) }));
   await page.goto(url);
   return page;
 }

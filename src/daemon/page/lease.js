@@ -27,7 +27,8 @@ export class Lease {
   async renew() {
     if (!this.isHeld) return;
     try {
-      await ask("PUT", "/lease", undefined, this.secret);
+      // A renewal that is not answered does not occupy a connection after the next one.
+      await ask("PUT", "/lease", undefined, this.secret, AbortSignal.timeout(RENEWAL_MS));
     } catch (error) {
       if (error.status === 403) this.secret = null; // it has expired
     }

@@ -1,36 +1,52 @@
 // The live page: connects the panels with the daemon.
 
-import { ask, follow, token } from "/page/connection.js";
+import { Live, ask, token } from "/page/connection.js";
+import { askDialog, cancelDialog } from "/page/dialogs.js";
 import { forgetColours, quantity } from "/page/drawing.js";
+import { showHeld } from "/page/held.js";
+import { keepKeysOutOfFrames, listenToStopButton, listenToStopKeys } from "/page/keys.js";
 import { Lease } from "/page/lease.js";
+import { isStopped, mayMove } from "/page/motion.js";
 import { compare, showRecordings, showResult } from "/page/recordings.js";
 import { Response } from "/page/response.js";
 import { formArguments, planRows, showFields, table } from "/page/run_form.js";
 import { Samples } from "/page/samples.js";
 import { Scope } from "/page/scope.js";
 import { Spectrum } from "/page/spectrum.js";
+import { Stop } from "/page/stop.js";
 import { drawTiming } from "/page/timing.js";
 
 const byId = (id) => document.getElementById(id);
 const SHARE_TITLES = { travel: "Travel", current: "Current", motor_heat: "Heat of the motor", probe_age: "Age of the reading" };
 const EVENTS = 200;
-/** Data older than this are marked, in milliseconds. */
-const OLD_MS = 1500;
-/** Two presses of the space bar within this time cut the current. */
-const TWICE_MS = 1500;
+/** The state is unknown when the last message is older than this. */
+const OLD_MS = 1000;
+/** Time between two looks at the age of the last message. */
+const AGE_MS = 100;
 
 const samples = new Samples();
 const scope = new Scope(byId("scope"), byId("scope-readout"), samples);
 const spectrum = new Spectrum(byId("spectrum"), byId("spectrum-readout"), byId("spectrum-text"), samples);
 const response = new Response(byId("response"), byId("response-readout"));
 const lease = new Lease();
-let state = null, receivedMs = 0, waitsUntilMs = 0, planned = "", finishedRun = null, stoppedMs = -Infinity;
+const stop = new Stop(showUndelivered);
+let state = null, receivedMs = -Infinity, waitsUntilMs = 0, planned = "";
 
 /* --- messages of the daemon --- */
+
+function isOld() {
+  return performance.now() - receivedMs > OLD_MS;
+}
+
+/** Whether something moves or may move, as far as this page knows. */
+function mayMoveNow() {
+  return stop.isPending || isOld() || mayMove(state);
+}
 
 function onMessage(message) {
   receivedMs = performance.now();
   if (message.type === "state") showState(message.state);
+  if (message.type === "state" && live.steadySinceMs !== null && isStopped(message.state)) stop.seenStopped(live.steadySinceMs);
   if (message.type === "event") addEvent(message);
   if (message.type === "response") showResponse(message.response);
   if (message.type === "lagged") addEvent({ time_s: samples.endS, kind: "lost", text: `this page was too slow: ${message.frames} frames are not shown; the recording is complete` });
@@ -81,9 +97,9 @@ function setText(id, text) {
 function showState(next) {
   const wasRunning = state?.run?.id;
   state = next;
-  setText("state", next.daemon.fault ? "no rig" : next.loop.state);
-  byId("state").dataset.state = next.daemon.fault ? "tripped" : next.loop.state;
+  showAge();
   showLease();
+  showHeld(next, lease.isHeld);
   showShares(next.shares);
   showAlert();
   showRun();
@@ -138,9 +154,16 @@ function showAlert() {
     paragraph(`Remedy: ${trip.remedy}`);
     const button = document.createElement("button");
     button.textContent = "Acknowledge";
-    button.onclick = () => withLease(() => ask("POST", "/clear", undefined, lease.secret));
+    button.onclick = () => withLease(() => ask("POST", "/clear", undefined, lease.secret), showAlertError);
     alert.append(button);
   }
+}
+
+function showAlertError(message) {
+  const line = document.createElement("p");
+  line.className = "message";
+  line.textContent = message;
+  byId("alert").append(line);
 }
 
 function showRun() {
@@ -164,7 +187,7 @@ function showQueue() {
   list.replaceChildren(...state.queue.map((run) => {
     const item = document.createElement("li");
     const length = run.estimated_s ? `, about ${run.estimated_s.toFixed(0)} s` : "";
-    item.textContent = `${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}, ${run.phase}${length} `;
+    item.textContent = `${run.command}${run.name ? ` "${run.name}"` : ""} of ${run.operator}, ${run.phase.replaceAll("_", " ")}${length} `;
     const button = document.createElement("button");
     button.textContent = "cancel";
     button.setAttribute("aria-label", `cancel run ${run.id}`);
@@ -185,7 +208,6 @@ function showTiming() {
 async function runEnded(id) {
   await attempt(async () => {
     const run = await ask("GET", `/runs/${id}`);
-    finishedRun = run;
     const message = run.message ? `: ${run.message}` : "";
     showPlanText([`Run ${id} ${run.outcome}${message}`], run.outcome === "failed");
     await showRecordings(recordingActions);
@@ -197,36 +219,26 @@ async function runEnded(id) {
 
 /* --- what the operator does --- */
 
-/** Shows the error of an action, and asks for the token if it is missing. */
-async function attempt(action) {
+/** Does an action and shows its error. Asks for the token if it is missing. */
+async function attempt(action, showError = (message) => showPlanText([message], true)) {
   try {
     return await action();
   } catch (error) {
-    if (error.status === 401) {
-      if (await askToken()) return attempt(action);
-    } else {
-      showPlanText([error.message], true);
-    }
+    if (error.status !== 401) showError(error.message);
+    else if (await askToken()) return attempt(action, showError);
     return undefined;
   }
 }
 
-function askDialog(id) {
-  const dialog = byId(id);
-  dialog.returnValue = "cancel";
-  dialog.showModal();
-  return new Promise((resolve) => { dialog.onclose = () => resolve(dialog.returnValue === "ok"); });
-}
-
 async function askToken() {
-  if (!await askDialog("token-dialog")) return false;
+  if (!await askDialog(byId("token-dialog"))) return false;
   token.set(byId("token").value.trim());
   return true;
 }
 
 async function takeLease() {
   byId("operator").value = localStorage.getItem("operator") ?? "";
-  if (!await askDialog("name-dialog")) return;
+  if (!await askDialog(byId("name-dialog"))) return;
   await attempt(() => lease.take(byId("operator").value));
   await refresh();
 }
@@ -235,16 +247,30 @@ async function refresh() {
   await attempt(async () => showState(await ask("GET", "/state")));
 }
 
-async function withLease(action) {
+async function withLease(action, showError) {
   if (!lease.isHeld) await takeLease();
-  if (lease.isHeld) await attempt(action);
+  if (lease.isHeld) await attempt(action, showError);
   await refresh();
 }
 
-async function stop() {
-  const how = performance.now() - stoppedMs < TWICE_MS ? "cut" : "settle";
-  stoppedMs = performance.now();
-  await attempt(() => ask("POST", "/stop", { how }));
+/** Lets a held bench go on. */
+async function resume() {
+  setText("resume-error", "");
+  await attempt(() => ask("POST", "/resume", undefined, lease.secret), (message) => setText("resume-error", message));
+  await refresh();
+}
+
+function onStopKey(key) {
+  stop.press();
+  if (key === "Escape") {
+    cancelDialog();
+    if (document.activeElement instanceof HTMLSelectElement) document.activeElement.blur(); // closes its list
+  }
+}
+
+function showUndelivered(fault) {
+  byId("undelivered").hidden = fault === null;
+  setText("undelivered-fault", fault ?? "");
 }
 
 function showPlanText(lines, isError) {
@@ -280,8 +306,8 @@ async function start(event) {
   // A simulated run is shown in real time.
   const args = isSimulated ? [...wanted.args, "--pace", "realtime"] : wanted.args;
   return withLease(async () => {
-    await ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value }, lease.secret);
-    showPlanText(["queued"], false);
+    const run = await ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value }, lease.secret);
+    showPlanText([run.phase === "held" ? "queued; the bench is held, the run starts after Resume" : "queued"], false);
   });
 }
 
@@ -301,14 +327,14 @@ const recordingActions = {
   note: async (recording) => {
     byId("note-name").value = recording.name;
     byId("note-text").value = recording.note;
-    if (!await askDialog("note-dialog")) return;
+    if (!await askDialog(byId("note-dialog"))) return;
     const body = { name: byId("note-name").value, note: byId("note-text").value };
     await attempt(() => ask("PUT", `/recordings/${encodeURIComponent(recording.file)}/note`, body));
     await attempt(() => showRecordings(recordingActions));
   },
   remove: async (recording) => {
     byId("confirm-text").textContent = `${recording.file} and the files computed from it are removed.`;
-    if (!await askDialog("confirm-dialog")) return;
+    if (!await askDialog(byId("confirm-dialog"))) return;
     await attempt(() => ask("DELETE", `/recordings/${encodeURIComponent(recording.file)}`));
     await attempt(() => showRecordings(recordingActions));
   },
@@ -316,11 +342,6 @@ const recordingActions = {
 
 function onKey(event) {
   const isTyping = /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) || document.querySelector("dialog[open]");
-  if (event.key === " " && !(isTyping && /^(INPUT|TEXTAREA)$/.test(event.target.tagName))) {
-    event.preventDefault();
-    stop();
-    return;
-  }
   if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
   const actions = { p: () => byId("pause").click(), l: () => byId("lease-button").click(), "?": () => document.querySelector("footer").scrollIntoView() };
   const action = actions[event.key];
@@ -331,12 +352,33 @@ function onKey(event) {
 
 /* --- start --- */
 
+/** Shows the state, or that it is unknown, and the age of the last message. */
 function showAge() {
-  const ageMs = performance.now() - receivedMs, isOld = receivedMs === 0 || ageMs > OLD_MS;
-  document.body.classList.toggle("is-old", isOld);
-  const waits = Math.ceil((waitsUntilMs - performance.now()) / 1000);
-  if (!isOld) setText("age", state?.run ? `run ${state.run.id}: ${state.run.command}` : "");
-  else setText("age", receivedMs === 0 ? "no connection to the daemon yet" : `these data are ${(ageMs / 1000).toFixed(0)} s old${waits > 0 ? `; next attempt in ${waits} s` : ""}`);
+  const word = isOld() && state ? "unknown" : stateWord();
+  setText("state", word);
+  byId("state").dataset.state = word === "no rig" ? "tripped" : word;
+  document.body.classList.toggle("is-old", isOld());
+  setText("age", ageText());
+  keepKeysOutOfFrames(mayMoveNow());
+}
+
+function stateWord() {
+  if (!state) return "connecting";
+  return state.daemon.fault ? "no rig" : state.loop.state;
+}
+
+function ageText() {
+  if (!isOld()) return state?.run ? `run ${state.run.id}: ${state.run.command}` : "";
+  if (!state) return "no connection to the daemon yet";
+  const ageS = (performance.now() - receivedMs) / 1000, waitS = Math.ceil((waitsUntilMs - performance.now()) / 1000);
+  return `these data are ${ageS.toFixed(0)} s old${waitS > 0 ? `; next attempt in ${waitS} s` : ""}`;
+}
+
+/** What is not to be covered by the bar of the state and STOP begins below it. */
+function followHeightOfBar() {
+  const bar = document.querySelector(".bar");
+  const setHeight = () => document.documentElement.style.setProperty("--bar-height", `${bar.offsetHeight}px`);
+  new ResizeObserver(setHeight).observe(bar);
 }
 
 /** The span of the scope after a zoom: one of the list, or another one. */
@@ -367,7 +409,9 @@ function forgetOldData() {
 }
 
 function connectControls() {
-  byId("stop").onclick = stop;
+  listenToStopKeys(onStopKey, mayMoveNow);
+  listenToStopButton(byId("stop"), () => stop.press());
+  byId("resume").onclick = resume;
   byId("lease-button").onclick = () => (lease.isHeld ? attempt(() => lease.release()).then(refresh) : takeLease());
   byId("pause").onclick = () => scope.pause(!scope.isPaused);
   scope.onpause = () => { byId("pause").setAttribute("aria-pressed", scope.isPaused); setText("pause", scope.isPaused ? "Follow" : "Pause"); };
@@ -393,7 +437,6 @@ function drawAll(lastMs = 0) {
     if (nowMs - lastMs > 500 && !document.hidden) {
       lastMs = nowMs;
       spectrum.draw();
-      showAge();
     }
     requestAnimationFrame(draw);
   };
@@ -403,10 +446,12 @@ const draw = drawAll();
 token.takeFromAddress();
 connectControls();
 showFields();
-follow({
+followHeightOfBar();
+const live = new Live({
   onopen: () => { forgetOldData(); attempt(() => showRecordings(recordingActions)); },
   onclose: (waitS) => { waitsUntilMs = performance.now() + waitS * 1000; },
   onsamples: onSamples,
   onmessage: onMessage,
 });
+setInterval(showAge, AGE_MS);
 requestAnimationFrame(draw);

@@ -1,0 +1,51 @@
+// What a test does on a page.
+
+/** A step that waits longer than this has failed. It is not a requirement. */
+export const PATIENCE = { timeout: Number(process.env.BENCH_PAGE_PATIENCE_MS ?? 60_000) };
+
+export const textIs = (page, id, pattern) => page.waitForFunction(([id, pattern]) => new RegExp(pattern).test(document.getElementById(id).textContent), [id, pattern], PATIENCE);
+export const stateIs = (page, wanted) => textIs(page, "state", `^${wanted}$`);
+
+/** Takes the arm lease for a page, if it does not have it. */
+export async function takeLease(page) {
+  if (/this page/.test(await page.textContent("#lease-text"))) return;
+  await page.click("#lease-button");
+  await page.fill("#operator", "anna");
+  await page.click("#name-dialog button[value=ok]");
+  await textIs(page, "lease-text", "anna .this page");
+}
+
+/** Closes a loop that holds the position until it is stopped. A bench that is held goes on first. */
+export async function startLoop(page) {
+  await stateIs(page, "(disarmed|tripped)");
+  await takeLease(page);
+  if (await page.isVisible("#resume")) await page.click("#resume");
+  await page.selectOption("#reference", "hold");
+  await page.fill("#duration", "3000s");
+  await page.click("#plan");
+  await textIs(page, "plan-text", "Duration");
+  await page.click("#start");
+  await stateIs(page, "running");
+}
+
+/** The stops that a page sends from now on: `settle` or `cut`. */
+export function stopsOf(page) {
+  const stops = [];
+  page.on("request", (request) => { if (request.url().endsWith("/api/v1/stop")) stops.push(request.postDataJSON().how); });
+  return stops;
+}
+
+/** Presses the mouse in the middle of STOP, wherever it is. */
+export async function clickStop(page) {
+  const box = await page.locator("#stop").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+}
+
+/** Waits until a condition of the daemon is true. */
+export async function until(condition) {
+  const endMs = performance.now() + PATIENCE.timeout;
+  while (!await condition()) {
+    if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE.timeout} ms: ${condition}`);
+    await new Promise((done) => setTimeout(done, 50));
+  }
+}
