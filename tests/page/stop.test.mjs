@@ -64,6 +64,15 @@ describe("the space bar stops while the focus is", () => {
     });
   }
 
+  test("in the open list of a select", async () => {
+    const page = await observer();
+    await page.click("#trigger");
+    await page.waitForFunction(() => document.activeElement.tagName === "OPTION", null, PATIENCE);
+    await page.keyboard.press(" ");
+    await stateIs(page, "disarmed");
+    assert.equal(await page.inputValue("#trigger"), "none");
+  });
+
   test("on the gain field of the page with the lease", async () => {
     await operator.focus("#tune-gain");
     await operator.keyboard.press(" ");
@@ -94,6 +103,18 @@ test("a space is typed into a text field while nothing moves, and only there", a
   await page.focus("#level");
   await page.keyboard.press(" ");
   assert.ok(stops.length > before, "a number has no space");
+});
+
+test("a click on STOP stops while the list of a select is open, and Esc closes the list", async () => {
+  const page = await observer();
+  await page.click("#trigger");
+  await page.waitForFunction(() => document.activeElement.tagName === "OPTION", null, PATIENCE);
+  await clickStop(page);
+  await stateIs(page, "disarmed");
+  await page.click("#span");
+  await page.waitForFunction(() => document.activeElement.tagName === "OPTION", null, PATIENCE);
+  await page.keyboard.press("Escape");
+  await page.waitForFunction(() => document.activeElement.tagName !== "OPTION", null, PATIENCE);
 });
 
 test("a key that is held down stops once and cuts nothing", async () => {

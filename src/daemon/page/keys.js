@@ -33,7 +33,8 @@ function isKey(event, character, place) {
 }
 
 function take(event) {
-  event.preventDefault();
+  // Esc also closes the open list of a select, in which an option has the focus.
+  if (!(event.key === "Escape" && event.target instanceof HTMLOptionElement)) event.preventDefault();
   event.stopImmediatePropagation();
 }
 

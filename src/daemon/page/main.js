@@ -262,10 +262,7 @@ async function resume() {
 
 function onStopKey(key) {
   stop.press();
-  if (key === "Escape") {
-    cancelDialog();
-    if (document.activeElement instanceof HTMLSelectElement) document.activeElement.blur(); // closes its list
-  }
+  if (key === "Escape") cancelDialog();
 }
 
 function showUndelivered(fault) {
@@ -341,7 +338,7 @@ const recordingActions = {
 };
 
 function onKey(event) {
-  const isTyping = /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) || document.querySelector("dialog[open]");
+  const isTyping = /^(INPUT|TEXTAREA|SELECT|OPTION)$/.test(event.target.tagName) || document.querySelector("dialog[open]");
   if (isTyping || event.ctrlKey || event.altKey || event.metaKey) return;
   const actions = { p: () => byId("pause").click(), l: () => byId("lease-button").click(), "?": () => document.querySelector("footer").scrollIntoView() };
   const action = actions[event.key];
