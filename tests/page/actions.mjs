@@ -18,12 +18,13 @@ export async function takeLease(page) {
 /** Closes a loop that holds the position until it is stopped. A bench that is held goes on first. */
 export async function startLoop(page) {
   await stateIs(page, "(disarmed|tripped)");
+  await page.waitForSelector("#progress-box.is-empty", { ...PATIENCE, state: "attached" }); // the run before is analysed
   await takeLease(page);
   if (await page.isVisible("#resume")) await page.click("#resume");
   await page.selectOption("#reference", "hold");
   await page.fill("#duration", "3000s");
   await page.click("#plan");
-  await textIs(page, "plan-text", "Duration");
+  await page.waitForSelector("#start:not([disabled])", PATIENCE); // the end of the run before may overwrite the plan
   await page.click("#start");
   await stateIs(page, "running");
 }

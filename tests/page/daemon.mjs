@@ -59,10 +59,10 @@ const isFileOfPage = (url) => url.pathname === "/" || url.pathname.startsWith("/
 
 /**
  * A page; its faults are collected: errors on the console, refused requests, and requests to other hosts.
- * `change` may change each live state before the page gets it.
+ * `change` may change each live state before the page gets it; with `hasTouch` it has a touch screen.
  */
-export async function openPage(chrome, url, size, colorScheme = "light", change) {
-  const context = await chrome.newContext({ viewport: size, colorScheme });
+export async function openPage(chrome, url, size, colorScheme = "light", { change, hasTouch } = {}) {
+  const context = await chrome.newContext({ viewport: size, colorScheme, hasTouch });
   if (change) await changeStates(context, change);
   const page = await context.newPage();
   page.faults = [];

@@ -28,7 +28,7 @@ after(async () => {
   daemon.remove();
 });
 
-const open = (change) => openPage(chrome, daemon.url, DESK, "light", change);
+const open = (change) => openPage(chrome, daemon.url, DESK, "light", { change });
 const isHeld = (page) => page.waitForSelector("#held:not([hidden])", PATIENCE);
 
 test("shows who stopped the bench, when and how, and how many commands wait", async () => {

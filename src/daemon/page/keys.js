@@ -2,6 +2,8 @@
 
 /** Types of an input in which a space is a character of the text. */
 const TEXT_TYPES = ["text", "search", "password", "email", "url", "tel"];
+/** The click that belongs to a press arrives within this time after its end. It is no second press. */
+const CLICK_MS = 700;
 
 /**
  * Stops with the space bar and Esc, whatever has the focus. In a text field a space is typed while nothing moves.
@@ -45,17 +47,19 @@ function isTextField(element) {
 
 /** The button acts when it is pressed, by the mouse, a finger, Enter or a screen reader. */
 export function listenToStopButton(button, stop) {
-  let isPressed = false;
+  let isDown = false, upMs = -Infinity;
+  const release = () => {
+    if (isDown) upMs = performance.now();
+    isDown = false;
+  };
   button.addEventListener("pointerdown", (event) => {
     if (event.button !== 0) return;
-    isPressed = true;
+    isDown = true;
     stop();
   });
-  // The click that follows is no second press. It comes before this timer.
-  const release = () => setTimeout(() => { isPressed = false; });
   window.addEventListener("pointerup", release, { capture: true });
   window.addEventListener("pointercancel", release, { capture: true });
-  button.addEventListener("click", () => { if (!isPressed) stop(); });
+  button.addEventListener("click", () => { if (!isDown && performance.now() - upMs > CLICK_MS) stop(); });
   button.addEventListener("keydown", (event) => { if (event.repeat) event.preventDefault(); });
 }
 
