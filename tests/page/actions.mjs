@@ -1,7 +1,8 @@
 // What a test does on a page.
 
-/** A step that waits longer than this has failed. It is not a requirement. */
-export const PATIENCE = { timeout: Number(process.env.BENCH_PAGE_PATIENCE_MS ?? 60_000) };
+import { PATIENCE_MS } from "./daemon.mjs";
+
+export const PATIENCE = { timeout: PATIENCE_MS };
 
 export const textIs = (page, id, pattern) => page.waitForFunction(([id, pattern]) => new RegExp(pattern).test(document.getElementById(id).textContent), [id, pattern], PATIENCE);
 export const stateIs = (page, wanted) => textIs(page, "state", `^${wanted}$`);

@@ -12,6 +12,9 @@ const PROGRAM = resolve(process.env.BENCH_PROGRAM ?? "target/release/bench");
 const SOURCE = process.env.BENCH_PAGE_SOURCE;
 const BROWSER = process.env.BENCH_BROWSER ?? "/usr/bin/chromium";
 
+/** A step that waits longer than this has failed. It is not a requirement. */
+export const PATIENCE_MS = 180_000;
+
 export class Daemon {
   constructor() {
     this.folder = mkdtempSync(join(tmpdir(), "bench-page-"));
@@ -63,6 +66,7 @@ const isFileOfPage = (url) => url.pathname === "/" || url.pathname.startsWith("/
  */
 export async function openPage(chrome, url, size, colorScheme = "light", { change, hasTouch } = {}) {
   const context = await chrome.newContext({ viewport: size, colorScheme, hasTouch });
+  context.setDefaultTimeout(PATIENCE_MS);
   if (change) await changeStates(context, change);
   const page = await context.newPage();
   page.faults = [];

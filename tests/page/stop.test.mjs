@@ -16,8 +16,9 @@ const loopState = async () => (await daemon.get("/state")).loop.state;
 before(async () => {
   await daemon.start();
   chrome = await browser();
-  // The page with the arm lease: it starts the loops. The pages under test only stop them.
-  operator = await openPage(chrome, daemon.url, DESK);
+  // The page with the arm lease starts the loops. The pages under test only stop them.
+  // Its window is small: drawing the scope in software takes most of a core.
+  operator = await openPage(chrome, daemon.url, { width: 500, height: 400 });
 });
 
 beforeEach(() => startLoop(operator));
