@@ -24,6 +24,7 @@ export async function startLoop(page) {
   if (await page.isVisible("#resume")) await page.click("#resume");
   await page.selectOption("#reference", "hold");
   await page.fill("#duration", "3000s");
+  await page.selectOption("#on-disconnect", "continue"); // a page on a busy machine may lose its lease
   await page.click("#plan");
   await page.waitForSelector("#start:not([disabled])", PATIENCE); // the end of the run before may overwrite the plan
   await page.click("#start");
