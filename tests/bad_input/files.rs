@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::program::{self, Bench};
+use crate::program::{self, Bench, NO_DAEMON};
 
 #[test]
 fn rejects_a_chirp_too_long_to_be_analysed() {
@@ -42,6 +42,7 @@ fn memory_of_a_run_does_not_grow_with_its_duration() {
     let output = assert_cmd::Command::new("sh")
         .args(["-c", &run])
         .env("MALLOC_ARENA_MAX", "1")
+        .envs([NO_DAEMON])
         .current_dir(bench.path(""))
         .output()
         .expect("sh");

@@ -8,7 +8,7 @@ use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench::identify::verdict::Cnmp;
 use serde_json::Value;
 
-use crate::program::Bench;
+use crate::program::{Bench, NO_DAEMON};
 
 /// 4 x 3 points, each with the shortest chirp that passes over all modes.
 const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 --single-chirp \
@@ -20,6 +20,7 @@ fn start(bench: &Bench) -> Child {
     let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
     command
         .current_dir(bench.path(""))
+        .envs([NO_DAEMON])
         .args(GRID.split_whitespace())
         .stdin(Stdio::null());
     command

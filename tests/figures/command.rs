@@ -2,7 +2,7 @@
 
 use std::process::Command;
 
-use bench_test_support::program::Bench;
+use bench_test_support::program::{Bench, NO_DAEMON};
 
 use crate::all::{all, folder};
 
@@ -34,6 +34,7 @@ fn every_command_of_the_page_runs_in_its_folder() {
             .args(["-c", command])
             .current_dir(&place)
             .env("PATH", &path)
+            .envs([NO_DAEMON])
             .output()
             .expect("bash");
         // Some loops of the thesis are unstable, for which `bench margins` exits with 1.

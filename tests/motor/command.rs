@@ -1,5 +1,6 @@
 //! `bench` with a configuration of devices: the state of the motor in `--plan` and `doctor`, and the options.
 use assert_cmd::Command;
+use bench_test_support::program::NO_DAEMON;
 use serde_json::Value;
 
 /// The profile `lab` with a hot excitation, and without its devices, which this machine may have.
@@ -34,6 +35,7 @@ impl Folder {
     fn bench(&self, arguments: &[&str]) -> (i32, String, String) {
         let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
         command.args(arguments).current_dir(self.0.path());
+        command.envs([NO_DAEMON]);
         command.env("XDG_STATE_HOME", self.0.path().join("state"));
         let output = command.output().expect("it starts");
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();

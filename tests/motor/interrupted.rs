@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use bench::experiment::{ExperimentError, MotorError, MotorHandling, Runner, Setup};
 use bench::rig::motor::{Moment, MotorOrigin};
 use bench::rt::thread::Pace;
+use bench_test_support::program::catches_interrupt;
 
 use crate::common::{LIMIT_A, hot, memory, refusal, run};
 
@@ -47,15 +48,6 @@ fn signal(child: &Child, signal: i32) {
     // SAFETY: a child that was not waited for yet, so its id is not reused.
     let result = unsafe { libc::kill(child.id() as libc::pid_t, signal) };
     assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
-}
-
-/// Whether a process catches SIGINT: bit 1 of `SigCgt` [Linux, proc_pid_status(5)].
-fn catches_interrupt(child: &Child) -> bool {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", child.id()));
-    let status = status.unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-    let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
-    mask.is_some_and(|mask| mask & 0b10 != 0)
 }
 
 #[test]
@@ -117,7 +109,7 @@ fn in_a_child_a_wait() {
 fn signal_ends_the_wait_without_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut child = child("interrupted::in_a_child_a_wait", folder.path());
-    until("the wait", || catches_interrupt(&child));
+    until("the wait", || catches_interrupt(child.id()));
     signal(&child, libc::SIGINT);
     assert!(child.wait().expect("it ends").success());
     assert!(!folder.path().join("recordings").exists());

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
+use bench_test_support::program::NO_DAEMON;
 use serde_json::{Value, json};
 
 use crate::{svg, truth};
@@ -22,6 +23,7 @@ struct Run {
 fn answer_in(folder: &Path, arguments: &[&str]) -> Value {
     let output = Command::new(env!("CARGO_BIN_EXE_bench"))
         .args(arguments)
+        .envs([NO_DAEMON])
         .current_dir(folder)
         .output()
         .unwrap();

@@ -7,6 +7,9 @@ use std::time::Duration;
 use serde_json::Value;
 use tempfile::TempDir;
 
+/// Variable and value with which `bench` finds no daemon: a daemon of this machine makes no runs of tests.
+pub const NO_DAEMON: (&str, &str) = ("BENCH_SOCKET", "/nonexistent/bench.sock");
+
 /// A program with a temporary working folder.
 pub struct Bench {
     folder: TempDir,
@@ -107,8 +110,7 @@ pub fn run_program(
     let mut command = assert_cmd::Command::new(program);
     command
         .current_dir(folder)
-        // A daemon of this machine makes no runs of tests.
-        .env("BENCH_SOCKET", "/nonexistent/bench.sock")
+        .envs([NO_DAEMON])
         .env_remove("BENCH_LOG")
         .args(arguments)
         .timeout(Duration::from_secs(300));
@@ -167,6 +169,15 @@ impl Answer {
             );
         }
     }
+}
+
+/// Whether a process catches SIGINT: bit 1 of `SigCgt` [Linux, proc_pid_status(5)].
+pub fn catches_interrupt(process: u32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status"));
+    let status = status.unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
+    mask.is_some_and(|mask| mask & 0b10 != 0)
 }
 
 /// A number of an answer.
