@@ -5,9 +5,12 @@ use std::time::{Duration, Instant};
 
 use bench::recording::Recording;
 use bench::rt::record::TickRecord;
+use bench_test_support::program::NO_DAEMON;
 
 /// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(120);
+/// Between two looks at the program.
+const PAUSE: Duration = Duration::from_millis(20);
 
 /// No effective limit of missed ticks: timing is not tested.
 pub const NO_OVERRUN_LIMIT: [&str; 2] = ["--set", "interlock.overruns_per_s=1000000"];
@@ -23,10 +26,15 @@ pub const AT_1_KHZ: [&str; 6] = [
 pub const RATE_HZ: u64 = 1000;
 
 pub fn bench(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
+    let mut command = without_daemon(env!("CARGO_BIN_EXE_bench"));
     command.args(arguments).stdin(Stdio::null());
-    // A daemon of this machine makes no runs of tests.
-    command.env("BENCH_SOCKET", "/nonexistent/bench.sock");
+    command
+}
+
+/// A program that is `bench` or starts it.
+pub fn without_daemon(program: &str) -> Command {
+    let mut command = Command::new(program);
+    command.envs([NO_DAEMON]);
     command
 }
 
@@ -86,6 +94,11 @@ impl Running {
         self.0.as_ref().expect("running").id() as libc::pid_t
     }
 
+    fn has_ended(&mut self) -> bool {
+        let child = self.0.as_mut().expect("running");
+        child.try_wait().expect("a child of ours").is_some()
+    }
+
     pub fn signal(&self, signal: i32) {
         // SAFETY: a child that was not waited for yet, so its id is not reused.
         let result = unsafe { libc::kill(self.pid(), signal) };
@@ -113,42 +126,44 @@ impl Running {
     /// Waits until the program ends by itself.
     pub fn until_ended(&mut self) {
         let deadline = Instant::now() + TIME_LIMIT;
-        while self
-            .0
-            .as_mut()
-            .expect("running")
-            .try_wait()
-            .expect("a child of ours")
-            .is_none()
-        {
+        while !self.has_ended() {
             assert!(Instant::now() < deadline, "the program does not end");
-            std::thread::sleep(Duration::from_millis(20));
+            std::thread::sleep(PAUSE);
+        }
+    }
+
+    /// Waits until a state is reached, while the program runs.
+    pub fn until(&mut self, what: &str, mut is_reached: impl FnMut(&Running) -> bool) {
+        let deadline = Instant::now() + TIME_LIMIT;
+        while !is_reached(self) {
+            if self.has_ended() {
+                panic!("{what}: it ended early: {:?}", self.end());
+            }
+            assert!(Instant::now() < deadline, "not reached: {what}");
+            std::thread::sleep(PAUSE);
         }
     }
 
     /// Waits until the loop has slept at least `times` times; returns the number of sleeps.
     pub fn until_slept(&mut self, times: u64) -> u64 {
-        let deadline = Instant::now() + TIME_LIMIT;
-        loop {
-            let sleeps = self.sleeps();
-            if sleeps >= times {
-                return sleeps;
-            }
-            let ended = self
-                .0
-                .as_mut()
-                .expect("running")
-                .try_wait()
-                .expect("a child of ours");
-            if ended.is_some() {
-                panic!("it ended early: {:?}", self.end());
-            }
-            assert!(
-                Instant::now() < deadline,
-                "the loop does not run: {sleeps} sleeps"
-            );
-            std::thread::sleep(Duration::from_millis(20));
-        }
+        let mut sleeps = 0;
+        self.until("the loop runs", |running| {
+            sleeps = running.sleeps();
+            sleeps >= times
+        });
+        sleeps
+    }
+
+    /// Waits until the part of the recording that is written fulfils a condition.
+    pub fn until_recorded(
+        &mut self,
+        folder: &Path,
+        what: &str,
+        is_reached: impl Fn(&Recording) -> bool,
+    ) {
+        self.until(what, |_| {
+            Recording::open(&recording_in(folder)).is_ok_and(|written| is_reached(&written))
+        });
     }
 
     pub fn end(&mut self) -> Output {

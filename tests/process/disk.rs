@@ -5,12 +5,14 @@ use std::process::{Command, Output, Stdio};
 use bench::recording::Recording;
 use bench::rt::record::flag;
 
-use crate::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr, stdout};
+use crate::common::{
+    AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr, stdout, without_daemon,
+};
 
 /// The program with a limit of `blocks` for the size of a file, so that writing fails half-way.
 fn command_with_file_limit(blocks: u32, arguments: &[&str], out: &Path) -> Command {
     let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
-    let mut command = Command::new("sh");
+    let mut command = without_daemon("sh");
     command
         .args(["-c", &script, env!("CARGO_BIN_EXE_bench")])
         .args(arguments)
@@ -173,7 +175,7 @@ fn file_size_limit_stops_the_run_instead_of_killing_the_program() {
     // SIGXFSZ has its default action, which ends a process.
     let folder = tempfile::tempdir().expect("a temporary folder");
     let script = "ulimit -f 2048; exec \"$0\" \"$@\"";
-    let output = Command::new("sh")
+    let output = without_daemon("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_bench"), "chirp", "--out"])
         .arg(folder.path())
         .output()

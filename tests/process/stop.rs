@@ -1,16 +1,18 @@
 //! The signals that stop a run.
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use bench::recording::Recording;
 use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, RequestKind, TickRecord};
 
-use crate::common::{LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks};
+use crate::common::{
+    LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks, without_daemon,
+};
 
 /// Starts a run through `env`, which sets whether SIGHUP is ignored.
 fn start_with(run: LongRun, disposition: &str, folder: &Path) -> Running {
-    let mut command = Command::new("env");
+    let mut command = without_daemon("env");
     command
         .arg(disposition)
         .arg(env!("CARGO_BIN_EXE_bench"))
@@ -71,11 +73,7 @@ fn stopped_by(signal: i32, run: LongRun) {
     assert_eq!(results["ticks"].as_u64(), Some(recording.tick_count()));
 
     let stop = tick_of_request(&recording, RequestKind::Finish);
-    let settling = EventKind::State {
-        from: State::Running,
-        to: State::Settling,
-    };
-    assert_eq!(tick_of(&recording, settling), stop);
+    assert_eq!(tick_of(&recording, SETTLING), stop);
     let off = EventKind::State {
         from: State::Settling,
         to: State::Disarmed,
@@ -166,10 +164,22 @@ fn hang_up_does_not_stop_a_run_that_ignores_it() {
     );
 }
 
+/// A closed loop with ramps of a minute: a test ends only if a second signal cuts the current.
+fn start_with_long_ramps(folder: &Path) -> Running {
+    let ramps = ["--set", "loop.stop_ramp_s=60"];
+    let arguments = [arguments_of(LongRun::Control), ramps.to_vec()].concat();
+    Running::start(&arguments, folder)
+}
+
+const SETTLING: EventKind = EventKind::State {
+    from: State::Running,
+    to: State::Settling,
+};
+
 #[test]
-fn second_ctrl_c_has_no_effect() {
+fn repeated_signals_cut_the_current_once() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut running = Running::start(&arguments_of(LongRun::Control), folder.path());
+    let mut running = start_with_long_ramps(folder.path());
     running.until_slept(RATE_HZ);
     for _ in 0..3 {
         running.signal(libc::SIGINT);
@@ -190,19 +200,12 @@ fn second_ctrl_c_has_no_effect() {
 #[test]
 fn second_signal_cuts_the_current() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let mut running = Running::of(
-        Command::new(env!("CARGO_BIN_EXE_bench"))
-            .args(arguments_of(LongRun::Control))
-            // Ramps of a minute: only the second signal ends this test.
-            .args(["--set", "loop.stop_ramp_s=60"])
-            .arg("--out")
-            .arg(folder.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped()),
-    );
+    let mut running = start_with_long_ramps(folder.path());
     running.until_slept(RATE_HZ);
     running.signal(libc::SIGINT);
-    running.until_slept(2 * RATE_HZ);
+    running.until_recorded(folder.path(), "the run settles", |written| {
+        written.events().iter().any(|event| event.kind == SETTLING)
+    });
     running.signal(libc::SIGINT);
     let output = running.end();
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
