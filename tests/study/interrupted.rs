@@ -5,7 +5,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::figures::XY;
-use crate::program::Bench;
+use crate::program::{Bench, catches_interrupt};
 
 /// More draws than a test lets the program complete.
 const LONG: &str = "--draws 3000000 --threads 2";
@@ -51,21 +51,23 @@ fn start(bench: &Bench, arguments: &str) -> Running {
     Running(Some(command.spawn().expect("it starts")))
 }
 
-/// Waits until the file contains its header and several blocks of about 1.1 kB.
-fn until_written(running: &mut Running, file: &Path) {
+/// Waits until a state is reached, while the program runs.
+fn until(running: &mut Running, what: &str, is_reached: impl Fn(&Child) -> bool) {
     let deadline = Instant::now() + TIME_LIMIT;
-    while std::fs::metadata(file).map_or(0, |file| file.len()) < 10_000 {
-        assert!(
-            running
-                .child()
-                .try_wait()
-                .expect("a child of ours")
-                .is_none(),
-            "the program ended early"
-        );
-        assert!(Instant::now() < deadline, "nothing is written");
+    let child = running.child();
+    while !is_reached(child) {
+        let ended = child.try_wait().expect("a child of ours");
+        assert!(ended.is_none(), "{what}: the program ended early");
+        assert!(Instant::now() < deadline, "not reached: {what}");
         std::thread::sleep(Duration::from_millis(10));
     }
+}
+
+/// Waits until the file contains its header and several blocks of about 1.1 kB.
+fn until_written(running: &mut Running, file: &Path) {
+    until(running, "some blocks are written", |_| {
+        std::fs::metadata(file).is_ok_and(|file| file.len() >= 10_000)
+    });
 }
 
 /// Number of draws in complete blocks, and number of damaged lines.
@@ -113,16 +115,14 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
     // Without a file the message states that nothing was stored.
     let bench = Bench::new();
     let mut running = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
-    std::thread::sleep(Duration::from_millis(500));
+    until(&mut running, "the program handles signals", |child| {
+        catches_interrupt(child.id())
+    });
     running.signal(libc::SIGINT);
     let output = running.end();
     let message = String::from_utf8_lossy(&output.stderr);
-    // On a loaded machine the signal may arrive before the program handles it; then the signal ends the program.
     assert!(
-        output
-            .status
-            .code()
-            .is_none_or(|code| code == 1 && message.contains("nothing was stored")),
+        output.status.code() == Some(1) && message.contains("nothing was stored"),
         "{message}"
     );
     assert_eq!(bench.files(), [""; 0]);
