@@ -233,7 +233,7 @@ fn between_runs_in_real_time_the_probe_is_read_and_no_current_is_commanded() {
     let calls = calls_of(&log).len();
     let count = || ticks.lock().expect("no test panics with it").len();
     let before = count();
-    let grows = (0..6000).any(|_| {
+    let grows = (0..60_000).any(|_| {
         std::thread::sleep(Duration::from_millis(1));
         count() >= before + 20
     });
