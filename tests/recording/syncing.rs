@@ -1,7 +1,7 @@
 //! Syncing to the disk beside the recorder: a slow disk does not stall it, a failing one ends the recording with the reason.
 use std::io;
 use std::sync::Mutex;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use bench::recording::{Recorder, Recording, Syncable};
@@ -9,13 +9,18 @@ use bench::rt::record::LoopMessage;
 
 use crate::common::{header, tick};
 
-/// A disk whose syncs end when the test permits it.
+/// A test that waits longer than this has failed. It is not a requirement.
+const TIME_LIMIT: Duration = Duration::from_secs(60);
+
+/// A disk that reports each sync, and whose syncs end when the test permits it.
 struct StalledDisk {
+    begun: Mutex<Sender<()>>,
     permits: Mutex<Receiver<()>>,
 }
 
 impl Syncable for StalledDisk {
     fn sync(&self) -> io::Result<()> {
+        let _ = self.begun.lock().expect("one user").send(());
         let permits = self.permits.lock().expect("one user");
         // Without a sender, too, the sync ends.
         let _ = permits.recv();
@@ -37,15 +42,16 @@ fn stalled_sync_does_not_stall_the_recorder() {
     let path = folder.path().join("run.mcap");
     let file = std::fs::File::create_new(&path).expect("fresh");
     let (permit, permits) = channel();
+    let (begun, syncs) = channel();
     let disk = StalledDisk {
+        begun: Mutex::new(begun),
         permits: Mutex::new(permits),
     };
     let mut recorder = Recorder::over(Box::new(file), &path, &header())
         .expect("room")
         .synced(Box::new(disk))
         .expect("a thread");
-    // Longer than the period of the syncs, so that one of them is waiting.
-    std::thread::sleep(Duration::from_millis(1200));
+    syncs.recv_timeout(TIME_LIMIT).expect("a sync that waits");
     for number in 0..20_000 {
         recorder
             .record(&LoopMessage::Tick(tick(number)))
@@ -71,7 +77,7 @@ fn failed_sync_ends_the_recording_with_the_reason() {
     );
 
     let mut running = recorder();
-    let deadline = Instant::now() + Duration::from_secs(60);
+    let deadline = Instant::now() + TIME_LIMIT;
     let error = (0..)
         .find_map(|number| {
             assert!(Instant::now() < deadline, "the failure is not reported");
