@@ -31,6 +31,6 @@ fn independent_client_sees_every_message_of_the_recording_beside_a_client_that_d
     assert!(output.status.success(), "{text}{errors}");
     let ticks = text.lines().find_map(|line| line.strip_prefix("/loop "));
     let ticks: u64 = ticks.and_then(|text| text.parse().ok()).expect("a count");
-    // 3 s in closed loop, and the rest before and after, less what a busy machine misses.
-    assert!((10_000..60_000).contains(&ticks), "{text}");
+    // 6 s at 2 kHz in closed loop, and the rest before and after: a tick that a busy machine misses does not count as one of them.
+    assert!((12_000..60_000).contains(&ticks), "{text}");
 }

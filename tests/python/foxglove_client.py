@@ -22,7 +22,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 
 BENCH, FOLDER = sys.argv[1], pathlib.Path(sys.argv[2])
-SETTINGS = ["--set", "loop.rate_hz=5000", "--set", "interlock.overruns_per_s=1000000"]
+# A rate at which a busy machine, too, decodes the messages as fast as they come.
+SETTINGS = ["--set", "loop.rate_hz=2000", "--set", "interlock.overruns_per_s=1000000"]
 ENVIRONMENT = {**os.environ, "BENCH_SOCKET": str(FOLDER / "bench.sock")}
 CHANNELS = {"/loop": "bench.Loop", "/event": "bench.Event", "/timing": "bench.Timing"}
 PROTOCOLS = ["foxglove.sdk.v1"]
@@ -34,8 +35,10 @@ REQUESTS = {
     json.dumps({"op": "setParameters", "parameters": [{"name": "loop.rate_hz", "value": 1}]}): "parameters",
     json.dumps({"op": "fetchAsset", "uri": "file:///etc/hostname", "requestId": 1}): "assets",
 }
-# Ticks of the loop between two runs whose times are within the run.
-MAX_OTHER_TICKS = 50
+# Ticks of the loop between two runs whose times are within the run: 10 ms.
+MAX_OTHER_TICKS = 20
+# Messages of the loop after the run, behind which no message of the run is late.
+MORE_MESSAGES = 5000
 # Messages for which the second client does not read: more than the queue of the server.
 STALLED_TICKS = 25_000
 
@@ -105,18 +108,26 @@ async def follow(address):
     async with websockets.connect(address, subprotocols=PROTOCOLS, max_size=None) as client, stalled_connection(address) as stalled:
         stalled_channels, channels = await subscribe(stalled), await subscribe(client)
         await check_read_only(client)
-        command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", "3s", "--json"] + SETTINGS
+        command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", "6s", "--json"] + SETTINGS
         run = await asyncio.create_subprocess_exec(*command, cwd=FOLDER, env=ENVIRONMENT, stdout=subprocess.PIPE)
         output = asyncio.create_task(run.communicate())
-        after_end = 0
-        # A second after the end of the run its last messages have arrived.
-        while len(received) < STALLED_TICKS or after_end < 5000:
+        result, after_end = None, 0
+        while len(received) < STALLED_TICKS or after_end < MORE_MESSAGES:
             message = decoded(await client.recv(), channels)
             if message:
                 received.append(message)
-                after_end += output.done()
+            if output.done() and result is None:
+                result = json.loads(output.result()[0])
+                end_ns = last_log_ns(FOLDER / result["recording"])
+            after_end += bool(message and result and message[1] > end_ns)
         late = await read_until(stalled, stalled_channels, max(log_ns for _, log_ns, _ in received))
-    return received, late, json.loads((await output)[0])
+    return received, late, result
+
+
+def last_log_ns(recording):
+    """Log time of the last message of a recording."""
+    with open(recording, "rb") as stream:
+        return make_reader(stream).get_summary().statistics.message_end_time
 
 
 async def read_until(client, channels, end_ns):
