@@ -54,7 +54,8 @@ impl Device {
             .arg(folder.path().join("log"));
         let child = Some(command.spawn().expect("it starts"));
         let device = Device { child, folder };
-        device.until("serving", || device.link().exists());
+        // The link of a device that serves for a short time may be gone again.
+        device.until("serving", || !device.log().is_empty());
         device
     }
 
@@ -74,9 +75,12 @@ impl Device {
         }
     }
 
+    /// The complete lines of the log.
     fn log(&self) -> Vec<serde_json::Value> {
         let text = std::fs::read_to_string(self.folder.path().join("log")).unwrap_or_default();
-        text.lines()
+        let complete = text.rsplit_once('\n').map_or("", |(complete, _)| complete);
+        complete
+            .lines()
             .map(|line| serde_json::from_str(line).expect("a JSON object a line"))
             .collect()
     }
@@ -193,6 +197,7 @@ fn serves_every_protocol_in_metres_of_the_stage() {
 fn planned_and_typed_faults_take_effect_and_are_logged() {
     let mut device = Device::start(&["--fault", "probe.out-of-range@0..0.2"]);
     let mut reader = device.reader();
+    device.until("past the planned fault", || device.faults().len() == 2);
     until(&mut reader, "at rest", is_at_rest);
     device.send("fault out-of-range");
     until(&mut reader, "out of range", |reading| {
