@@ -79,13 +79,13 @@ async def check_read_only(client):
 
 
 def stalled_connection(address):
-    """A client that reads only when it is asked to; nearly everything waits at the server."""
+    """A client that reads only when it is asked to; nearly everything waits at the server. It cannot answer pings either."""
     host, port = address.removeprefix("ws://").split(":")
     connection = socket.socket()
     # A small window: what waits in the buffers of the system is then little.
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     connection.connect((host, int(port)))
-    return websockets.connect(address, sock=connection, subprotocols=PROTOCOLS, max_size=None, max_queue=1)
+    return websockets.connect(address, sock=connection, subprotocols=PROTOCOLS, max_size=None, max_queue=1, ping_interval=None)
 
 
 def decoded(data, channels):
@@ -105,7 +105,7 @@ def fields(message):
 async def follow(address):
     """Runs a loop; returns the messages that a client received, those of a client that did not read, and the result of the run."""
     received = []
-    async with websockets.connect(address, subprotocols=PROTOCOLS, max_size=None) as client, stalled_connection(address) as stalled:
+    async with websockets.connect(address, subprotocols=PROTOCOLS, max_size=None, ping_interval=None) as client, stalled_connection(address) as stalled:
         stalled_channels, channels = await subscribe(stalled), await subscribe(client)
         await check_read_only(client)
         command = [BENCH, "control", "--slow", "--pace", "realtime", "--duration", "6s", "--json"] + SETTINGS
