@@ -17,6 +17,12 @@ pub enum RecordingError {
     /// The process that owns the rig could not complete the file.
     #[error("{0}")]
     Remote(String),
+    /// Another process, or another run of this one, writes the file.
+    #[error("{}: this recording is still being written; wait until its run has ended", path.display())]
+    InUse {
+        /// The file.
+        path: PathBuf,
+    },
     /// The file could not be created.
     #[error("{}: cannot create the recording: {source}; check that its directory exists and may be written to", path.display())]
     Create {

@@ -1,5 +1,6 @@
 //! Copies the intact parts of a cut-off or damaged recording to a complete one.
 
+use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use super::losses::{Cut, DamagedRange, MissingTicks};
@@ -48,7 +49,11 @@ impl Recovered {
 /// Copies everything in `from` that is intact to the new file `to`: the messages, byte for byte, the configuration, the
 /// metadata (with an additional entry `recovered` that describes what is missing) and the attachments. An event `lost` counts the
 /// missing messages at their place. `from` is not changed.
+///
+/// # Errors
+/// When `from` is still being written or cannot be read, or `to` exists or cannot be written.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
+    let _reading = not_in_use(from)?;
     let old = Recording::salvage(from)?;
     let mut new = Recorder::create(to, &header(&old))?;
     for published in old.published()? {
@@ -70,6 +75,17 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
         had_summary: old.has_summary(),
         unchecked_messages: old.unchecked_messages(),
     })
+}
+
+/// The file, locked against a writer; `None` if it cannot be opened or locked, which reading it reports.
+fn not_in_use(path: &Path) -> Result<Option<File>, RecordingError> {
+    let Ok(file) = File::open(path) else {
+        return Ok(None);
+    };
+    match file.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => Err(RecordingError::InUse { path: path.into() }),
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    }
 }
 
 fn header(old: &Recording) -> Header {

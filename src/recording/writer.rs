@@ -93,6 +93,8 @@ pub struct Recorder {
     /// The log time of the last message.
     last_log_ns: u64,
     syncing: Option<Syncing>,
+    /// Shows other processes that the file is being written; `None` if it is not a file.
+    in_use: Option<File>,
     chunk_ends_ns: u64,
     encoded: Vec<u8>,
     account: Continuity,
@@ -101,7 +103,8 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Creates the file and writes `header` to it. An existing file is never changed.
+    /// Creates the file and writes `header` to it. An existing file is never changed. Until the recorder is dropped, the file is locked, so
+    /// that [`recover`](super::recover()) refuses it.
     pub fn create(path: &Path, header: &Header) -> Result<Recorder, RecordingError> {
         let file = File::create_new(path).map_err(|source| match source.kind() {
             io::ErrorKind::AlreadyExists => RecordingError::Exists { path: path.into() },
@@ -115,7 +118,9 @@ impl Recorder {
             source,
         };
         let same_file = file.try_clone().map_err(not_started)?;
-        let recorder = Recorder::over(Box::new(file), path, header)?;
+        let in_use = mark_in_use(path);
+        let mut recorder = Recorder::over(Box::new(file), path, header)?;
+        recorder.in_use = in_use;
         recorder.synced(Box::new(same_file)).map_err(not_started)
     }
 
@@ -149,6 +154,7 @@ impl Recorder {
             log_time: LogTime::new(header.started_ns),
             last_log_ns: header.started_ns,
             syncing: None,
+            in_use: None,
             chunk_ends_ns: CHUNK_NS,
             encoded: Vec::new(),
             account: Continuity::default(),
@@ -322,6 +328,13 @@ impl Recorder {
             source,
         }
     }
+}
+
+/// Locks a file that is being written (`flock`; the kernel releases it when the process ends). The lock has a descriptor of its own, so
+/// that it ends with the recorder and not with the thread that syncs. A file system without locks is no reason not to record.
+fn mark_in_use(path: &Path) -> Option<File> {
+    let file = File::open(path).ok()?;
+    file.try_lock().ok().map(|()| file)
 }
 
 /// Chunks are completed in memory and appended to the file without seeking, so that only the last chunk of a cut file can be

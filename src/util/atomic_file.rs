@@ -35,7 +35,7 @@ pub fn write_durable(path: &Path, text: &str) -> std::io::Result<()> {
 }
 
 /// Brings the name of a file in its folder to the disk, where the file system supports that for a folder.
-fn sync_folder(path: &Path) -> std::io::Result<()> {
+pub(super) fn sync_folder(path: &Path) -> std::io::Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

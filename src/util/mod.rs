@@ -6,6 +6,7 @@ pub mod decimal;
 pub mod estimate;
 pub mod finding;
 pub mod input_file;
+pub mod lock_file;
 pub mod nearest;
 pub mod numeric;
 pub mod progress;
