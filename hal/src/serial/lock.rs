@@ -10,7 +10,7 @@ use std::io::{Read, Seek, Write};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 
-use nix::fcntl::{Flock, FlockArg};
+use nix::fcntl::{Flock, FlockArg, OFlag};
 
 use super::error::SerialError;
 
@@ -51,18 +51,17 @@ fn name_of(device: &Path) -> PathBuf {
 }
 
 /// Opens the file, or creates it for every user. In a shared, sticky directory, opening a file of another user with O_CREAT
-/// may be refused, so the existing file is opened first.
+/// may be refused, so the existing file is opened first. Another user may have put a symbolic link or a pipe there: neither is opened.
 fn open(path: &Path) -> std::io::Result<File> {
-    let existing = OpenOptions::new().read(true).write(true).open(path);
-    existing.or_else(|_| {
-        OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .mode(0o666)
-            .open(path)
-    })
+    let mut options = OpenOptions::new();
+    let flags = OFlag::O_NOFOLLOW | OFlag::O_NONBLOCK;
+    options.read(true).write(true).custom_flags(flags.bits());
+    let existing = options.open(path);
+    let file = existing.or_else(|_| options.create(true).truncate(false).mode(0o666).open(path))?;
+    match file.metadata()?.is_file() {
+        true => Ok(file),
+        false => Err(std::io::Error::other("it is not a regular file")),
+    }
 }
 
 fn write_pid(file: &mut File) -> std::io::Result<()> {
@@ -75,4 +74,33 @@ fn read_pid(file: &mut File) -> Option<u32> {
     let mut text = String::new();
     file.take(16).read_to_string(&mut text).ok()?;
     text.trim().parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn does_not_write_through_a_link_of_another_user() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (device, target) = (Path::new("/dev/ttyX"), folder.path().join("target"));
+        std::fs::write(&target, "content").expect("a file");
+        let name = folder.path().join(name_of(device));
+        std::os::unix::fs::symlink(&target, name).expect("a link");
+        let refused = PortLock::take(folder.path(), device, device);
+        assert!(matches!(refused, Err(SerialError::Lock { .. })));
+        assert_eq!(std::fs::read_to_string(&target).expect("a file"), "content");
+    }
+
+    #[test]
+    fn second_lock_names_the_process_of_the_first() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let device = Path::new("/dev/ttyX");
+        let first = PortLock::take(folder.path(), device, device).expect("a free port");
+        let second = PortLock::take(folder.path(), device, device);
+        let me = std::process::id();
+        assert!(matches!(second, Err(SerialError::PortInUse { pid: Some(pid), .. }) if pid == me));
+        drop(first);
+        PortLock::take(folder.path(), device, device).expect("a free port");
+    }
 }
