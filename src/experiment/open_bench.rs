@@ -8,7 +8,7 @@ use super::live_rig::LiveRig;
 use super::loop_check::Stage;
 use super::run_hooks::RunHooks;
 use crate::config::Config;
-use crate::rig::devices;
+use crate::rig::devices::{self, Reservation};
 use crate::rt::device_defect::DeviceDefect;
 use crate::rt::thread::{Pace, Scheduling};
 
@@ -39,6 +39,8 @@ pub struct OpenBench {
     serial: Option<StatisticsHandle>,
     config: Config,
     opening: Opening,
+    /// Dropped after the rig.
+    _reservation: Option<Reservation>,
 }
 
 impl OpenBench {
@@ -72,6 +74,7 @@ impl OpenBench {
             serial: opened.watch,
             config: config.clone(),
             opening,
+            _reservation: opened.reservation,
         })
     }
 
@@ -89,6 +92,7 @@ impl OpenBench {
             serial: opened.watch,
             config: config.clone(),
             opening,
+            _reservation: opened.reservation,
         }
     }
 

@@ -12,6 +12,7 @@ pub mod amplifier;
 pub mod canopen;
 pub mod deferred;
 pub mod probe;
+mod reservation;
 pub mod vesc;
 
 use std::time::{Duration, Instant};
@@ -27,6 +28,7 @@ use deferred::{ComputingDelayError, OutputTiming};
 
 pub use amplifier::{AmplifierError, CanAmplifier, Requirements};
 pub use probe::ProbeError;
+pub use reservation::{DeviceInUse, Reservation};
 
 /// How long a probe may take to give its first valid reading.
 pub(crate) const FIRST_READING: Duration = Duration::from_secs(2);
@@ -55,6 +57,9 @@ pub enum DevicesError {
         /// Kind of the probe.
         probe: &'static str,
     },
+    /// Another process has reserved a device.
+    #[error(transparent)]
+    InUse(#[from] DeviceInUse),
     /// The computing delay.
     #[error(transparent)]
     ComputingDelay(#[from] ComputingDelayError),
@@ -79,6 +84,8 @@ pub enum DevicesError {
 
 /// An open rig.
 pub struct OpenRig {
+    /// The devices of the rig are reserved for this process; `None` for the simulated stage.
+    pub reservation: Option<Reservation>,
     /// The rig for the loop.
     pub rig: Box<dyn Rig>,
     /// Identity of the amplifier, as it reports it.
@@ -127,10 +134,12 @@ pub fn open(config: &Config) -> Result<OpenRig, DevicesError> {
     }
     check_kinds(config)?;
     let timing = OutputTiming::of(&config.servo)?;
+    let reservation = Reservation::take(config)?;
     let mut probe = probe::open(&config.probe, config.servo.priority)?;
     let (amplifier, amplifier_identity) = amplifier::open(&config.amplifier, &config.servo)?;
     wait_for_reading(&mut probe)?;
     Ok(OpenRig {
+        reservation: Some(reservation),
         amplifier: amplifier_identity,
         probe: probe::identity(&config.probe.device),
         notes: probe.notes().iter().map(Note::to_string).collect(),
@@ -145,6 +154,7 @@ pub const SIMULATED: &str = "simulated";
 /// The simulated stage with the rates, delays and resolutions of the configured devices.
 pub fn simulate(config: &Config) -> Result<OpenRig, DevicesError> {
     Ok(OpenRig {
+        reservation: None,
         rig: Box::new(SimulatedRig::new(config)?),
         amplifier: SIMULATED.into(),
         probe: SIMULATED.into(),
