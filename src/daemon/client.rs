@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use futures_util::{SinkExt, StreamExt};
-use nix::unistd::getuid;
 use tokio::net::UnixStream;
 use tokio::runtime::Runtime;
 use tokio_tungstenite::WebSocketStream;
@@ -109,7 +108,6 @@ impl DaemonOwner {
         OpenCommand {
             request: self.request.clone(),
             operator: self.operator.clone(),
-            user: getuid().as_raw(),
             ticket: std::env::var(TICKET_VARIABLE).ok(),
             estimated_s: estimated_s(order),
         }

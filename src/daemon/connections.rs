@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 use std::io;
-use std::net::{IpAddr, SocketAddr};
+use std::net::IpAddr;
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
@@ -21,6 +21,8 @@ use nix::sys::socket::{setsockopt, sockopt};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream, UnixListener};
 use tower::ServiceExt;
+
+use super::peer::Peer;
 
 /// Connections of all clients of a listener together.
 const MAX_CONNECTIONS: usize = 256;
@@ -49,15 +51,25 @@ pub async fn serve_tcp(mut listener: TcpListener, router: Router) {
             stream,
             _place: place,
         };
-        tokio::spawn(serve_connection(connection, router.clone(), Some(client)));
+        let client = ConnectInfo(client);
+        tokio::spawn(serve_connection(connection, router.clone(), client));
     }
 }
 
-/// Serves the clients of the socket of this machine.
+/// Serves the clients of the socket of this machine. Each request carries the user of its client.
 pub async fn serve_unix(mut listener: UnixListener, router: Router) {
     let places = Arc::new(Places::default());
     loop {
         let (stream, _) = Listener::accept(&mut listener).await;
+        let peer = match Peer::of(&stream) {
+            Ok(peer) => peer,
+            Err(error) => {
+                tracing::warn!(
+                    "a connection at the socket was refused: its user is not known: {error}"
+                );
+                continue;
+            }
+        };
         let Some(place) = places.take(None) else {
             tracing::warn!("a connection at the socket was refused: {MAX_CONNECTIONS} are open");
             continue;
@@ -66,7 +78,7 @@ pub async fn serve_unix(mut listener: UnixListener, router: Router) {
             stream,
             _place: place,
         };
-        tokio::spawn(serve_connection(connection, router.clone(), None));
+        tokio::spawn(serve_connection(connection, router.clone(), peer));
     }
 }
 
@@ -77,14 +89,14 @@ fn detect_dead_peer(stream: &TcpStream) -> nix::Result<()> {
     setsockopt(stream, sockopt::TcpUserTimeout, &PEER_TIME_MS)
 }
 
-async fn serve_connection<S>(connection: Connection<S>, router: Router, client: Option<SocketAddr>)
+/// Serves a connection. Each request carries `client` as extension.
+async fn serve_connection<S, C>(connection: Connection<S>, router: Router, client: C)
 where
     S: AsyncRead + AsyncWrite + Unpin + Send + 'static,
+    C: Clone + Send + Sync + 'static,
 {
     let service = router.map_request(move |mut request: Request<Incoming>| {
-        if let Some(client) = client {
-            request.extensions_mut().insert(ConnectInfo(client));
-        }
+        request.extensions_mut().insert(client.clone());
         request.map(Body::new)
     });
     let served = Builder::new()

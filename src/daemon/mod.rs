@@ -14,6 +14,7 @@ mod metrics;
 mod output;
 mod owner;
 mod page;
+mod peer;
 mod run_entry;
 mod run_record;
 mod same_rig;

@@ -1,5 +1,6 @@
 //! One command of this machine on its connection (see [`session_messages`](super::session_messages)).
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -10,6 +11,7 @@ use tokio::time::{MissedTickBehavior, interval};
 use super::catalogue::RecordingInfo;
 use super::live::hub::LiveRun;
 use super::owner::OwnerOrder;
+use super::peer::Peer;
 use super::run_entry::{Carrier, Phase, RunOutcome};
 use super::schedule::{NewEntry, Schedule, ScheduleError};
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
@@ -22,14 +24,14 @@ use crate::util::progress::Progress;
 /// Period of the progress reports.
 const PROGRESS: Duration = Duration::from_millis(100);
 
-/// Serves a command until its connection closes.
-pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket) {
+/// Serves a command until its connection closes. `peer` is the user of the connection.
+pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket, peer: Peer) {
     let _counted = daemon.count_session();
     let mut connection = Connection(Some(socket));
     let Some(FromCommand::Open(open)) = connection.receive().await else {
         return; // not a command of this version
     };
-    let entered = enter(&daemon, &open);
+    let entered = enter(&daemon, &open, peer);
     let (id, is_attached) = match entered {
         Ok(entered) => entered,
         Err(error) => return connection.send(&refused(error.to_string())).await,
@@ -38,7 +40,7 @@ pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket) {
         daemon,
         id,
         connection,
-        is_own_user: nix::unistd::geteuid().as_raw() == open.user,
+        is_own_user: peer.is_own_user(),
         open_run: None,
         outcome: RunOutcome::Failed,
     };
@@ -50,8 +52,12 @@ pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket) {
 }
 
 /// Number of the entry, and whether it belongs to the connection.
-fn enter(daemon: &Daemon, open: &OpenCommand) -> Result<(u64, bool), ScheduleError> {
+fn enter(daemon: &Daemon, open: &OpenCommand, peer: Peer) -> Result<(u64, bool), ScheduleError> {
     if let Some(ticket) = &open.ticket {
+        // The processes of the daemon run as its own user.
+        if !peer.is_own_user() {
+            return Err(ScheduleError::NoTicket);
+        }
         let id = daemon.change(|schedule, _| {
             let id = schedule.by_ticket(ticket)?;
             schedule.open_entry(id)?.estimated_s = open.estimated_s;
@@ -73,6 +79,21 @@ fn enter(daemon: &Daemon, open: &OpenCommand) -> Result<(u64, bool), ScheduleErr
     Ok((id, true))
 }
 
+/// A file of an order that the command of another user may not be able to read: neither that of the daemon's own configuration, nor in the
+/// folder of its recordings.
+fn foreign_file(daemon: &Daemon, order: &RunOrder) -> Option<String> {
+    let file = order.plan().ok()?.config.calibration.file?;
+    let own = daemon.configuration().config.calibration.file.as_ref();
+    let is_known = own == Some(&file) || is_in(Path::new(&file), &daemon.recordings);
+    (!is_known).then_some(file)
+}
+
+/// Whether a file is in a folder, with all symbolic links followed.
+fn is_in(file: &Path, folder: &Path) -> bool {
+    let found = file.canonicalize();
+    found.is_ok_and(|found| found.starts_with(folder))
+}
+
 fn refused(message: String) -> FromDaemon {
     FromDaemon::Refused(RemoteError::failed(message))
 }
@@ -89,9 +110,11 @@ impl Connection {
                 Some(Ok(Message::Text(text))) => match serde_json::from_str(&text) {
                     Ok(message) => return Some(message),
                     Err(error) => {
-                        tracing::warn!(
-                            "a command sent a message that cannot be read: {error}; use the same version of `bench` for the daemon and the command"
+                        let why = format!(
+                            "a message of the command cannot be read: {error}; use the same version of `bench` for the daemon and the command"
                         );
+                        tracing::warn!("{why}");
+                        self.send(&refused(why)).await;
                         self.0 = None;
                     }
                 },
@@ -201,6 +224,13 @@ impl Session {
         if !self.is_own_user {
             // The command fetches the recording from there.
             order.folder.clone_from(&self.daemon.recordings);
+            if let Some(file) = foreign_file(&self.daemon, &order) {
+                let message = format!(
+                    "calibration.file is {file}, and the daemon, which runs as another user, reads no file for this command with its own rights; copy it into {}, or add --connect none",
+                    self.daemon.recordings.display()
+                );
+                return self.connection.send(&refused(message)).await;
+            }
         }
         let (warnings, warned) = mpsc::unbounded_channel();
         let (reply, replied) = oneshot::channel();

@@ -27,8 +27,9 @@ pub enum FromCommand {
     Finish(String),
 }
 
-/// A command that asks for its turn.
+/// A command that asks for its turn. Its user is not stated here: the kernel knows it.
 #[derive(Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct OpenCommand {
     /// The command.
     pub request: RunRequest,
@@ -36,8 +37,6 @@ pub struct OpenCommand {
     pub operator: String,
     /// The ticket of a process that the daemon started.
     pub ticket: Option<String>,
-    /// Its user. The daemon writes the recording into the folder of the command only for its own user.
-    pub user: u32,
     /// Length of its first run in seconds, if it takes real time.
     pub estimated_s: Option<f64>,
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use aide::NoApi;
-use axum::Json;
 use axum::extract::State;
 use axum::extract::ws::rejection::WebSocketUpgradeRejection;
 use axum::extract::ws::{Message, WebSocket, WebSocketUpgrade};
 use axum::http::StatusCode;
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,7 @@ use super::views::{StateView, state};
 use crate::daemon::live::event_text::EventView;
 use crate::daemon::live::hub::LiveMessage;
 use crate::daemon::live::response::ResponseView;
+use crate::daemon::peer::Peer;
 use crate::daemon::session;
 use crate::daemon::shared::Daemon;
 use crate::experiment::ErrorKind;
@@ -100,10 +101,11 @@ fn no_web_socket(rejection: WebSocketUpgradeRejection) -> ApiError {
 /// Upgrades to the connection of a command of this machine.
 pub async fn command(
     State(daemon): State<Arc<Daemon>>,
+    NoApi(Extension(peer)): NoApi<Extension<Peer>>,
     NoApi(upgrade): NoApi<Upgrade>,
 ) -> Result<Response, ApiError> {
     let upgrade = upgrade.map_err(no_web_socket)?;
-    Ok(upgrade.on_upgrade(|socket| session::serve(daemon, socket)))
+    Ok(upgrade.on_upgrade(move |socket| session::serve(daemon, socket, peer)))
 }
 
 async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {
