@@ -108,7 +108,7 @@ pub fn main() -> Outcome {
 /// Runs a parsed command line in this process, or at the daemon that it names.
 fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
     let arguments: Vec<String> = arguments().collect();
-    match remote::target(&arguments) {
+    match remote::target(&arguments)? {
         Some(target) => {
             let description = cli.command.description().cloned().unwrap_or_default();
             remote::carry_out(&target, &arguments, &description)

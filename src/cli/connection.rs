@@ -17,6 +17,9 @@ pub(super) struct ConnectOption {
     /// on the same kind of bench]; http://HOST:PORT carries out the whole command there
     #[arg(long, value_name = "PATH|URL|none")]
     connect: Option<String>,
+    /// File with the token of the daemon at --connect http://HOST:PORT [default: $BENCH_TOKEN]
+    #[arg(long, value_name = "FILE", requires = "connect")]
+    token_file: Option<PathBuf>,
 }
 
 impl ConnectOption {
@@ -27,9 +30,10 @@ impl ConnectOption {
         description: &DescriptionOptions,
     ) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
         let socket = match self.connect.as_deref() {
-            Some("none") => return Ok(None),
+            Some("none") if self.token_file.is_none() => return Ok(None),
             // The whole command is carried out there, before it gets here.
-            Some(url) if url.starts_with("http://") => return Ok(None),
+            Some(url) if url.starts_with(SCHEME) => return Ok(None),
+            _ if self.token_file.is_some() => return Err(token_without_url()),
             Some(path) => Some(required(PathBuf::from(path), stage)?),
             None => running_daemon().filter(|socket| rig_of(socket).ok() == Some(stage)),
         };
@@ -37,6 +41,15 @@ impl ConnectOption {
             .map(|socket| DaemonOwner::new(socket, request(description), description.operator()));
         Ok(owner.map(|owner| Arc::new(owner) as Arc<dyn RigOwner>))
     }
+}
+
+/// What the address of a daemon begins with.
+pub(super) const SCHEME: &str = "http://";
+
+fn token_without_url() -> CliError {
+    CliError::Usage(
+        "--token-file is for a daemon at --connect http://HOST:PORT; leave it out".into(),
+    )
 }
 
 /// A daemon that the operator named must run, with the same kind of bench.

@@ -7,6 +7,7 @@ use hyper::body::Incoming;
 use serde_json::{Value, json};
 use tokio::time::{Duration, interval};
 
+use super::connection::SCHEME;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::outcome::Outcome;
@@ -18,12 +19,41 @@ use crate::experiment::StopSignals;
 /// Period of the renewals of the arm lease.
 const RENEWAL: Duration = Duration::from_secs(3);
 
+/// Variable of the environment with the token.
+const TOKEN_VARIABLE: &str = "BENCH_TOKEN";
+
 /// The daemon that `--connect` names, if it is at an address.
-pub(super) fn target(arguments: &[String]) -> Option<Target> {
+pub(super) fn target(arguments: &[String]) -> Result<Option<Target>, CliError> {
     let (_, value) = split(arguments, "--connect");
-    value
-        .filter(|value| value.starts_with("http://"))
-        .map(|value| Target::of(&value))
+    let Some(address) = value.as_deref().and_then(|url| url.strip_prefix(SCHEME)) else {
+        return Ok(None);
+    };
+    require_plain_address(address)?;
+    let (_, file) = split(arguments, "--token-file");
+    Ok(Some(Target::tcp(address, token(file.as_deref())?)))
+}
+
+/// Other users of the machine see the arguments of a process, so that the address must not contain the token.
+fn require_plain_address(address: &str) -> Result<(), CliError> {
+    match address.contains(['#', '?', '@']) {
+        false => Ok(()),
+        true => Err(CliError::Usage(format!(
+            "--connect: every user of this machine can read the arguments of a process, so that the token does not belong there; give http://HOST:PORT only, and the token with --token-file FILE or in the environment variable {TOKEN_VARIABLE}"
+        ))),
+    }
+}
+
+/// The token in the file, or that of the environment.
+fn token(file: Option<&str>) -> Result<Option<String>, CliError> {
+    let Some(file) = file else {
+        return Ok(std::env::var(TOKEN_VARIABLE).ok());
+    };
+    let text = std::fs::read_to_string(file).map_err(|error| {
+        CliError::Usage(format!(
+            "--token-file {file}: {error}; give a file with the token of the daemon, which `bench serve --listen` names when it starts"
+        ))
+    })?;
+    Ok(Some(text.trim().into()))
 }
 
 /// The arguments without an option such as `--connect`, and its value.
@@ -43,7 +73,13 @@ fn split(arguments: &[String], option: &str) -> (Vec<String>, Option<String>) {
 
 /// The arguments without the options that the request of the daemon or its arm lease contains.
 fn command_line(arguments: &[String]) -> Vec<String> {
-    let sent_apart = ["--connect", "--name", "--note", "--operator"];
+    let sent_apart = [
+        "--connect",
+        "--token-file",
+        "--name",
+        "--note",
+        "--operator",
+    ];
     sent_apart
         .iter()
         .fold(arguments.to_vec(), |rest, option| split(&rest, option).0)
@@ -217,9 +253,56 @@ mod tests {
             assert_eq!(rest, words("chirp --seed 4"));
             assert_eq!(value.as_deref(), Some("http://lab:1"));
         }
-        assert_eq!(target(&words("chirp --connect none")), None);
-        let line = "chirp --name a --connect=http://lab:1 --note=b --operator c --seed 4";
+        let line =
+            "chirp --name a --connect=http://lab:1 --token-file t --note=b --operator c --seed 4";
         assert_eq!(command_line(&words(line)), words("chirp --seed 4"));
-        assert_eq!(target(&words("chirp")), None);
+    }
+
+    fn target_of(line: &str) -> Result<Option<Target>, CliError> {
+        let words: Vec<String> = line.split(' ').map(String::from).collect();
+        target(&words)
+    }
+
+    #[test]
+    fn only_an_address_is_another_machine() {
+        for line in ["chirp --connect none", "chirp --connect a.sock", "chirp"] {
+            assert!(matches!(target_of(line), Ok(None)), "{line}");
+        }
+        let found = target_of("chirp --connect http://lab:8020").expect("an address");
+        assert!(matches!(found, Some(Target::Tcp { address, .. }) if address == "lab:8020"));
+    }
+
+    #[test]
+    fn token_comes_from_a_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("token");
+        std::fs::write(&file, "0123\n").expect("a file");
+        let line = format!("chirp --connect http://lab --token-file {}", file.display());
+        let found = target_of(&line).expect("an address");
+        assert_eq!(found, Some(Target::tcp("lab", Some("0123".into()))));
+        let missing = target_of("chirp --connect http://lab --token-file /nonexistent/token");
+        let error = missing.expect_err("no file").to_string();
+        assert!(error.contains("--token-file /nonexistent/token"), "{error}");
+    }
+
+    #[test]
+    fn rejects_token_among_the_arguments_without_repeating_it() {
+        for address in [
+            "http://lab:8020/#token=0123abcd",
+            "http://lab:8020/?token=0123abcd",
+            "http://x:0123abcd@lab:8020",
+        ] {
+            for line in [
+                format!("chirp --connect {address}"),
+                format!("chirp --connect={address}"),
+            ] {
+                let error = target_of(&line).expect_err("refused").to_string();
+                assert!(!error.contains("0123abcd"), "{error}");
+                assert!(
+                    error.contains("--token-file") && error.contains("BENCH_TOKEN"),
+                    "{error}"
+                );
+            }
+        }
     }
 }

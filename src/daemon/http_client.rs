@@ -27,15 +27,8 @@ pub enum Target {
 }
 
 impl Target {
-    /// `http://HOST:PORT`, also with `#token=TOKEN` as the daemon prints it; otherwise the path of a socket.
-    pub fn of(text: &str) -> Target {
-        let Some(rest) = text.strip_prefix("http://") else {
-            return Target::Socket(text.into());
-        };
-        let (address, token) = match rest.split_once("#token=") {
-            Some((address, token)) => (address, Some(token.to_string())),
-            None => (rest, std::env::var("BENCH_TOKEN").ok()),
-        };
+    /// The daemon at `HOST:PORT`, or `HOST` for the port 80.
+    pub fn tcp(address: &str, token: Option<String>) -> Target {
         let address = address.trim_end_matches('/');
         let has_port = address
             .rsplit_once(':')
@@ -172,19 +165,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_addresses_and_paths() {
-        let tcp = |address: &str, token: Option<&str>| Target::Tcp {
-            address: address.into(),
-            token: token.map(String::from),
-        };
-        assert_eq!(
-            Target::of("http://lab:8020/#token=ab"),
-            tcp("lab:8020", Some("ab"))
-        );
-        assert_eq!(Target::of("http://lab"), tcp("lab:80", None));
-        assert_eq!(
-            Target::of("/run/b.sock"),
-            Target::Socket("/run/b.sock".into())
-        );
+    fn port_of_an_address_is_80_unless_it_is_given() {
+        for (text, expected) in [
+            ("lab:8020/", "lab:8020"),
+            ("lab", "lab:80"),
+            ("10.0.0.1/", "10.0.0.1:80"),
+        ] {
+            let Target::Tcp { address, .. } = Target::tcp(text, None) else {
+                panic!("{text}");
+            };
+            assert_eq!(address, expected);
+        }
     }
 }

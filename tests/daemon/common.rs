@@ -69,7 +69,9 @@ impl Daemon {
             .stderr(Stdio::piped())
             .spawn()
             .expect("a process");
-        let (address, token) = address(&mut child);
+        let address = address(&mut child);
+        let token = std::fs::read_to_string(folder.path().join("bench.token"));
+        let token = token.expect("a token");
         Daemon {
             child,
             folder,
@@ -103,7 +105,7 @@ impl Daemon {
     }
 
     pub fn url(&self) -> String {
-        format!("http://{}/#token={}", self.address, self.token)
+        format!("http://{}/", self.address)
     }
 
     /// `bench` with this daemon as that of the machine.
@@ -256,8 +258,8 @@ pub fn bench_in(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// The address and the token that the daemon prints.
-fn address(child: &mut Child) -> (String, String) {
+/// The address that the daemon prints.
+fn address(child: &mut Child) -> String {
     let stdout = child.stdout.as_mut().expect("a pipe");
     let mut lines = BufReader::new(stdout).lines();
     let page = lines.find_map(|line| {
@@ -265,8 +267,7 @@ fn address(child: &mut Child) -> (String, String) {
         line.split("http://").nth(1).map(String::from)
     });
     let page = page.expect("the daemon prints the address of its page");
-    let (address, token) = page.split_once("/#token=").expect("address and token");
-    (address.into(), token.trim().into())
+    page.split('/').next().unwrap_or_default().trim().into()
 }
 
 /// One request on a connection of its own.

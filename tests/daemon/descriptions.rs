@@ -69,6 +69,7 @@ fn command_at_a_terminal_passes_name_note_and_operator_to_the_daemon() {
         .concat();
         let output = daemon
             .bench(here.path(), &arguments)
+            .env("BENCH_TOKEN", daemon.token())
             .output()
             .expect("a process");
         let shown = String::from_utf8_lossy(&output.stderr);

@@ -85,8 +85,7 @@ fn session_of_a_local_command_cannot_be_opened_over_tcp() {
 fn oversized_and_unknown_requests_are_refused() {
     let daemon = Daemon::start();
     let large = vec![b' '; 2 << 20];
-    let token = daemon.url();
-    let token = format!("Bearer {}", token.split("token=").nth(1).expect("a token"));
+    let token = format!("Bearer {}", daemon.token());
     let answer = daemon.raw("POST", "/api/v1/plan", &[("Authorization", &token)], &large);
     assert_eq!(answer.status, 413);
     assert_eq!(daemon.ask("GET", "/api/v1/nothing", "", None).status, 404);

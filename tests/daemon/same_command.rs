@@ -176,6 +176,7 @@ fn command_over_tcp_prints_what_it_prints_there() {
     let url = daemon.url();
     let remote = [&arguments[..], &["--connect", &url]].concat();
     let output = bench_in(folder.path(), &remote)
+        .env("BENCH_TOKEN", daemon.token())
         .output()
         .expect("a process");
     let text = |output: &Output| {
