@@ -1,5 +1,6 @@
 //! `bench serve`: the daemon.
 
+use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -30,7 +31,7 @@ pub(super) struct Args {
     #[arg(long, value_name = "PATH")]
     socket: Option<PathBuf>,
     /// Also listen on TCP, for the live page: 127.0.0.1:8020, or 0.0.0.0:8020 for other machines. Whatever changes
-    /// something needs the token that is printed
+    /// something needs the token, which is in a file beside the socket
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
     /// Also serve the channels of the recordings to Foxglove and Lichtblick: 127.0.0.1:8765. Everyone who reaches the
@@ -96,8 +97,13 @@ fn absolute_if_file(name: String) -> String {
     }
 }
 
+/// What is printed at the start. The token is shown on a terminal only: a pipe or the journal may be read by others.
 fn started_text(started: &Started) -> String {
-    let page = started.page.as_ref().map(|page| labelled("page", page));
+    let page = match std::io::stdout().is_terminal() {
+        true => started.page_with_token(),
+        false => started.page.clone(),
+    };
+    let page = page.map(|page| labelled("page", &page));
     let foxglove = started.foxglove.map(|address| format!("ws://{address}"));
     let foxglove = foxglove.map(|address| labelled("foxglove", &address));
     let file = started.token_file.as_ref();

@@ -13,10 +13,11 @@ use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
 
 use super::http_client::{Ask, HttpError, Target, download, json};
+use super::private_files::{folder_of, require_private_folder};
 use super::run_entry::RunRequest;
 use super::schedule::StopKind;
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
-use super::socket::{TICKET_VARIABLE, sockets};
+use super::socket::{TICKET_VARIABLE, default_socket, sockets};
 use crate::experiment::{
     ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
     RunReport, Stage, StopSignals,
@@ -32,7 +33,24 @@ pub const SESSION_PATH: &str = "/api/v1/session";
 pub fn running_daemon() -> Option<PathBuf> {
     sockets()
         .into_iter()
+        .filter(is_trustworthy)
         .find(|path| BlockingStream::connect(path).is_ok())
+}
+
+/// Whether nobody else can have made a socket that was found by its default path. In a folder for temporary files another user may be
+/// first.
+fn is_trustworthy(socket: &PathBuf) -> bool {
+    if *socket != default_socket() || !socket.exists() {
+        return true;
+    }
+    match require_private_folder(folder_of(socket)) {
+        Ok(()) => true,
+        Err(error) => {
+            let socket = socket.display();
+            tracing::warn!("no daemon is used at {socket}: {error}");
+            false
+        }
+    }
 }
 
 /// Whether the daemon started this process to carry out a command.

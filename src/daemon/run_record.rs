@@ -1,25 +1,21 @@
-//! What a crash leaves behind: the record that the daemon runs, and recordings that were cut off.
+//! The record of the daemon in the folder of its recordings, which is also the lock of the folder, and the recovery of what a crash has
+//! cut off.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
-
-use crate::recording::{Recording, recover};
-use crate::util::atomic_file::write_durable;
+use crate::recording::{Recording, RecordingError, recover};
+use crate::util::lock_file::{Holder, LockError, LockFile};
 
 /// The file of the record, in the folder of the recordings.
-const FILE: &str = ".bench-daemon.json";
+const FILE: &str = ".bench-daemon.lock";
 /// What follows the name of a recording in the name of its recovered copy.
 const RECOVERED: &str = "-recovered.mcap";
-
-/// A daemon that runs. A clean shutdown removes the file.
-#[derive(Debug, Serialize, Deserialize)]
-struct Record {
-    pid: u32,
-}
+/// What follows the name of a recovered copy until it is complete.
+const PARTIAL: &str = ".partial";
 
 /// How the last daemon on this folder ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LastEnd {
     /// By a shutdown, or there was none.
     Clean,
@@ -27,39 +23,42 @@ pub enum LastEnd {
     Crashed,
 }
 
-/// The record of the running daemon. Dropping it means a clean shutdown.
+/// The record of the running daemon. One process at a time has it. Dropping it means a clean shutdown; before the crash of an earlier
+/// daemon has been reported, the record of that crash remains.
 #[derive(Debug)]
 pub struct RunRecord {
-    path: PathBuf,
+    lock: LockFile,
+    last: LastEnd,
 }
 
 impl RunRecord {
-    /// Begins the record; returns how the last daemon ended.
+    /// Begins the record.
     ///
     /// # Errors
-    /// When the file cannot be written.
-    pub fn begin(folder: &Path) -> std::io::Result<(RunRecord, LastEnd)> {
-        let path = folder.join(FILE);
-        let last = match path.exists() {
+    /// When another daemon uses the folder, and those of the file system.
+    pub fn begin(folder: &Path, holder: &Holder) -> Result<RunRecord, LockError> {
+        let mut lock = LockFile::take(&folder.join(FILE), holder)?;
+        let last = match lock.was_left() {
             true => LastEnd::Crashed,
             false => LastEnd::Clean,
         };
-        let record = Record {
-            pid: std::process::id(),
-        };
-        let text = serde_json::to_string(&record).map_err(std::io::Error::other)?;
-        write_durable(&path, &text).map_err(std::io::Error::other)?;
-        Ok((RunRecord { path }, last))
+        lock.keep(last == LastEnd::Crashed);
+        Ok(RunRecord { lock, last })
+    }
+
+    /// How the last daemon ended.
+    pub fn last(&self) -> LastEnd {
+        self.last
+    }
+
+    /// The daemon runs and reports how the last one ended.
+    pub fn started(&mut self) {
+        self.lock.keep(false);
     }
 }
 
-impl Drop for RunRecord {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path); // without it the next daemon reports a crash
-    }
-}
-
-/// Recovers the recordings that were cut off; returns the names of the copies. The originals stay.
+/// Recovers the recordings that were cut off; returns the names of the copies. The originals stay. Files that another process writes are
+/// left alone.
 pub fn recover_cut_recordings(folder: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(folder) else {
         return Vec::new();
@@ -97,24 +96,120 @@ fn copy_of(path: &Path) -> PathBuf {
     path.with_file_name(format!("{stem}{RECOVERED}"))
 }
 
+/// The name of the copy; `None` if there is none.
 fn recovered(path: &Path) -> Option<String> {
     let copy = copy_of(path);
-    match recover(path, &copy) {
-        Ok(_) => {
+    let shown = path.display();
+    match recover_to(path, &copy) {
+        Ok(()) => {
             let ticks = Recording::open(&copy).map_or(0, |recording| recording.tick_count());
             let copy = copy.file_name()?.to_string_lossy().into_owned();
-            tracing::warn!(
-                "{} was cut off; its {ticks} ticks are in {copy}",
-                path.display()
-            );
+            tracing::warn!("{shown} was cut off; its {ticks} ticks are in {copy}");
             Some(copy)
         }
-        Err(error) => {
-            tracing::warn!(
-                "{} was cut off and cannot be recovered: {error}",
-                path.display()
-            );
+        Err(RecordingError::InUse { .. }) => {
+            tracing::info!("{shown} is written by another process and was left alone");
             None
         }
+        Err(error) => {
+            tracing::warn!("{shown} was cut off and cannot be recovered: {error}");
+            None
+        }
+    }
+}
+
+/// Recovers under another name, so that a copy that is cut off itself does not pass for a complete one.
+fn recover_to(path: &Path, copy: &Path) -> Result<(), RecordingError> {
+    let partial = PathBuf::from(format!("{}{PARTIAL}", copy.display()));
+    let _ = std::fs::remove_file(&partial); // left by a recovery that was cut off
+    let recovered = recover(path, &partial).and_then(|_| rename(&partial, copy));
+    if recovered.is_err() {
+        let _ = std::fs::remove_file(&partial); // the error of the recovery is the one to report
+    }
+    recovered
+}
+
+fn rename(from: &Path, to: &Path) -> Result<(), RecordingError> {
+    let renamed = std::fs::rename(from, to);
+    renamed.map_err(|source: io::Error| RecordingError::Create {
+        path: to.into(),
+        source,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{Header, Recorder};
+    use crate::rt::record::{LoopMessage, TickRecord};
+
+    fn begin(folder: &Path) -> RunRecord {
+        RunRecord::begin(folder, &Holder::this_process("a daemon")).expect("a record")
+    }
+
+    /// A recorder with 300 ticks at 1 kHz.
+    fn recorder(path: &Path) -> Recorder {
+        let header = Header {
+            period_s: 1e-3,
+            ..Header::default()
+        };
+        let mut recorder = Recorder::create(path, &header).expect("a file");
+        for tick in 0..300 {
+            let record = TickRecord {
+                tick,
+                scheduled_ns: tick * 1_000_000,
+                ..TickRecord::default()
+            };
+            recorder.record(&LoopMessage::Tick(record)).expect("space");
+        }
+        recorder
+    }
+
+    /// Completes a recording and cuts its end off.
+    fn cut_off(recorder: Recorder, path: &Path) -> Vec<u8> {
+        recorder.finish(&[]).expect("space");
+        let bytes = std::fs::read(path).expect("a file");
+        std::fs::write(path, &bytes[..bytes.len() - 20]).expect("a cut file");
+        bytes
+    }
+
+    #[test]
+    fn crash_is_reported_until_a_daemon_has_started() {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join(FILE), "{").expect("a record that a crash left");
+        let failed = begin(folder.path());
+        assert_eq!(failed.last(), LastEnd::Crashed);
+        drop(failed);
+        let mut started = begin(folder.path());
+        assert_eq!(
+            started.last(),
+            LastEnd::Crashed,
+            "the start before it failed"
+        );
+        started.started();
+        drop(started);
+        assert_eq!(begin(folder.path()).last(), LastEnd::Clean);
+    }
+
+    #[test]
+    fn leaves_a_recording_alone_while_it_is_written_and_recovers_it_afterwards() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mcap");
+        let recorder = recorder(&path);
+        assert!(is_cut(&path));
+        assert!(recover_cut_recordings(folder.path()).is_empty());
+        cut_off(recorder, &path);
+        assert_eq!(recover_cut_recordings(folder.path()), ["a-recovered.mcap"]);
+    }
+
+    #[test]
+    fn copy_that_was_cut_off_is_made_again() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mcap");
+        let bytes = cut_off(recorder(&path), &path);
+        let partial = folder.path().join("a-recovered.mcap.partial");
+        std::fs::write(&partial, &bytes[..50]).expect("a recovery that was cut off");
+        assert_eq!(recover_cut_recordings(folder.path()), ["a-recovered.mcap"]);
+        assert!(!partial.exists());
     }
 }

@@ -1,10 +1,8 @@
 //! Start, listeners, and shutdown of the daemon.
 
-use std::fs::Permissions;
 use std::io;
 use std::net::SocketAddr;
-use std::os::unix::fs::PermissionsExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -18,85 +16,19 @@ use super::connections::{serve_tcp, serve_unix};
 use super::dispatch;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
+use super::ownership::Ownership;
 use super::run_entry::{Carrier, Command, OnDisconnect, RunRequest};
-use super::run_record::{LastEnd, RunRecord, recover_cut_recordings};
+use super::run_record::{LastEnd, recover_cut_recordings};
 use super::schedule::{NewEntry, StopKind};
 use super::secret::Secret;
-use super::shared::{Daemon, DaemonConfig, Parts};
+use super::shared::{Daemon, Parts};
+use super::start::{ServeError, ServeOptions, Started};
 use crate::experiment::{FeedSender, StopSignals};
-use crate::util::atomic_file::write_atomic;
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);
 /// Longest time without a tick for which the watchdog is still notified, because the devices are being opened.
 const OPENING: Duration = Duration::from_secs(15);
-/// Permissions of the socket: its owner and its group.
-const SOCKET_MODE: u32 = 0o660;
-
-/// What the daemon is started with.
-#[derive(Clone, Debug)]
-pub struct ServeOptions {
-    /// The configuration.
-    pub configuration: DaemonConfig,
-    /// The socket.
-    pub socket: PathBuf,
-    /// An address for TCP.
-    pub listen: Option<SocketAddr>,
-    /// An address for Foxglove and Lichtblick. Only with the feature `foxglove`.
-    pub foxglove: Option<SocketAddr>,
-    /// Folder of the recordings.
-    pub recordings: PathBuf,
-    /// Whether a closed loop begins at once, on the simulated stage.
-    pub demo: bool,
-}
-
-/// A daemon that cannot start.
-#[derive(Debug, thiserror::Error)]
-pub enum ServeError {
-    /// Another daemon has the socket.
-    #[error("a daemon runs already at {}; stop it first, or choose another path with --socket", .0.display())]
-    Running(PathBuf),
-    /// The socket cannot be made.
-    #[error("cannot listen at {}: {why}; choose another path with --socket", path.display())]
-    Socket {
-        /// The path.
-        path: PathBuf,
-        /// The error of the operating system.
-        why: io::Error,
-    },
-    /// The address cannot be used.
-    #[error("cannot listen at {address}: {why}; choose another address with --listen")]
-    Address {
-        /// The address.
-        address: SocketAddr,
-        /// The error of the operating system.
-        why: io::Error,
-    },
-    /// The folder cannot be used.
-    #[error("cannot write to the folder {}: {why}; choose another one with --out", path.display())]
-    Folder {
-        /// The folder.
-        path: PathBuf,
-        /// The error of the operating system.
-        why: io::Error,
-    },
-    /// The address for viewers cannot be used.
-    #[error("cannot listen at {address}: {why}; choose another address with --foxglove")]
-    Foxglove {
-        /// The address.
-        address: SocketAddr,
-        /// Why.
-        why: String,
-    },
-    /// The program was built without the server for viewers.
-    #[error(
-        "this program was built without --foxglove; install the Debian package, or build with `--features foxglove`"
-    )]
-    WithoutFoxglove,
-    /// The system refuses threads or random numbers.
-    #[error("cannot start the daemon: {0}; look at the limits of the system")]
-    System(String),
-}
 
 /// Runs the daemon until a signal ends it. `started` is called when clients can connect, with the address of the page.
 ///
@@ -114,55 +46,34 @@ pub fn serve(options: ServeOptions, started: impl FnOnce(&Started)) -> Result<()
     served
 }
 
-/// Where the daemon can be reached.
-#[derive(Clone, Debug)]
-pub struct Started {
-    /// The socket.
-    pub socket: PathBuf,
-    /// The address of the page with the token.
-    pub page: Option<String>,
-    /// The address for Foxglove and Lichtblick.
-    pub foxglove: Option<SocketAddr>,
-    /// The file with the token.
-    pub token_file: Option<PathBuf>,
-    /// Why the daemon started.
-    pub reason: String,
-}
-
 async fn serve_clients(
     options: ServeOptions,
     started: impl FnOnce(&Started),
 ) -> Result<(), ServeError> {
-    let folder_error = |why| ServeError::Folder {
-        path: options.recordings.clone(),
-        why,
-    };
-    std::fs::create_dir_all(&options.recordings).map_err(folder_error)?;
-    let recordings = options.recordings.canonicalize().map_err(folder_error)?;
-    let unix = listen_unix(&options.socket)?;
-    let (record, last) = RunRecord::begin(&recordings).map_err(folder_error)?;
-    let reason = start_reason(last, &recordings);
+    let mut own = Ownership::take(&options)?;
+    let unix = own.listen()?;
     let tcp = match options.listen {
         Some(address) => Some(listen_tcp(address).await?),
         None => None,
     };
-    let (token, token_file) = token(&options)?;
+    let token = tcp.as_ref().map(|_| new_token(&mut own)).transpose()?;
     let mut signals =
         StopSignals::listen().map_err(|error| ServeError::System(error.to_string()))?;
     let (viewer, foxglove) = start_viewer(options.foxglove).await?.unzip();
+    let recordings = own.recordings().to_path_buf();
+    let reason = start_reason(own.last_end(), &recordings);
     let daemon = start_daemon(&options, &recordings, reason.clone(), viewer)?;
     let tasks = spawn_tasks(&daemon, unix, tcp.as_ref(), token.as_ref())?;
     if options.demo {
         start_demo(&daemon);
     }
-    let page = tcp
-        .as_ref()
-        .map(|listener| page_address(listener, token.as_ref()));
+    own.started();
     started(&Started {
         socket: options.socket.clone(),
-        page,
+        page: tcp.as_ref().map(page_address),
+        token,
         foxglove,
-        token_file: token_file.clone(),
+        token_file: own.token_file(),
         reason,
     });
     tracing::info!(socket = %options.socket.display(), tcp = ?options.listen, "the daemon runs");
@@ -172,10 +83,7 @@ async fn serve_clients(
     shut_down(&daemon, &mut signals).await;
     tasks.abort_all_clients();
     drop(daemon);
-    for path in [Some(options.socket), token_file].into_iter().flatten() {
-        let _ = std::fs::remove_file(path); // it may have been removed by hand
-    }
-    drop(record);
+    drop(own);
     Ok(())
 }
 
@@ -229,70 +137,22 @@ fn start_daemon(
     })))
 }
 
-/// A socket that only its owner and its group may use. A socket without a daemon is replaced.
-fn listen_unix(path: &Path) -> Result<UnixListener, ServeError> {
-    let failed = |why| ServeError::Socket {
-        path: path.into(),
-        why,
-    };
-    if std::os::unix::net::UnixStream::connect(path).is_ok() {
-        return Err(ServeError::Running(path.into()));
-    }
-    if let Some(folder) = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-    {
-        create_private_folder(folder).map_err(failed)?;
-    }
-    match std::fs::symlink_metadata(path) {
-        Ok(found) if std::os::unix::fs::FileTypeExt::is_socket(&found.file_type()) => {
-            std::fs::remove_file(path).map_err(failed)?;
-        }
-        Ok(_) => return Err(failed(io::ErrorKind::AlreadyExists.into())),
-        Err(_) => {}
-    }
-    let listener = UnixListener::bind(path).map_err(failed)?;
-    std::fs::set_permissions(path, Permissions::from_mode(SOCKET_MODE)).map_err(failed)?;
-    Ok(listener)
-}
-
-/// A folder that only this user may enter. One that exists is left as it is.
-fn create_private_folder(folder: &Path) -> io::Result<()> {
-    use std::os::unix::fs::DirBuilderExt;
-    if folder.is_dir() {
-        return Ok(());
-    }
-    std::fs::DirBuilder::new()
-        .recursive(true)
-        .mode(0o700)
-        .create(folder)
-}
-
 async fn listen_tcp(address: SocketAddr) -> Result<TcpListener, ServeError> {
     let listener = TcpListener::bind(address).await;
     listener.map_err(|why| ServeError::Address { address, why })
 }
 
-/// The token of this start, in a file that only this user may read. Without TCP there is none.
-fn token(options: &ServeOptions) -> Result<(Option<Secret>, Option<PathBuf>), ServeError> {
-    if options.listen.is_none() {
-        return Ok((None, None));
-    }
-    let system = |error: String| ServeError::System(error);
-    let secret = Secret::random().map_err(|error| system(error.to_string()))?;
-    let path = options.socket.with_extension("token");
-    write_atomic(&path, secret.reveal()).map_err(|error| system(error.to_string()))?;
-    let private = std::fs::set_permissions(&path, Permissions::from_mode(0o640));
-    private.map_err(|error| system(error.to_string()))?;
-    Ok((Some(secret), Some(path)))
+/// The token of this start, also in a file that only this user may read.
+fn new_token(own: &mut Ownership) -> Result<Secret, ServeError> {
+    let token = Secret::random().map_err(|error| ServeError::System(error.to_string()))?;
+    own.write_token(&token)?;
+    Ok(token)
 }
 
-fn page_address(listener: &TcpListener, token: Option<&Secret>) -> String {
-    let address = listener
-        .local_addr()
-        .map_or(String::new(), |address| address.to_string());
-    let token = token.map_or(String::new(), |token| format!("#token={}", token.reveal()));
-    format!("http://{address}/{token}")
+/// The address of the page, without the token.
+fn page_address(listener: &TcpListener) -> String {
+    let address = listener.local_addr();
+    address.map_or(String::new(), |address| format!("http://{address}/"))
 }
 
 /// Why the daemon started; recovers what a crash has cut off.

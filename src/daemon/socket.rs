@@ -12,12 +12,16 @@ pub const TICKET_VARIABLE: &str = "BENCH_TICKET";
 /// The socket of a daemon that the system started.
 const SYSTEM_SOCKET: &str = "/run/bench/bench.sock";
 
-/// The socket of this user's daemon: `BENCH_SOCKET`, or `bench.sock` in the runtime folder of the user, or a folder of the user in
-/// the folder for temporary files.
+/// The socket of this user's daemon: `BENCH_SOCKET`, or [`default_socket`].
 pub fn own_socket() -> PathBuf {
-    if let Some(path) = std::env::var_os(SOCKET_VARIABLE) {
-        return path.into();
+    match std::env::var_os(SOCKET_VARIABLE) {
+        Some(path) => path.into(),
+        None => default_socket(),
     }
+}
+
+/// `bench.sock` in the runtime folder of the user, or in a folder of the user in the folder for temporary files.
+pub fn default_socket() -> PathBuf {
     match std::env::var_os("XDG_RUNTIME_DIR") {
         Some(folder) => PathBuf::from(folder).join("bench.sock"),
         None => std::env::temp_dir()

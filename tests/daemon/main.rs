@@ -8,6 +8,7 @@ mod foxglove;
 mod full_disk;
 mod interface;
 mod listener;
+mod ownership;
 mod peer;
 mod queue;
 mod same_command;

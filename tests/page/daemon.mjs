@@ -1,7 +1,7 @@
 // A daemon on the simulated stage for a test, and a browser.
 
 import { spawn } from "node:child_process";
-import { mkdtempSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { chromium } from "playwright-core";
@@ -27,15 +27,17 @@ export class Daemon {
       cwd: this.folder, env: { ...process.env, BENCH_SOCKET: join(this.folder, "bench.sock") }, stdio: ["ignore", "pipe", "inherit"],
     });
     this.ended = new Promise((done) => this.process.once("exit", done));
-    this.url = await new Promise((found, failed) => {
+    const address = await new Promise((found, failed) => {
       let text = "";
       this.process.stdout.on("data", (piece) => {
         text += piece;
-        const address = /http:\/\/\S+/.exec(text);
-        if (address) found(address[0]);
+        const printed = /http:\/\/\S+/.exec(text);
+        if (printed) found(printed[0]);
       });
       this.process.once("exit", () => failed(new Error(`the daemon has ended: ${text}`)));
     });
+    // The token is printed on a terminal only.
+    this.url = `${address}#token=${readFileSync(join(this.folder, "bench.token"), "utf8")}`;
     this.port = new URL(this.url).port;
   }
 

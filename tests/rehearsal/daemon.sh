@@ -39,7 +39,7 @@ end() {
   echo $? >"$1.serve.code"
   echo "$begun $(uptime_s)" >"$1.serve.times"
   sleep 1
-  { pgrep -fa 'bench (serve|control|chirp)'; ls "$BENCH_SOCKET"; ls recordings/.bench-daemon.json; } >"$1.serve.left" 2>/dev/null
+  { pgrep -fa 'bench (serve|control|chirp)'; ls "$BENCH_SOCKET"; ls recordings/.bench-daemon.lock; } >"$1.serve.left" 2>/dev/null
 }
 
 # newest NAME: stores the name of the newest recording.
