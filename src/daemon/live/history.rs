@@ -13,11 +13,27 @@ const FRAME_BLOCKS: u64 = 512;
 /// Kept time in seconds.
 const KEPT_S: f64 = 600.0;
 
-/// Frames of blocks, oldest first.
+/// Frames of blocks, oldest first. Those that are complete are encoded once: all clients share them.
 #[derive(Default)]
 pub(super) struct History {
-    closed: VecDeque<Frame>,
+    closed: VecDeque<Closed>,
     open: Option<Frame>,
+}
+
+/// A complete frame.
+struct Closed {
+    /// End of its last tick in seconds since the daemon started.
+    end_s: f64,
+    message: Bytes,
+}
+
+impl From<Frame> for Closed {
+    fn from(frame: Frame) -> Closed {
+        Closed {
+            end_s: frame.end_s(),
+            message: frame.encode().into(),
+        }
+    }
 }
 
 impl History {
@@ -25,7 +41,7 @@ impl History {
     pub(super) fn push(&mut self, sample: Sample, time_s: f64, tick_s: f64, run: u32) {
         let is_next = |frame: &Frame| frame.continues(time_s, run) && !is_full(frame);
         if !self.open.as_ref().is_some_and(is_next) {
-            self.closed.extend(self.open.take());
+            self.closed.extend(self.open.take().map(Closed::from));
             self.forget_before(time_s - KEPT_S);
         }
         self.open
@@ -37,7 +53,7 @@ impl History {
         while self
             .closed
             .front()
-            .is_some_and(|frame| frame.end_s() < time_s)
+            .is_some_and(|frame| frame.end_s < time_s)
         {
             self.closed.pop_front();
         }
@@ -45,8 +61,9 @@ impl History {
 
     /// Everything as messages, oldest first.
     pub(super) fn encode(&self) -> Vec<Bytes> {
-        let frames = self.closed.iter().chain(&self.open);
-        frames.map(|frame| frame.encode().into()).collect()
+        let closed = self.closed.iter().map(|frame| frame.message.clone());
+        let open = self.open.iter().map(|frame| frame.encode().into());
+        closed.chain(open).collect()
     }
 }
 
