@@ -16,7 +16,7 @@ use super::http_client::{Ask, HttpError, Target, download, json};
 use super::private_files::{folder_of, require_private_folder};
 use super::run_entry::RunRequest;
 use super::schedule::StopKind;
-use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
+use super::session_messages::{FromCommand, FromDaemon, MAX_MESSAGE_BYTES, OpenCommand};
 use super::socket::{TICKET_VARIABLE, default_socket, sockets};
 use crate::experiment::{
     ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
@@ -286,6 +286,7 @@ impl Connection {
     fn send(&mut self, message: &FromCommand) -> Result<(), ExperimentError> {
         let text = serde_json::to_string(message)
             .map_err(|error| lost(&self.socket, &error.to_string()))?;
+        require_size(&text)?;
         let sent = self.runtime.block_on(self.stream.send(Message::text(text)));
         sent.map_err(|error| lost(&self.socket, &error.to_string()))
     }
@@ -334,6 +335,17 @@ fn require_text(folder: &Path) -> Result<(), RemoteError> {
         error: ErrorObject::new(message, ErrorKind::Usage, Some("--out".into())),
         is_failure: false,
     })
+}
+
+/// The daemon closes the connection of a command that sends more.
+fn require_size(message: &str) -> Result<(), RemoteError> {
+    if message.len() <= MAX_MESSAGE_BYTES {
+        return Ok(());
+    }
+    Err(RemoteError::failed(format!(
+        "what the command sends to the daemon has {} bytes, and the daemon takes at most {MAX_MESSAGE_BYTES}; shorten the reference, or add --connect none",
+        message.len()
+    )))
 }
 
 fn lost(socket: &Path, why: &str) -> ExperimentError {

@@ -13,6 +13,10 @@ use super::schedule::StopKind;
 use crate::experiment::{RemoteError, RunOrder, RunReport};
 use crate::recording::Totals;
 
+/// Largest message of a command in bytes. The largest parts of a message are the text of a reference (some 20 bytes a tick) and the
+/// responses in the results (some 100 bytes a frequency).
+pub const MAX_MESSAGE_BYTES: usize = 16 << 20;
+
 /// From the command to the daemon.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use tokio::sync::broadcast::Receiver;
 use tokio::sync::broadcast::error::RecvError;
-use tokio::time::{Interval, MissedTickBehavior, interval};
+use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 
 use super::error::ApiError;
 use super::extract::InQuery;
@@ -27,11 +27,20 @@ use crate::daemon::live::hub::LiveMessage;
 use crate::daemon::live::response::ResponseView;
 use crate::daemon::peer::Peer;
 use crate::daemon::session;
+use crate::daemon::session_messages::MAX_MESSAGE_BYTES;
 use crate::daemon::shared::Daemon;
 use crate::experiment::ErrorKind;
 
 /// Time between two states.
 const STATE: Duration = Duration::from_millis(200);
+/// Largest message of a viewer, also of one that has not ended. Nothing is expected of it.
+const VIEWER_BYTES: usize = 1 << 10;
+/// Shortest time between two messages of a viewer that are read.
+const VIEWER_PAUSE: Duration = Duration::from_millis(20);
+/// Buffer for what a client sends.
+const READ_BYTES: usize = 4 << 10;
+/// Largest message to a client that waits until the client takes it. A state with a full queue of long commands is smaller.
+const MAX_WAITING_BYTES: usize = 16 << 20;
 /// A client that takes no message for this long is disconnected.
 const PATIENCE: Duration = Duration::from_secs(20);
 
@@ -79,12 +88,22 @@ pub async fn web_socket(
     InQuery(query): InQuery<LiveQuery>,
     NoApi(upgrade): NoApi<Upgrade>,
 ) -> Result<Response, ApiError> {
-    let upgrade = upgrade.map_err(no_web_socket)?;
+    let upgrade = limited(upgrade.map_err(no_web_socket)?, VIEWER_BYTES);
     Ok(upgrade.on_upgrade(move |socket| serve(daemon, socket, query)))
 }
 
 /// The request for a WebSocket, or why it is none.
 type Upgrade = Result<WebSocketUpgrade, WebSocketUpgradeRejection>;
+
+/// A WebSocket that closes if its client sends a message, or a part of one, of more than `bytes`.
+fn limited(upgrade: WebSocketUpgrade, bytes: usize) -> WebSocketUpgrade {
+    upgrade
+        .max_message_size(bytes)
+        .max_frame_size(bytes)
+        .read_buffer_size(READ_BYTES)
+        .write_buffer_size(0)
+        .max_write_buffer_size(MAX_WAITING_BYTES)
+}
 
 fn no_web_socket(rejection: WebSocketUpgradeRejection) -> ApiError {
     let message = format!(
@@ -104,12 +123,13 @@ pub async fn command(
     NoApi(Extension(peer)): NoApi<Extension<Peer>>,
     NoApi(upgrade): NoApi<Upgrade>,
 ) -> Result<Response, ApiError> {
-    let upgrade = upgrade.map_err(no_web_socket)?;
+    let upgrade = limited(upgrade.map_err(no_web_socket)?, MAX_MESSAGE_BYTES);
     Ok(upgrade.on_upgrade(move |socket| session::serve(daemon, socket, peer)))
 }
 
 async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {
     let mut source = Source::new(Arc::clone(&daemon));
+    let mut read_at = Instant::now();
     for message in first_messages(&daemon, &query) {
         if send(&mut socket, message).await.is_err() {
             return;
@@ -118,9 +138,12 @@ async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {
     loop {
         let message = tokio::select! {
             message = source.next() => message,
-            received = socket.recv() => match received {
+            received = receive_after(&mut socket, read_at) => match received {
                 Some(Ok(Message::Close(_)) | Err(_)) | None => return,
-                Some(Ok(_)) => continue, // nothing is expected of a viewer
+                Some(Ok(_)) => {
+                    read_at = Instant::now() + VIEWER_PAUSE;
+                    continue; // nothing is expected of a viewer
+                }
             },
         };
         let Some(message) = message else { return };
@@ -130,19 +153,32 @@ async fn serve(daemon: Arc<Daemon>, mut socket: WebSocket, query: LiveQuery) {
     }
 }
 
-/// What a client gets that was sent before it connected.
-fn first_messages(daemon: &Daemon, query: &LiveQuery) -> Vec<Message> {
+/// The next message of a client, not before a time.
+async fn receive_after(
+    socket: &mut WebSocket,
+    time: Instant,
+) -> Option<Result<Message, axum::Error>> {
+    tokio::time::sleep_until(time).await;
+    socket.recv().await
+}
+
+/// What a client gets that was sent before it connected. Each message is made when the client has taken the one before.
+fn first_messages(daemon: &Daemon, query: &LiveQuery) -> impl Iterator<Item = Message> + use<> {
     let history = match query.history {
         true => daemon.live.history(),
         false => Vec::new(),
     };
     let snapshot = daemon.live.snapshot();
-    let events = snapshot.events.iter();
-    let events = events.map(|event| text(&TextMessage::Event { event }));
-    let response = snapshot.response.iter();
-    let response = response.map(|response| text(&TextMessage::Response { response }));
+    let events = snapshot.events.into_iter();
+    let events = events.map(|event| text(&TextMessage::Event { event: &event }));
+    let response = snapshot.response.into_iter();
+    let response = response.map(|response| {
+        text(&TextMessage::Response {
+            response: &response,
+        })
+    });
     let history = history.into_iter().map(Message::Binary);
-    history.chain(events).chain(response).collect()
+    history.chain(events).chain(response)
 }
 
 /// Fails when the client is gone, or takes nothing for too long.
