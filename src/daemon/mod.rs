@@ -4,6 +4,7 @@ mod api;
 mod catalogue;
 pub mod client;
 mod connections;
+mod descriptors;
 mod dispatch;
 #[cfg(feature = "foxglove")]
 mod foxglove;
@@ -17,6 +18,8 @@ mod ownership;
 mod page;
 mod peer;
 mod private_files;
+mod places;
+mod reserve;
 mod run_entry;
 mod run_record;
 mod same_rig;

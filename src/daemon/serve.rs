@@ -13,6 +13,7 @@ use tokio::net::{TcpListener, UnixListener};
 use super::api::guard::{Guard, guard};
 use super::api::{Reach, router};
 use super::connections::{serve_tcp, serve_unix};
+use super::descriptors::Capacity;
 use super::dispatch;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
@@ -189,14 +190,15 @@ fn spawn_tasks(
     tcp: Option<&TcpListener>,
     token: Option<&Secret>,
 ) -> Result<Tasks, ServeError> {
+    let capacity = Capacity::of_process();
     let local = router(Arc::clone(daemon), Reach::Machine);
     let mut tasks = vec![
         tokio::spawn(dispatch::serve(Arc::clone(daemon))),
         tokio::spawn(watch_loop(Arc::clone(daemon))),
-        tokio::spawn(serve_unix(unix, local)),
+        tokio::spawn(serve_unix(unix, local, capacity)),
     ];
     if let (Some(listener), Some(token)) = (tcp, token) {
-        tasks.push(spawn_tcp(daemon, listener, token)?);
+        tasks.push(spawn_tcp(daemon, listener, token, capacity)?);
     }
     Ok(Tasks(tasks))
 }
@@ -205,6 +207,7 @@ fn spawn_tcp(
     daemon: &Arc<Daemon>,
     listener: &TcpListener,
     token: &Secret,
+    capacity: Capacity,
 ) -> Result<tokio::task::JoinHandle<()>, ServeError> {
     let system = |error: io::Error| ServeError::System(error.to_string());
     let address = listener.local_addr().map_err(system)?;
@@ -216,7 +219,7 @@ fn spawn_tcp(
         .map_err(system)?;
     let own = std::net::TcpListener::from(own);
     let listener = TcpListener::from_std(own).map_err(system)?;
-    Ok(tokio::spawn(serve_tcp(listener, remote)))
+    Ok(tokio::spawn(serve_tcp(listener, remote, capacity)))
 }
 
 /// Tells systemd that all is well, as long as ticks pass.

@@ -4,7 +4,7 @@ use aide::OperationOutput;
 use aide::generate::GenContext;
 use aide::openapi::{Operation, Response as Described};
 use axum::Json;
-use axum::http::StatusCode;
+use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -18,7 +18,12 @@ use crate::experiment::{ErrorKind, ErrorObject};
 pub struct ApiError {
     status: StatusCode,
     object: ErrorObject,
+    /// Whether the same request may succeed soon.
+    is_busy: bool,
 }
+
+/// When a client asks again after it was refused because others are served.
+const RETRY_AFTER_S: u32 = 5;
 
 /// The body of an error.
 #[derive(Debug, Serialize, JsonSchema)]
@@ -42,6 +47,15 @@ impl ApiError {
         ApiError {
             status,
             object: ErrorObject::new(message.into(), kind, None),
+            is_busy: false,
+        }
+    }
+
+    /// A request that cannot be served now.
+    pub fn busy(status: StatusCode, message: impl Into<String>) -> ApiError {
+        ApiError {
+            is_busy: true,
+            ..ApiError::new(status, ErrorKind::Failed, message)
         }
     }
 
@@ -83,6 +97,7 @@ impl ApiError {
             Ok(object) => ApiError {
                 status: StatusCode::UNPROCESSABLE_ENTITY,
                 object,
+                is_busy: false,
             },
             Err(_) => ApiError::refused(
                 ErrorKind::Failed,
@@ -116,11 +131,9 @@ impl From<ArgsError> for ApiError {
 impl From<ComputeError> for ApiError {
     fn from(error: ComputeError) -> ApiError {
         match error {
-            ComputeError::Busy => ApiError::new(
-                StatusCode::TOO_MANY_REQUESTS,
-                ErrorKind::Usage,
-                error.to_string(),
-            ),
+            ComputeError::Busy => {
+                ApiError::busy(StatusCode::TOO_MANY_REQUESTS, error.to_string())
+            }
             ComputeError::Start(_) | ComputeError::TooLong | ComputeError::NoResult(_) => {
                 ApiError::refused(ErrorKind::Failed, error.to_string())
             }
@@ -132,7 +145,11 @@ impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let object = self.object;
         let body = serde_json::json!({ "error": object });
-        (self.status, Json(body)).into_response()
+        let retry_after = self.is_busy.then(|| HeaderValue::from(RETRY_AFTER_S));
+        let mut response = (self.status, Json(body)).into_response();
+        let headers = response.headers_mut();
+        headers.extend(retry_after.map(|value| (header::RETRY_AFTER, value)));
+        response
     }
 }
 

@@ -1,13 +1,15 @@
 //! Parts of a request; what cannot be read is answered with an error object.
 
 use std::convert::Infallible;
+use std::net::{IpAddr, SocketAddr};
 use std::time::Duration;
 
 use aide::OperationInput;
 use aide::generate::GenContext;
 use aide::openapi::{Operation, ReferenceOr};
 use axum::Json;
-use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
+use axum::body::Body as HttpBody;
+use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::StatusCode;
 use axum::http::request::Parts;
 use bytes::Bytes;
@@ -21,6 +23,11 @@ use crate::experiment::ErrorKind;
 
 /// Longest time in which a client sends its body.
 const BODY_TIME: Duration = Duration::from_secs(10);
+
+/// Longest time in which the body of a stop arrives.
+const STOP_BODY_TIME: Duration = Duration::from_secs(2);
+/// Largest body of a stop: anyone may send one.
+const MAX_STOP_BYTES: usize = 1 << 10;
 
 /// A JSON body.
 pub struct Body<T>(pub T);
@@ -88,20 +95,38 @@ pub struct Stop {
     how: StopKind,
 }
 
-/// How a run is stopped. A stop is never refused because of its body: without a body, or with one that cannot be read, it settles.
-pub struct StopBody(pub StopKind);
+/// The body of a stop. It says how to stop; it is not read before the stop has begun.
+pub struct StopBody(HttpBody);
 
-impl<S: Send + Sync> FromRequest<S> for StopBody {
-    type Rejection = Infallible;
+impl StopBody {
+    /// Stops when the head of the request has arrived, whatever follows it: `stop` is called to settle at once, and once more if the
+    /// body says `cut`. Without a body, or with one that cannot be read, it settles. Returns the result of the first call, and how the
+    /// bench was stopped.
+    pub async fn carry_out<T>(self, mut stop: impl FnMut(StopKind) -> T) -> (T, StopKind) {
+        let stopped = stop(StopKind::Settle);
+        let how = self.how().await;
+        if how == StopKind::Cut {
+            stop(how);
+        }
+        (stopped, how)
+    }
 
-    async fn from_request(request: Request, state: &S) -> Result<Self, Infallible> {
-        let read = Bytes::from_request(request, state);
-        let body = match tokio::time::timeout(BODY_TIME, read).await {
+    async fn how(self) -> StopKind {
+        let read = axum::body::to_bytes(self.0, MAX_STOP_BYTES);
+        let body = match tokio::time::timeout(STOP_BODY_TIME, read).await {
             Ok(Ok(body)) => body,
             Ok(Err(_)) | Err(_) => Bytes::new(),
         };
         let stop: Stop = serde_json::from_slice(&body).unwrap_or_default();
-        Ok(StopBody(stop.how))
+        stop.how
+    }
+}
+
+impl<S: Send + Sync> FromRequest<S> for StopBody {
+    type Rejection = Infallible;
+
+    async fn from_request(request: Request, _state: &S) -> Result<Self, Infallible> {
+        Ok(StopBody(request.into_body()))
     }
 }
 
@@ -160,6 +185,20 @@ impl<T: JsonSchema> OperationInput for InQuery<T> {
     }
 }
 
+/// The address of the client; `None` on this machine.
+pub struct Client(pub Option<IpAddr>);
+
+impl<S: Send + Sync> FromRequestParts<S> for Client {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Infallible> {
+        let client = parts.extensions.get::<ConnectInfo<SocketAddr>>();
+        Ok(Client(client.map(|client| client.0.ip())))
+    }
+}
+
+impl OperationInput for Client {}
+
 /// The header `Bench-Lease`; empty if it is absent.
 pub struct LeaseHeader(pub String);
 
@@ -200,5 +239,53 @@ impl OperationInput for LeaseHeader {
             style: aide::openapi::HeaderStyle::Simple,
         };
         aide::operation::add_parameters(context, operation, [parameter]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::RefCell;
+    use std::pin::pin;
+
+    use futures_util::{FutureExt, stream};
+    use tokio::sync::mpsc::{UnboundedReceiver, unbounded_channel};
+
+    use super::*;
+
+    async fn next(
+        mut parts: UnboundedReceiver<&'static str>,
+    ) -> Option<(
+        Result<&'static str, Infallible>,
+        UnboundedReceiver<&'static str>,
+    )> {
+        let part = parts.recv().await?;
+        Some((Ok(part), parts))
+    }
+
+    #[tokio::test]
+    async fn stop_acts_before_its_body_has_arrived() {
+        for (body, expected) in [
+            ("{\"how\":\"cut\"}", StopKind::Cut),
+            ("{\"how\":", StopKind::Settle),
+            ("", StopKind::Settle),
+        ] {
+            let (sender, parts) = unbounded_channel();
+            let stop = StopBody(HttpBody::from_stream(stream::unfold(parts, next)));
+            let calls = RefCell::new(Vec::new());
+            let mut carried_out = pin!(stop.carry_out(|how| calls.borrow_mut().push(how)));
+            assert!(carried_out.as_mut().now_or_never().is_none());
+            assert_eq!(*calls.borrow(), [StopKind::Settle], "before the body");
+            sender.send(body).unwrap();
+            drop(sender);
+            assert_eq!(carried_out.await.1, expected, "{body}");
+            assert_eq!(calls.borrow().last(), Some(&expected));
+        }
+    }
+
+    #[tokio::test]
+    async fn long_body_of_a_stop_is_not_read() {
+        let long = " ".repeat(MAX_STOP_BYTES) + "{\"how\":\"cut\"}";
+        let stop = StopBody(HttpBody::from(long));
+        assert_eq!(stop.carry_out(|_| ()).await.1, StopKind::Settle);
     }
 }

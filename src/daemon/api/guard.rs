@@ -16,7 +16,7 @@ use crate::experiment::ErrorKind;
 /// Requests per second that all clients over TCP together may make in the long run, and at once.
 const RATE_PER_S: f64 = 500.0;
 const BURST: f64 = 1000.0;
-/// The request that needs no token: anyone may stop.
+/// The request that needs neither a token nor a place: anyone may stop.
 const STOP_PATH: &str = "/api/v1/stop";
 
 /// The guard of one TCP address.
@@ -62,7 +62,7 @@ impl Guard {
 
     fn check(&self, method: &Method, path: &str, headers: &HeaderMap) -> Result<(), ApiError> {
         // A stop is never refused because of other requests, nor for want of a token.
-        let is_stop = method == Method::POST && path == STOP_PATH;
+        let is_stop = is_stop(method, path);
         let mut bucket = self.tokens.lock().unwrap_or_else(PoisonError::into_inner);
         if !bucket.take(Instant::now()) && !is_stop {
             let message =
@@ -121,6 +121,20 @@ impl Guard {
             )),
         }
     }
+}
+
+fn is_stop(method: &Method, path: &str) -> bool {
+    method == Method::POST && path == STOP_PATH
+}
+
+/// Refuses every request but a stop, on a connection for which there is no other place.
+pub async fn only_stop(request: Request, next: Next) -> Response {
+    if is_stop(request.method(), request.uri().path()) {
+        return next.run(request).await;
+    }
+    let message =
+        "the daemon has too many connections; close some of them, or wait. Only a stop is served";
+    ApiError::busy(StatusCode::SERVICE_UNAVAILABLE, message).into_response()
 }
 
 fn text(headers: &HeaderMap, name: header::HeaderName) -> Option<&str> {

@@ -108,14 +108,17 @@ async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<
 pub async fn stop(
     State(daemon): State<Arc<Daemon>>,
     InPath(RunId { id }): InPath<RunId>,
-    StopBody(how): StopBody,
+    body: StopBody,
 ) -> Result<Json<RunView>, ApiError> {
-    let view = daemon.change(|schedule, now| {
-        schedule.stop(id, how, now)?;
-        schedule.entry(id).map(RunView::from)
-    })?;
+    let stop = |how| {
+        daemon.change(|schedule, now| {
+            schedule.stop(id, how, now)?;
+            schedule.entry(id).map(RunView::from)
+        })
+    };
+    let (view, how) = body.carry_out(stop).await;
     tracing::warn!(run = id, ?how, "the run was stopped by a client");
-    Ok(Json(view))
+    Ok(Json(view?))
 }
 
 /// What was stopped.
@@ -128,8 +131,9 @@ pub struct Stopped {
 }
 
 /// Stops whatever runs. Needs neither lease nor token.
-pub async fn stop_all(State(daemon): State<Arc<Daemon>>, StopBody(how): StopBody) -> Json<Stopped> {
-    let run = daemon.change(|schedule, _| schedule.stop_current(how));
+pub async fn stop_all(State(daemon): State<Arc<Daemon>>, body: StopBody) -> Json<Stopped> {
+    let stop = |how| daemon.change(|schedule, _| schedule.stop_current(how));
+    let (run, how) = body.carry_out(stop).await;
     tracing::warn!(run, ?how, "a client stopped the bench");
     Json(Stopped { run, how })
 }
