@@ -1,7 +1,11 @@
 //! The recordings in the folder of the daemon, with their data: operator, name, note, verdict. The data of a recording are in a small file
 //! beside it, `NAME.info.json`.
+//!
+//! Only regular files of the folder itself belong to it: neither links, which may point anywhere, nor hidden files.
 
+use std::fs::{DirEntry, File};
 use std::io;
+use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
@@ -9,6 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::util::atomic_file::write_atomic;
+use crate::util::input_file::read_open;
 use crate::util::timestamp::unix_ns;
 
 /// Data of a recording that are not in it.
@@ -57,6 +62,8 @@ const EXTENSION: &str = "mcap";
 const INFO: &str = ".info.json";
 /// Extensions of files that may be downloaded.
 const DOWNLOADS: [&str; 6] = ["mcap", "csv", "svg", "html", "json", "toml"];
+/// Largest file with the data of a recording: name and note have at most some thousand characters.
+const MAX_INFO_BYTES: u64 = 64 << 10;
 
 impl Catalogue {
     /// The recordings of a folder.
@@ -70,10 +77,7 @@ impl Catalogue {
     /// When the folder cannot be read.
     pub fn list(&self) -> io::Result<Vec<ListedRecording>> {
         let entries: io::Result<Vec<_>> = std::fs::read_dir(&self.folder)?.collect();
-        let names: Vec<String> = entries?
-            .iter()
-            .filter_map(|entry| entry.file_name().into_string().ok())
-            .collect();
+        let names: Vec<String> = entries?.iter().filter_map(name_of_file).collect();
         let recordings = names.iter().filter(|name| is_recording(name));
         let listed = recordings.filter_map(|name| self.listed(name, &names));
         let mut listed: Vec<ListedRecording> = listed.collect();
@@ -87,7 +91,7 @@ impl Catalogue {
 
     /// A recording that was removed in the meantime is left out.
     fn listed(&self, file: &str, names: &[String]) -> Option<ListedRecording> {
-        let metadata = std::fs::metadata(self.folder.join(file)).ok()?;
+        let metadata = std::fs::symlink_metadata(self.folder.join(file)).ok()?;
         let changed = metadata.modified().unwrap_or(SystemTime::UNIX_EPOCH);
         let stem = stem(file);
         let others = names
@@ -103,12 +107,33 @@ impl Catalogue {
         })
     }
 
-    /// The path of a file that may be downloaded; `None` for other names.
+    /// The path of a file that may be downloaded; `None` for other names, and for what is not a regular file.
     pub fn path(&self, file: &str) -> Option<PathBuf> {
+        let path = self.named(file)?;
+        let found = std::fs::symlink_metadata(&path);
+        found.is_ok_and(|found| found.is_file()).then_some(path)
+    }
+
+    /// Opens a file that may be downloaded; `None` for what [`path`](Self::path) does not name.
+    ///
+    /// # Errors
+    /// Those of the file system.
+    pub fn open(&self, file: &str) -> io::Result<Option<File>> {
+        let Some(path) = self.named(file) else {
+            return Ok(None);
+        };
+        match open_regular(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+            opened => opened,
+        }
+    }
+
+    /// The path of a file with a name that may be downloaded.
+    fn named(&self, file: &str) -> Option<PathBuf> {
         let is_name = Path::new(file).file_name().is_some_and(|name| name == file);
         let extension = Path::new(file).extension()?.to_str()?;
-        let path = self.folder.join(file);
-        (is_name && DOWNLOADS.contains(&extension) && path.is_file()).then_some(path)
+        let is_public = is_name && !is_hidden(file) && DOWNLOADS.contains(&extension);
+        is_public.then(|| self.folder.join(file))
     }
 
     /// The path of a recording.
@@ -118,8 +143,15 @@ impl Catalogue {
 
     /// What is known about a recording; nothing if its file is missing or cannot be read.
     pub fn info(&self, file: &str) -> RecordingInfo {
-        let text = std::fs::read(self.info_path(file)).unwrap_or_default();
-        serde_json::from_slice(&text).unwrap_or_default()
+        let opened = open_regular(&self.info_path(file)).ok().flatten();
+        let text = opened.and_then(|file| read_open(&file, MAX_INFO_BYTES).ok());
+        serde_json::from_slice(&text.unwrap_or_default()).unwrap_or_default()
+    }
+
+    /// Whether a path in the folder, with all links that it follows, leaves the folder. One that does not exist does not.
+    pub fn leaves(&self, path: &str) -> bool {
+        let found = self.folder.join(path).canonicalize();
+        found.is_ok_and(|found| !found.starts_with(&self.folder))
     }
 
     /// Stores what is known about a recording.
@@ -150,6 +182,29 @@ impl Catalogue {
     fn info_path(&self, file: &str) -> PathBuf {
         self.folder.join(format!("{}{INFO}", stem(file)))
     }
+}
+
+/// Opens a regular file for reading; `None` for everything else. A link is not followed, and a FIFO is not waited for.
+fn open_regular(path: &Path) -> io::Result<Option<File>> {
+    let flags = libc::O_NOFOLLOW | libc::O_NONBLOCK;
+    let opened = File::options().read(true).custom_flags(flags).open(path);
+    match opened {
+        Ok(file) => Ok(file.metadata()?.is_file().then_some(file)),
+        // A link; a socket or a device without a driver.
+        Err(error) if matches!(error.raw_os_error(), Some(libc::ELOOP | libc::ENXIO)) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// The name of a regular file that is not hidden.
+fn name_of_file(entry: &DirEntry) -> Option<String> {
+    let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+    let name = entry.file_name().into_string().ok()?;
+    (is_file && !is_hidden(&name)).then_some(name)
+}
+
+fn is_hidden(file: &str) -> bool {
+    file.starts_with('.')
 }
 
 fn is_recording(file: &str) -> bool {
@@ -212,6 +267,61 @@ mod tests {
             assert_eq!(catalogue.path(name), None, "{name}");
         }
         assert!(catalogue.path("a.mcap").is_some());
+    }
+
+    #[test]
+    fn links_and_hidden_files_do_not_belong_to_the_folder() {
+        let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let inside = |name: &str| folder.path().join(name);
+        let secret = outside.path().join("secret.mcap");
+        std::fs::write(&secret, r#"{"note":"secret"}"#).unwrap();
+        std::fs::write(inside(".bench-daemon.json"), "{}").unwrap();
+        std::fs::write(inside(".hidden.mcap"), "x").unwrap();
+        std::fs::write(inside("a.mcap"), "x").unwrap();
+        for name in ["link.mcap", "link.csv", "a.info.json", "a.csv"] {
+            std::os::unix::fs::symlink(&secret, inside(name)).unwrap();
+        }
+        std::os::unix::fs::symlink("a.mcap", inside("inner.mcap")).unwrap();
+        nix::unistd::mkfifo(&inside("fifo.mcap"), nix::sys::stat::Mode::S_IRUSR).unwrap();
+        std::fs::create_dir(inside("folder.mcap")).unwrap();
+        let catalogue = Catalogue::new(folder.path().into());
+        for name in [
+            ".bench-daemon.json",
+            ".hidden.mcap",
+            "link.mcap",
+            "link.csv",
+            "inner.mcap",
+            "fifo.mcap",
+            "folder.mcap",
+        ] {
+            assert_eq!(catalogue.path(name), None, "{name}");
+            assert!(catalogue.open(name).unwrap().is_none(), "{name}");
+        }
+        assert!(catalogue.open("a.mcap").unwrap().is_some());
+        let listed = catalogue.list().unwrap();
+        let [only] = &listed[..] else {
+            panic!("{listed:?}")
+        };
+        assert_eq!((only.file.as_str(), only.files.len()), ("a.mcap", 0));
+        assert_eq!(only.info, RecordingInfo::default());
+    }
+
+    #[test]
+    fn links_of_an_argument_are_followed_inside_only() {
+        let (folder, outside) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let inside = |name: &str| folder.path().join(name);
+        std::fs::write(inside("own.csv"), "x").unwrap();
+        std::fs::write(outside.path().join("x.csv"), "x").unwrap();
+        std::os::unix::fs::symlink("own.csv", inside("inner.csv")).unwrap();
+        std::os::unix::fs::symlink(outside.path(), inside("out")).unwrap();
+        std::os::unix::fs::symlink("out/x.csv", inside("chain.csv")).unwrap();
+        let catalogue = Catalogue::new(folder.path().canonicalize().unwrap());
+        for name in ["own.csv", "inner.csv", "absent.csv", "", "0.1mm/s"] {
+            assert!(!catalogue.leaves(name), "{name}");
+        }
+        for name in ["out", "out/x.csv", "chain.csv"] {
+            assert!(catalogue.leaves(name), "{name}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Metrics in the text format of Prometheus [Prometheus, "Text-based format"]. All values are counted elsewhere; this is their text.
 
 use std::fmt::{Display, Write};
+use std::time::Duration;
 
 use super::live::status::EDGES_US;
 use super::shared::Daemon;
@@ -8,6 +9,8 @@ use crate::recording::free_bytes;
 use crate::rig::devices::CanAmplifier;
 use crate::rt::arming::State;
 
+/// Time in which the folder of the recordings answers.
+const FOLDER_TIME: Duration = Duration::from_secs(2);
 /// The media type of the text.
 pub const MEDIA_TYPE: &str = "text/plain; version=0.0.4; charset=utf-8";
 
@@ -51,7 +54,7 @@ impl Exposition {
 }
 
 /// The metrics at this moment.
-pub fn text(daemon: &Daemon) -> String {
+pub async fn text(daemon: &Daemon) -> String {
     let mut out = Exposition::default();
     let version = format!("version=\"{}\"", env!("CARGO_PKG_VERSION"));
     out.begin("bench_build_info", "gauge", "Version of the daemon.");
@@ -65,7 +68,10 @@ pub fn text(daemon: &Daemon) -> String {
         "1 if the run in progress, or the last one, cannot be recorded.",
         u8::from(defect.is_some()),
     );
-    if let Some(bytes) = free_bytes(&daemon.recordings) {
+    let folder = daemon.recordings.clone();
+    // Without an answer of the folder the metric is left out.
+    let free = daemon.files.run(move || free_bytes(&folder));
+    if let Ok(Ok(Some(bytes))) = tokio::time::timeout(FOLDER_TIME, free).await {
         let help = "Free space in the folder of the recordings.";
         out.gauge("bench_recording_free_bytes", help, bytes);
     }

@@ -3,9 +3,11 @@
 mod api;
 mod catalogue;
 pub mod client;
+mod computations;
 mod connections;
 mod descriptors;
 mod dispatch;
+mod files;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 pub mod http_client;

@@ -8,7 +8,7 @@ use axum::extract::ws::{Message, WebSocket};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{MissedTickBehavior, interval};
 
-use super::catalogue::RecordingInfo;
+use super::catalogue::{Catalogue, RecordingInfo};
 use super::live::hub::LiveRun;
 use super::owner::OwnerOrder;
 use super::peer::Peer;
@@ -235,7 +235,11 @@ impl Session {
         let (warnings, warned) = mpsc::unbounded_channel();
         let (reply, replied) = oneshot::channel();
         let progress = Progress::new(order.kind.name());
-        let plan = order.plan().ok().map(Arc::new);
+        let ordered = order.clone();
+        let plan = blocking(move || Ok(ordered.plan()?))
+            .await
+            .ok()
+            .map(Arc::new);
         let live_run = LiveRun {
             number: u32::try_from(self.id).unwrap_or(u32::MAX),
             kind: order.kind,
@@ -356,7 +360,7 @@ impl Session {
         if let Some(verdict) = verdict(&results) {
             self.daemon.count_verdict(&verdict);
         }
-        self.store_info(&run, &results);
+        store_info(self.info(&run, &results)).await;
         let finished = blocking(move || run.finish(&results).map_err(ExperimentError::from)).await;
         let message = match finished {
             Ok(totals) => FromDaemon::Finished(totals),
@@ -370,7 +374,7 @@ impl Session {
         let Some(mut run) = self.open_run.take() else {
             return;
         };
-        self.store_info(&run, "");
+        store_info(self.info(&run, "")).await;
         let completed = blocking(move || {
             let summary = RunSummary::of(&mut run)?;
             close(run, &summary)
@@ -380,32 +384,29 @@ impl Session {
         }
     }
 
-    /// Stores what is known about a recording in the folder of the daemon.
-    fn store_info(&self, run: &Run, results: &str) {
+    /// What is known about a recording; `None` if it is not in the folder of the daemon.
+    fn info(&self, run: &Run, results: &str) -> Option<KnownInfo> {
         let folder = run.path.parent();
         if folder != Some(self.daemon.recordings.as_path()) {
-            return;
+            return None;
         }
-        let Some(file) = run.path.file_name().and_then(|name| name.to_str()) else {
-            return;
-        };
-        let Ok(entry) = self
+        let file = run.path.file_name()?.to_str()?;
+        let entry = self
             .daemon
-            .read(|schedule| schedule.entry(self.id).cloned())
-        else {
-            return;
-        };
+            .read(|schedule| schedule.entry(self.id).cloned());
         let info = RecordingInfo {
-            command: entry.request.command.name().into(),
+            command: entry.ok()?.request.command.name().into(),
             operator: run.description.operator.clone().unwrap_or_default(),
             name: run.description.name.clone().unwrap_or_default(),
             note: run.description.note.clone().unwrap_or_default(),
             outcome: Some(Ending::from(&run.ended).name().into()),
             verdict: verdict(results),
         };
-        if let Err(error) = self.daemon.catalogue().set_info(file, &info) {
-            tracing::warn!("{file}: its note cannot be stored: {error}");
-        }
+        Some(KnownInfo {
+            catalogue: self.daemon.catalogue(),
+            file: file.into(),
+            info,
+        })
     }
 
     /// The connection has closed. A command that the daemon started ends with its process.
@@ -416,6 +417,31 @@ impl Session {
                 .change(|schedule, now| schedule.finish(id, outcome, None, now));
             self.daemon.owner.end_command();
         }
+    }
+}
+
+/// What is known about a recording of the daemon.
+struct KnownInfo {
+    catalogue: Catalogue,
+    file: String,
+    info: RecordingInfo,
+}
+
+impl KnownInfo {
+    fn store(&self) -> Result<(), ExperimentError> {
+        let stored = self.catalogue.set_info(&self.file, &self.info);
+        stored.map_err(|error| {
+            let file = &self.file;
+            ExperimentError::Failed(format!("{file}: its note cannot be stored: {error}"))
+        })
+    }
+}
+
+/// Stores what is known about a recording, if it is in the folder of the daemon.
+async fn store_info(known: Option<KnownInfo>) {
+    let Some(known) = known else { return };
+    if let Err(error) = blocking(move || known.store()).await {
+        tracing::warn!("{error}");
     }
 }
 

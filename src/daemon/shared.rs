@@ -6,9 +6,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Instant, SystemTime};
 
-use tokio::sync::{Semaphore, watch};
+use tokio::sync::watch;
 
 use super::catalogue::Catalogue;
+use super::computations::Computations;
+use super::files::Files;
 use super::live::hub::LiveHub;
 use super::output::RunOutput;
 use super::owner::Owner;
@@ -16,9 +18,6 @@ use super::schedule::{Now, Schedule};
 use crate::config::{Config, Source};
 use crate::experiment::Plan;
 use crate::util::timestamp::unix_ns;
-
-/// Computations that run at the same time. More of them would take the processor from the loop.
-pub const MAX_COMPUTATIONS: usize = 2;
 
 /// Commands whose output is kept.
 const KEPT_OUTPUTS: usize = 100;
@@ -51,7 +50,9 @@ pub struct Daemon {
     /// Open connections of commands.
     sessions: AtomicUsize,
     /// Places for computations that move nothing.
-    pub computations: Semaphore,
+    pub computations: Computations,
+    /// Calls of the file system for clients.
+    pub files: Files,
     /// Folder of the recordings.
     pub recordings: PathBuf,
     /// The socket of this daemon.
@@ -101,7 +102,8 @@ impl Daemon {
             plan: Mutex::new(None),
             verdicts: Mutex::default(),
             sessions: AtomicUsize::new(0),
-            computations: Semaphore::new(MAX_COMPUTATIONS),
+            computations: Computations::default(),
+            files: Files::default(),
             recordings: parts.recordings,
             socket: parts.socket,
             started_unix_s: now().unix_s,

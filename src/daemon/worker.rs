@@ -2,6 +2,7 @@
 
 use std::io;
 use std::path::Path;
+use std::pin::pin;
 use std::process::{ExitStatus, Output, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,10 +12,12 @@ use nix::unistd::Pid;
 use tokio::io::{AsyncRead, AsyncReadExt};
 use tokio::process::{Child, Command as Process};
 
+use super::catalogue::Catalogue;
+use super::computations::{Busy, Purpose};
 use super::output::{OutputPiece, RunOutput};
 use super::run_entry::{Command, RunRequest};
 use super::secret::Secret;
-use super::shared::{Daemon, MAX_COMPUTATIONS};
+use super::shared::Daemon;
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
 use crate::config::{Source, texts_of_set};
 use crate::experiment::option_in;
@@ -27,6 +30,8 @@ const END_TIME: Duration = Duration::from_secs(5);
 const MAX_ARGS: usize = 200;
 /// Longest arguments of a command together, in bytes.
 const MAX_ARG_BYTES: usize = 16 << 10;
+/// Exit code of a command that was stopped before its process began.
+const STOPPED: i32 = 1;
 
 /// Arguments that a client may not give.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -72,23 +77,41 @@ pub fn check_args(args: &[String]) -> Result<(), ArgsError> {
     Ok(())
 }
 
+/// Refuses arguments that leave the folder through a link. It asks the file system.
+///
+/// # Errors
+/// With the first argument that is refused.
+pub fn check_links(args: &[String], catalogue: &Catalogue) -> Result<(), ArgsError> {
+    let leaves = |arg: &&String| paths_in(arg).iter().any(|path| catalogue.leaves(path));
+    match args.iter().find(leaves) {
+        Some(arg) => Err(ArgsError::Outside(arg.clone())),
+        None => Ok(()),
+    }
+}
+
 /// Whether an argument may be a path that leaves the folder. Quantities such as `0.1mm/s` are not paths.
 fn is_outside(arg: &str) -> bool {
+    paths_in(arg).iter().any(|text| leaves_folder(text))
+}
+
+/// What may be a path in an argument.
+fn paths_in(arg: &str) -> Vec<String> {
     let after_option = match arg.strip_prefix("--") {
         Some(option) => option.split_once('=').map_or("", |(_, value)| value),
         None => arg,
     };
     let last = arg.rsplit('=').next().unwrap_or(arg);
-    let plain = [after_option, last].map(String::from);
-    let in_settings = texts_of_set(after_option);
-    plain
-        .iter()
-        .chain(&in_settings)
-        .any(|text| leaves_folder(text))
+    let mut texts = vec![after_option.to_string(), last.to_string()];
+    texts.extend(texts_of_set(after_option));
+    texts.iter().map(|text| plain_path(text)).collect()
 }
 
-fn leaves_folder(text: &str) -> bool {
-    let path = text.trim().trim_matches(['"', '\'']);
+/// A text without the quotation marks of TOML.
+fn plain_path(text: &str) -> String {
+    text.trim().trim_matches(['"', '\'']).into()
+}
+
+fn leaves_folder(path: &str) -> bool {
     let mut parts = Path::new(path).components();
     path.starts_with(['/', '~']) || parts.any(|part| part.as_os_str() == "..")
 }
@@ -146,7 +169,11 @@ pub async fn run(
     if command != Command::Identify {
         process.arg("--out").arg(&daemon.recordings);
     }
-    let mut child = process.spawn()?;
+    let stopped = pin!(stopped);
+    let Some((mut child, stopped)) = spawned(process, stopped).await? else {
+        output.add(OutputPiece::Exit(STOPPED));
+        return Ok(STOPPED);
+    };
     let stdout = child
         .stdout
         .take()
@@ -165,6 +192,19 @@ pub async fn run(
     let code = status.code().unwrap_or(1);
     output.add(OutputPiece::Exit(code));
     Ok(code)
+}
+
+/// Starts a process, unless it is stopped before. The process enters the folder of the recordings: if the folder does not answer, its
+/// start takes for ever.
+async fn spawned<S: Future<Output = ()> + Unpin>(
+    mut process: Process,
+    mut stopped: S,
+) -> io::Result<Option<(Child, S)>> {
+    let child = tokio::task::spawn_blocking(move || process.spawn());
+    tokio::select! {
+        child = child => Ok(Some((child??, stopped))),
+        () = &mut stopped => Ok(None), // a process that starts later is killed
+    }
 }
 
 /// Asks a process to end, and kills it if it does not.
@@ -207,11 +247,8 @@ pub enum ComputeError {
     #[error("the computation cannot be started: {0}; look at the limits of the daemon's processes")]
     Start(#[from] io::Error),
     /// Others go on.
-    #[error(
-        "{MAX_COMPUTATIONS} computations go on, and none of them ended within {} s; ask again later",
-        COMPUTATION.as_secs()
-    )]
-    Busy,
+    #[error(transparent)]
+    Busy(#[from] Busy),
     /// It takes too long.
     #[error("the computation took more than {} s; start it on the command line", COMPUTATION.as_secs())]
     TooLong,
@@ -226,13 +263,14 @@ pub enum ComputeError {
 /// When the process cannot be started, takes too long, or prints no object.
 pub async fn compute(
     daemon: &Daemon,
+    purpose: Purpose,
     command: &[&str],
     args: &[String],
 ) -> Result<serde_json::Value, ComputeError> {
     // In front of the others, so that none of them takes it as its value.
     let args = [&["--json".to_string()], args].concat();
-    let mut process = process(daemon, command, &args)?;
-    let output = printed(daemon, &mut process).await?;
+    let process = process(daemon, command, &args)?;
+    let output = printed(daemon, purpose, process).await?;
     serde_json::from_slice(&output.stdout).map_err(|_| ComputeError::of(&output))
 }
 
@@ -240,9 +278,14 @@ pub async fn compute(
 ///
 /// # Errors
 /// When the process cannot be started, takes too long, or draws nothing.
-pub async fn page(daemon: &Daemon, files: &[String]) -> Result<String, ComputeError> {
+pub async fn page(
+    daemon: &Daemon,
+    purpose: Purpose,
+    files: &[String],
+) -> Result<String, ComputeError> {
     let mut process = process(daemon, &["report"], files)?;
-    let output = printed(daemon, process.args(["--out", "-"])).await?;
+    process.args(["--out", "-"]);
+    let output = printed(daemon, purpose, process).await?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
         false => Err(ComputeError::of(&output)),
@@ -250,12 +293,21 @@ pub async fn page(daemon: &Daemon, files: &[String]) -> Result<String, ComputeEr
 }
 
 /// Runs a process to its end when it has its turn, and ends it if it takes too long.
-async fn printed(daemon: &Daemon, process: &mut Process) -> Result<Output, ComputeError> {
-    let turn = tokio::time::timeout(COMPUTATION, daemon.computations.acquire());
-    let _turn = turn.await.map_err(|_| ComputeError::Busy)?;
-    let child: Child = process.spawn()?;
-    let ended = tokio::time::timeout(COMPUTATION, child.wait_with_output()).await;
-    Ok(ended.map_err(|_| ComputeError::TooLong)??)
+async fn printed(
+    daemon: &Daemon,
+    purpose: Purpose,
+    mut process: Process,
+) -> Result<Output, ComputeError> {
+    let turn = daemon.computations.turn(purpose).await?;
+    // A start that does not return, because the folder of the process does not answer, keeps its turn.
+    let started = tokio::task::spawn_blocking(move || (process.spawn(), turn));
+    let ended = async {
+        let (child, turn) = started.await.map_err(io::Error::other)?;
+        Ok::<_, io::Error>((child?.wait_with_output().await?, turn))
+    };
+    let ended = tokio::time::timeout(COMPUTATION, ended).await;
+    let (output, _) = ended.map_err(|_| ComputeError::TooLong)??;
+    Ok(output)
 }
 
 impl ComputeError {

@@ -9,6 +9,7 @@ use axum::response::{IntoResponse, Response};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::daemon::files::FolderError;
 use crate::daemon::schedule::ScheduleError;
 use crate::daemon::worker::{ArgsError, ComputeError};
 use crate::experiment::{ErrorKind, ErrorObject};
@@ -131,13 +132,19 @@ impl From<ArgsError> for ApiError {
 impl From<ComputeError> for ApiError {
     fn from(error: ComputeError) -> ApiError {
         match error {
-            ComputeError::Busy => {
+            ComputeError::Busy(_) => {
                 ApiError::busy(StatusCode::TOO_MANY_REQUESTS, error.to_string())
             }
             ComputeError::Start(_) | ComputeError::TooLong | ComputeError::NoResult(_) => {
                 ApiError::refused(ErrorKind::Failed, error.to_string())
             }
         }
+    }
+}
+
+impl From<FolderError> for ApiError {
+    fn from(error: FolderError) -> ApiError {
+        ApiError::busy(StatusCode::SERVICE_UNAVAILABLE, error.to_string())
     }
 }
 

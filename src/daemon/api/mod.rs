@@ -1,5 +1,7 @@
 //! The HTTP interface: one line per request in [`routes`], one file per resource.
 
+mod arguments;
+mod download;
 pub mod error;
 mod extract;
 pub mod guard;

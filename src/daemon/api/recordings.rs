@@ -1,20 +1,21 @@
 //! The recordings: list, download, note, delete, results.
 
+use std::io;
 use std::sync::Arc;
 
 use axum::Json;
-use axum::extract::{Request, State};
-use axum::http::{HeaderValue, StatusCode, header};
+use axum::extract::State;
+use axum::http::{HeaderMap, HeaderValue, header};
 use axum::response::{IntoResponse, NoContent, Response};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tower::ServiceExt;
-use tower_http::services::ServeFile;
 
+use super::download::OpenFile;
 use super::error::ApiError;
-use super::extract::{Body, InPath, InQuery};
+use super::extract::{Body, Client, InPath, InQuery};
 use super::texts::check_texts;
-use crate::daemon::catalogue::{ListedRecording, RecordingInfo};
+use crate::daemon::catalogue::{Catalogue, ListedRecording, RecordingInfo};
+use crate::daemon::computations::Purpose;
 use crate::daemon::shared::Daemon;
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
@@ -40,8 +41,9 @@ pub struct Recordings {
 
 /// Lists the recordings.
 pub async fn list(State(daemon): State<Arc<Daemon>>) -> Result<Json<Recordings>, ApiError> {
-    let recordings = on_files(move || {
-        let listed = daemon.catalogue().list();
+    let catalogue = daemon.catalogue();
+    let recordings = daemon.files.run(move || {
+        let listed = catalogue.list();
         listed.map_err(|error| {
             file_error(format!(
                 "the folder of the recordings cannot be read: {error}; check its permissions"
@@ -49,7 +51,7 @@ pub async fn list(State(daemon): State<Arc<Daemon>>) -> Result<Json<Recordings>,
         })
     });
     Ok(Json(Recordings {
-        recordings: recordings.await?,
+        recordings: recordings.await??,
     }))
 }
 
@@ -57,20 +59,18 @@ pub async fn list(State(daemon): State<Arc<Daemon>>) -> Result<Json<Recordings>,
 pub async fn download(
     State(daemon): State<Arc<Daemon>>,
     InPath(FileName { file }): InPath<FileName>,
-    request: Request,
+    headers: HeaderMap,
 ) -> Result<Response, ApiError> {
-    let path = daemon
-        .catalogue()
-        .path(&file)
-        .ok_or_else(|| unknown(&file))?;
-    let served = ServeFile::new(path).oneshot(request).await;
-    let mut response = match served {
-        Ok(response) => response.map(axum::body::Body::new).into_response(),
-        Err(never) => match never {},
-    };
-    if let Some(error) = unserved(response.status(), &file) {
-        return Ok(with_range(error.into_response(), &response));
-    }
+    let catalogue = daemon.catalogue();
+    let open = daemon.files.run(move || {
+        let opened = catalogue.open(&file);
+        let opened =
+            opened.and_then(|found| found.map(|it| OpenFile::new(file.clone(), it)).transpose());
+        opened
+            .map_err(|error| unreadable(&file, &error))?
+            .ok_or_else(|| unknown(&file))
+    });
+    let mut response = open.await??.answer(daemon, &headers);
     // The script of a report cannot use the token of the page.
     let policy = HeaderValue::from_static(REPORT_POLICY);
     let headers = response.headers_mut();
@@ -88,6 +88,7 @@ pub struct ReportQuery {
 /// A page with the frequency responses and steps of one or several recordings, as `bench report`.
 pub async fn report(
     State(daemon): State<Arc<Daemon>>,
+    Client(client): Client,
     InQuery(query): InQuery<ReportQuery>,
 ) -> Result<Response, ApiError> {
     let files: Vec<String> = query.files.split(',').map(String::from).collect();
@@ -97,45 +98,13 @@ pub async fn report(
             files.len()
         )));
     }
-    for file in &files {
-        require(&daemon, file)?;
-    }
-    let page = worker::page(&daemon, &files).await?;
+    require_all(&daemon, files.clone()).await?;
+    let page = worker::page(&daemon, Purpose::View(client), &files).await?;
     let headers = [
         (header::CONTENT_TYPE, "text/html; charset=utf-8"),
         (header::CONTENT_SECURITY_POLICY, REPORT_POLICY),
     ];
     Ok((headers, page).into_response())
-}
-
-/// The error of an answer without the file.
-fn unserved(status: StatusCode, file: &str) -> Option<ApiError> {
-    let message = match status {
-        StatusCode::NOT_FOUND => return Some(unknown(file)),
-        StatusCode::RANGE_NOT_SATISFIABLE => {
-            format!("{file} does not contain this range; ask for one range within the file")
-        }
-        StatusCode::PRECONDITION_FAILED => {
-            format!("{file} has changed since; ask for it without a condition")
-        }
-        status if status.is_server_error() => {
-            return Some(file_error(format!(
-                "{file} cannot be read; look at the log of the system"
-            )));
-        }
-        status if status.is_client_error() => format!("{file} cannot be sent: {status}"),
-        _ => return None,
-    };
-    Some(ApiError::new(status, ErrorKind::Usage, message))
-}
-
-/// An error with the length of the file [RFC 9110, 15.5.17].
-fn with_range(mut error: Response, served: &Response) -> Response {
-    if let Some(range) = served.headers().get(header::CONTENT_RANGE) {
-        let headers = error.headers_mut();
-        headers.insert(header::CONTENT_RANGE, range.clone());
-    }
-    error
 }
 
 /// Removes a recording and the files computed from it.
@@ -152,16 +121,16 @@ pub async fn remove(
             "a run goes on, and this may be its recording; wait for its end",
         ));
     }
-    require(&daemon, &file)?;
-    on_files(move || {
-        let removed = daemon.catalogue().remove(&file);
-        removed.map_err(|error| {
+    let catalogue = daemon.catalogue();
+    let removed = daemon.files.run(move || {
+        require(&catalogue, &file)?;
+        catalogue.remove(&file).map_err(|error| {
             file_error(format!(
                 "{file} cannot be removed: {error}; check the permissions of the folder"
             ))
         })
-    })
-    .await?;
+    });
+    removed.await??;
     Ok(NoContent)
 }
 
@@ -184,9 +153,9 @@ pub async fn note(
     Body(note): Body<Note>,
 ) -> Result<NoContent, ApiError> {
     check_texts(&note.name, &note.note)?;
-    require(&daemon, &file)?;
-    on_files(move || {
-        let catalogue = daemon.catalogue();
+    let catalogue = daemon.catalogue();
+    let stored = daemon.files.run(move || {
+        require(&catalogue, &file)?;
         let info = RecordingInfo {
             name: note.name,
             note: note.note,
@@ -198,8 +167,8 @@ pub async fn note(
                 "the note cannot be stored: {error}; check the permissions of the folder"
             ))
         })
-    })
-    .await?;
+    });
+    stored.await??;
     Ok(NoContent)
 }
 
@@ -208,11 +177,9 @@ pub async fn results(
     State(daemon): State<Arc<Daemon>>,
     InPath(FileName { file }): InPath<FileName>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
-    let path = daemon
-        .catalogue()
-        .recording(&file)
-        .ok_or_else(|| unknown(&file))?;
-    let results = on_files(move || {
+    let catalogue = daemon.catalogue();
+    let results = daemon.files.run(move || {
+        let path = catalogue.recording(&file).ok_or_else(|| unknown(&file))?;
         let opened = Recording::open(&path);
         let recording =
             opened.map_err(|error| ApiError::refused(ErrorKind::Recording, error.to_string()))?;
@@ -224,12 +191,18 @@ pub async fn results(
             ))
         })
     });
-    Ok(Json(results.await?))
+    Ok(Json(results.await??))
 }
 
-fn require(daemon: &Daemon, file: &str) -> Result<(), ApiError> {
-    let found = daemon.catalogue().recording(file);
+fn require(catalogue: &Catalogue, file: &str) -> Result<(), ApiError> {
+    let found = catalogue.recording(file);
     found.map(drop).ok_or_else(|| unknown(file))
+}
+
+async fn require_all(daemon: &Daemon, files: Vec<String>) -> Result<(), ApiError> {
+    let catalogue = daemon.catalogue();
+    let found = move || files.iter().try_for_each(|file| require(&catalogue, file));
+    daemon.files.run(found).await?
 }
 
 fn unknown(file: &str) -> ApiError {
@@ -242,14 +215,8 @@ fn file_error(message: String) -> ApiError {
     ApiError::refused(ErrorKind::Failed, message)
 }
 
-/// Work on files, outside the tasks that serve clients.
-async fn on_files<T: Send + 'static>(
-    work: impl FnOnce() -> Result<T, ApiError> + Send + 'static,
-) -> Result<T, ApiError> {
-    let done = tokio::task::spawn_blocking(work).await;
-    done.unwrap_or_else(|_| {
-        Err(file_error(
-            "reading the folder failed; report this with the log of the daemon".into(),
-        ))
-    })
+fn unreadable(file: &str, error: &io::Error) -> ApiError {
+    file_error(format!(
+        "{file} cannot be read: {error}; check its permissions"
+    ))
 }

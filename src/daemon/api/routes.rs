@@ -13,7 +13,8 @@ use axum::extract::State;
 use axum::http::header::CONTENT_TYPE;
 use axum::response::IntoResponse;
 use axum::routing::get;
-use axum::{Extension, Json, Router};
+use axum::{Extension, Router};
+use bytes::Bytes;
 
 use super::error::ApiError;
 use super::{lease, live, page, recordings, runs, tools};
@@ -45,6 +46,8 @@ pub fn router(daemon: Arc<Daemon>, reach: Reach) -> Router {
         ..OpenApi::default()
     };
     let api = api().finish_api_with(&mut description, |api| api.security_scheme(TOKEN, token()));
+    // Serialising it does not fail: its keys are texts.
+    let written = Written(serde_json::to_vec(&description).unwrap_or_default().into());
     let mut router = api
         .route("/", get(page::index))
         .route("/metrics", get(metrics))
@@ -55,7 +58,7 @@ pub fn router(daemon: Arc<Daemon>, reach: Reach) -> Router {
     router
         .fallback(unknown)
         .method_not_allowed_fallback(wrong_method)
-        .layer(Extension(Arc::new(description)))
+        .layer(Extension(written))
         .layer(DefaultBodyLimit::max(MAX_BODY))
         .with_state(daemon)
 }
@@ -65,7 +68,7 @@ const DESCRIPTION: &str = "Controller daemon of a precision-motion test bench. O
 async fn metrics(State(daemon): State<Arc<Daemon>>) -> impl IntoResponse {
     (
         [(CONTENT_TYPE, metrics::MEDIA_TYPE)],
-        metrics::text(&daemon),
+        metrics::text(&daemon).await,
     )
 }
 
@@ -81,8 +84,12 @@ async fn wrong_method() -> ApiError {
     )
 }
 
-async fn description(Extension(description): Extension<Arc<OpenApi>>) -> Json<OpenApi> {
-    Json((*description).clone())
+/// The description as JSON, written once.
+#[derive(Clone)]
+struct Written(Bytes);
+
+async fn description(Extension(written): Extension<Written>) -> impl IntoResponse {
+    ([(CONTENT_TYPE, "application/json")], written.0)
 }
 
 /// Name of the security scheme of the token.
@@ -113,8 +120,9 @@ fn change(
     move |operation| named(id, summary)(operation).security_requirement(TOKEN)
 }
 
-/// Every request may be refused: for its rate, its host or its form.
-fn with_errors(mut operation: TransformOperation<'_>) -> TransformOperation<'_> {
+/// Every request may be refused: for its rate, its host or its form, or because others are served.
+fn with_errors(operation: TransformOperation<'_>) -> TransformOperation<'_> {
+    let mut operation = operation.response::<503, ApiError>();
     let responses = operation.inner_mut().responses.as_ref();
     let errors = StatusCode::Range(4);
     match responses.is_some_and(|responses| responses.responses.contains_key(&errors)) {

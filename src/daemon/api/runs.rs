@@ -13,18 +13,20 @@ use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::arguments::check_arguments;
 use super::error::ApiError;
 use super::extract::{Body, InPath, LeaseHeader, StopBody};
 use super::lease::random;
 use super::reply::{Accepted, Reply};
 use super::texts::check_texts;
 use super::views::RunView;
+use crate::daemon::computations::Purpose;
 use crate::daemon::output::{OutputPiece, RunOutput};
 use crate::daemon::run_entry::{Carrier, Command, Phase, RunRequest};
 use crate::daemon::schedule::{NewEntry, StopKind};
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::{Daemon, now};
-use crate::daemon::worker::{self, check_args};
+use crate::daemon::worker;
 use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
 use crate::rt::tuning::{Factors, Tune};
 
@@ -75,7 +77,7 @@ pub async fn start(
         let lease = schedule.require_lease(&lease, now())?;
         Ok::<_, ApiError>(lease.operator.clone())
     })?;
-    check_args(&request.args)?;
+    check_arguments(&daemon, &request.args).await?;
     let (command, args) = (request.command, request.args.clone());
     let new = NewEntry {
         request,
@@ -94,7 +96,7 @@ pub async fn start(
 /// Adds the length of a command by its plan. A command without a plan has none.
 async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<String>) {
     args.push("--plan".into());
-    let computed = worker::compute(&daemon, &[command.name()], &args).await;
+    let computed = worker::compute(&daemon, Purpose::Plan, &[command.name()], &args).await;
     let plan = computed.unwrap_or_default();
     let length_s = plan["expected"]["duration_s"].as_f64();
     daemon.change(|schedule, _| {
@@ -164,11 +166,12 @@ pub async fn plan(
     State(daemon): State<Arc<Daemon>>,
     Body(request): Body<PlanRequest>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
-    check_args(&request.args)?;
+    check_arguments(&daemon, &request.args).await?;
     // In front of the others, so that none of them takes it as its value.
     let mut args = request.args;
     args.insert(0, "--plan".into());
-    let computed = worker::compute(&daemon, &[request.command.name()], &args).await?;
+    let computed =
+        worker::compute(&daemon, Purpose::Plan, &[request.command.name()], &args).await?;
     match computed.get("error") {
         Some(_) => Err(ApiError::of_command(&computed)),
         None => Ok(Json(computed)),

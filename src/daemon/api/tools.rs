@@ -7,9 +7,11 @@ use axum::extract::State;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::arguments::check_arguments;
 use super::error::ApiError;
-use super::extract::Body;
+use super::extract::{Body, Client};
 use crate::config::{self, Config, Source, load, profiles};
+use crate::daemon::computations::Purpose;
 use crate::daemon::shared::{Daemon, DaemonConfig};
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
@@ -18,17 +20,25 @@ use crate::rig::devices;
 /// Findings of `bench doctor`.
 pub async fn doctor(
     State(daemon): State<Arc<Daemon>>,
+    Client(client): Client,
 ) -> Result<Json<serde_json::Value>, ApiError> {
-    computed(&daemon, &["doctor"]).await
+    computed(&daemon, Purpose::View(client), &["doctor"]).await
 }
 
 /// Modes, residues and zeros of the model, as `bench model modes`.
-pub async fn model(State(daemon): State<Arc<Daemon>>) -> Result<Json<serde_json::Value>, ApiError> {
-    computed(&daemon, &["model", "modes"]).await
+pub async fn model(
+    State(daemon): State<Arc<Daemon>>,
+    Client(client): Client,
+) -> Result<Json<serde_json::Value>, ApiError> {
+    computed(&daemon, Purpose::View(client), &["model", "modes"]).await
 }
 
-async fn computed(daemon: &Daemon, command: &[&str]) -> Result<Json<serde_json::Value>, ApiError> {
-    let computed = worker::compute(daemon, command, &[]).await?;
+async fn computed(
+    daemon: &Daemon,
+    purpose: Purpose,
+    command: &[&str],
+) -> Result<Json<serde_json::Value>, ApiError> {
+    let computed = worker::compute(daemon, purpose, command, &[]).await?;
     match computed.get("error") {
         Some(_) => Err(ApiError::of_command(&computed)),
         None => Ok(Json(computed)),
@@ -89,8 +99,11 @@ pub async fn check(
     State(daemon): State<Arc<Daemon>>,
     Body(new): Body<NewConfig>,
 ) -> Result<Json<ConfigView>, ApiError> {
-    let checked = checked(&daemon, new)?;
-    config_view(&checked).map(Json)
+    check_arguments(&daemon, &new.sets).await?;
+    check_arguments(&daemon, new.profile.as_slice()).await?;
+    let source = source(&daemon, new);
+    let view = daemon.files.run(move || config_view(&loaded(source)?));
+    view.await?.map(Json)
 }
 
 /// The name of a profile, or the path of a file in the folder of the recordings, as for a command.
@@ -101,18 +114,20 @@ fn in_folder(daemon: &Daemon, name: String) -> String {
     }
 }
 
-fn checked(daemon: &Daemon, new: NewConfig) -> Result<DaemonConfig, ApiError> {
-    worker::check_args(&new.sets)?;
-    worker::check_args(new.profile.as_slice())?;
+/// The configuration of the daemon with other settings, or another one.
+fn source(daemon: &Daemon, new: NewConfig) -> Source {
     let own = daemon.configuration().source.clone();
-    let source = Source {
+    Source {
         config: new
             .profile
             .map(|name| in_folder(daemon, name))
             .or(own.config),
         sets: new.sets,
         ..own
-    };
+    }
+}
+
+fn loaded(source: Source) -> Result<DaemonConfig, ApiError> {
     let refused = |message: String| ApiError::refused(ErrorKind::Configuration, message);
     let config = load(&source).map_err(|error| refused(error.to_string()))?;
     devices::check(&config).map_err(|error| refused(error.to_string()))?;
