@@ -49,8 +49,14 @@ impl Daemon {
 
     /// A daemon whose files cannot become larger than `limit_kb`: writing to a larger one fails, as on a full disk.
     pub fn start_with_file_limit(limit_kb: u64, settings: &[&str]) -> Daemon {
+        // Blocks of 512 bytes.
+        Daemon::start_with_limit(&format!("ulimit -f {}", limit_kb * 2), settings)
+    }
+
+    /// A daemon with a limit that the shell sets.
+    pub fn start_with_limit(limit: &str, settings: &[&str]) -> Daemon {
         let mut program = Command::new("sh");
-        let limited = format!("ulimit -f {}; exec \"$0\" \"$@\"", limit_kb * 2); // blocks of 512 bytes
+        let limited = format!("{limit}; exec \"$0\" \"$@\"");
         program.args(["-c", &limited, env!("CARGO_BIN_EXE_bench")]);
         Daemon::start_as(program, settings, tempfile::tempdir().expect("a folder"))
     }

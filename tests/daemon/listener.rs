@@ -1,13 +1,12 @@
 //! The TCP address: other pages and names, too many requests and connections, clients that are slow or silent.
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::os::fd::OwnedFd;
 use std::time::{Duration, Instant};
 
-use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, socket};
 use serde_json::json;
 
 use crate::common::{Daemon, TIME_LIMIT};
+use crate::hostile::tcp_from;
 use crate::wire::{exchange, request, status, tcp, unix};
 
 /// Connections of one address, by docs/daemon.md.
@@ -147,29 +146,12 @@ fn closes_connections_of_slow_and_silent_clients() {
     assert_eq!(daemon.state()["loop"]["state"], "disarmed");
 }
 
-/// A connection from another address of this machine.
-fn from_other_address(daemon: &Daemon) -> TcpStream {
-    let port = daemon.address().rsplit(':').next().expect("a port");
-    let port = port.parse().expect("a port");
-    let tcp = socket(
-        AddressFamily::Inet,
-        SockType::Stream,
-        SockFlag::empty(),
-        None,
-    );
-    let tcp: OwnedFd = tcp.expect("a socket");
-    use std::os::fd::AsRawFd;
-    bind(tcp.as_raw_fd(), &SockaddrIn::new(127, 0, 0, 2, 0)).expect("an address");
-    connect(tcp.as_raw_fd(), &SockaddrIn::new(127, 0, 0, 1, port)).expect("the daemon listens");
-    tcp.into()
-}
-
 #[test]
 fn limits_connections_of_an_address_and_lets_others_stop() {
     let daemon = Daemon::start();
     let stop = request("POST", "/api/v1/stop", &[("Host", daemon.address())], b"");
     let idle: Vec<TcpStream> = (0..MAX_OF_ADDRESS + 8).map(|_| tcp(&daemon)).collect();
-    // Connections are accepted in their order: the last ones are closed.
+    // Connections are accepted in their order: the last ones have a short time for a stop and are closed.
     let (accepted, refused) = idle.split_at(MAX_OF_ADDRESS);
     for mut stream in refused {
         assert!(
@@ -183,14 +165,12 @@ fn limits_connections_of_an_address_and_lets_others_stop() {
         let _ = stream.read_to_end(&mut answer);
         assert_eq!(status(&answer), Some(200));
     }
-    assert_eq!(
-        status(&exchange(from_other_address(&daemon), &stop)),
-        Some(200)
-    );
+    assert_eq!(status(&exchange(tcp_from(&daemon, 2), &stop)), Some(200));
     assert_eq!(status(&exchange(unix(&daemon), &stop)), Some(200));
     drop(idle);
+    let get = request("GET", "/api/v1/state", &[("Host", daemon.address())], b"");
     let begun = Instant::now();
-    while status(&exchange(tcp(&daemon), &stop)) != Some(200) {
+    while status(&exchange(tcp(&daemon), &get)) != Some(200) {
         assert!(
             begun.elapsed() < TIME_LIMIT,
             "closed connections leave their places"
@@ -226,7 +206,7 @@ fn web_sockets_count_as_connections() {
         open.push(stream);
     }
     let get = request("GET", "/api/v1/state", &[("Host", daemon.address())], b"");
-    assert_eq!(status(&exchange(tcp(&daemon), &get)), None);
+    assert_eq!(status(&exchange(tcp(&daemon), &get)), Some(503));
 }
 
 /// Processes that the daemon has started and that have not ended.

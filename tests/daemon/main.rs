@@ -6,6 +6,7 @@ mod descriptions;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod full_disk;
+mod hostile;
 mod interface;
 mod listener;
 mod ownership;
