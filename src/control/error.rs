@@ -3,6 +3,7 @@
 use super::import_error::ImportError;
 use super::section::SectionError;
 use super::transfer::TransferError;
+use super::unstable::{MAX_INTEGRATORS, WHY_TWO};
 use crate::config::ConfigError;
 
 /// A controller that is refused, before any motion.
@@ -20,6 +21,16 @@ pub enum ControllerError {
         number: usize,
         /// What is wrong.
         why: SectionError,
+    },
+    /// More integrators than a controller may have.
+    #[error(
+        "{name}: its sections have {count} integrators (poles at s = 0); the limit is {MAX_INTEGRATORS}, because {WHY_TWO}"
+    )]
+    Integrators {
+        /// The controller.
+        name: String,
+        /// Their number.
+        count: usize,
     },
     /// A prewarping frequency above half the servo rate.
     #[error(

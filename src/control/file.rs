@@ -10,6 +10,7 @@ use super::laws::LawSettings;
 use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
 };
+use super::unstable::MAX_INTEGRATORS;
 use crate::config::{self, profiles};
 
 /// A controller file with a cascade of sections.
@@ -186,9 +187,17 @@ impl ControllerText {
     fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
         let file: ControllerFile = config::typed(&self.name, &self.text)?;
         let numbered = (1..).zip(&file.section);
-        numbered
-            .map(|(number, settings)| self.checked_section(number, settings, rate_hz))
-            .collect()
+        let checked =
+            numbered.map(|(number, settings)| self.checked_section(number, settings, rate_hz));
+        let sections: Vec<Section> = checked.collect::<Result<_, _>>()?;
+        let count = sections.iter().map(Section::integrators).sum();
+        match count > MAX_INTEGRATORS {
+            true => Err(ControllerError::Integrators {
+                name: self.name.clone(),
+                count,
+            }),
+            false => Ok(sections),
+        }
     }
 
     fn cascade(&self, table: TransferTable) -> Result<Cascade, ControllerError> {

@@ -41,6 +41,7 @@ mod swept;
 mod transfer;
 mod tuned;
 pub mod tuning;
+mod unstable;
 
 pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};
@@ -63,8 +64,9 @@ pub use state_space::StateSpace;
 pub use step_metrics::{SETTLING_BAND, StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};
 pub use transfer::{
-    Agreement, Cascade, DiscreteDesign, Domain, Factors, GainUnit, Roots, SsFile, SsSettings,
-    TfFile, TfSettings, TransferError, TransferSettings, TransferTable, UnstablePole, ZpkFile,
-    ZpkSettings,
+    Agreement, Cascade, DiscreteDesign, Domain, Factors, GainUnit, Inexact, RootPlace, Roots,
+    SsFile, SsSettings, TfFile, TfSettings, TransferError, TransferSettings, TransferTable,
+    ZpkFile, ZpkSettings,
 };
 pub use tuned::TunedDesign;
+pub use unstable::MAX_INTEGRATORS;

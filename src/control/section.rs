@@ -4,6 +4,7 @@ use nalgebra::Complex;
 
 use super::Biquad;
 use super::quadratic::quadratic_roots;
+use super::unstable::ONLY_STABLE;
 
 /// Coefficients of a section by rising power of s; s in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,9 +30,9 @@ pub enum SectionError {
         /// Order of the denominator.
         denominator: usize,
     },
-    /// A pole in the right half plane, or more than one at the origin.
+    /// A pole in the right half plane, or on the imaginary axis outside of the origin.
     #[error(
-        "is unstable: it has a pole at {re_rad_s:.4} {im_rad_s:+.4}j rad/s; move the pole to the left of the imaginary axis (only a single pole at the origin is allowed)"
+        "is unstable: it has a pole at {re_rad_s:.4} {im_rad_s:+.4}j rad/s; move the pole to the left of the imaginary axis (poles at the origin, integrators, are allowed); {ONLY_STABLE}"
     )]
     Unstable {
         /// Real part.
@@ -53,7 +54,7 @@ impl Section {
         at(&self.numerator) / at(&self.denominator)
     }
 
-    /// This section, if it is proper and has no unstable pole. One pole at the origin is allowed.
+    /// This section, if it is proper and has no unstable pole. Poles at the origin are allowed.
     pub fn checked(self) -> Result<Section, SectionError> {
         let mut coefficients = self.numerator.iter().chain(&self.denominator);
         let is_finite = coefficients.all(|c| c.is_finite());
@@ -75,13 +76,17 @@ impl Section {
         }
     }
 
-    /// A pole in the right half plane or on the imaginary axis. A single pole at the origin is allowed.
+    /// A pole in the right half plane or on the imaginary axis, except for the origin.
     fn unstable_pole(&self) -> Option<Complex<f64>> {
-        let poles = self.poles();
-        let at_origin = poles.iter().filter(|pole| pole.norm() == 0.0).count();
-        poles
-            .into_iter()
-            .find(|pole| pole.re >= 0.0 && (pole.norm() > 0.0 || at_origin > 1))
+        let poles = self.poles().into_iter();
+        let mut others = poles.filter(|pole| pole.norm() > 0.0);
+        others.find(|pole| pole.re >= 0.0)
+    }
+
+    /// Number of integrators: poles at the origin.
+    pub(super) fn integrators(&self) -> usize {
+        let poles = self.poles().into_iter();
+        poles.filter(|pole| pole.norm() == 0.0).count()
     }
 
     /// Roots of the denominator.
@@ -226,10 +231,6 @@ mod tests {
             Err(SectionError::Unstable { .. })
         ));
         assert!(matches!(
-            section([1.0, 0.0, 0.0], [0.0, 0.0, 1.0]).checked(),
-            Err(SectionError::Unstable { .. })
-        ));
-        assert!(matches!(
             section([1.0, 0.0, 0.0], [0.0; 3]).checked(),
             Err(SectionError::Degenerate)
         ));
@@ -237,10 +238,10 @@ mod tests {
             section([f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.0]).checked(),
             Err(SectionError::Degenerate)
         ));
-        assert!(
-            section([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]).checked().is_ok(),
-            "one integrator is allowed"
-        );
+        for (integrators, denominator) in [(1, [0.0, 1.0, 0.0]), (2, [0.0, 0.0, 1.0])] {
+            let section = section([1.0, 0.0, 0.0], denominator).checked();
+            assert_eq!(section.map(|s| s.integrators()), Ok(integrators));
+        }
         assert!(section([1.0, 2.0, 3.0], [25.0, 1.0, 1.0]).checked().is_ok());
     }
 }

@@ -116,14 +116,14 @@ fn rejects_matrices_of_wrong_size() {
 }
 
 #[test]
-fn rejects_unstable_poles_and_a_second_integrator() {
+fn rejects_unstable_poles_and_a_third_integrator() {
     refused(
         &tf("numerator = [1]\ndenominator = [1, -5]"),
         &["unstable", "s = 5.0000", "rate_hz"],
     );
     refused(
-        &tf("numerator = [1]\ndenominator = [1, 0, 0]"),
-        &["unstable", "single pole at the origin"],
+        &tf("numerator = [1]\ndenominator = [1, 0, 0, 0]"),
+        &["3 integrators", "limit is 2"],
     );
     refused(
         &tf("numerator = [1]\ndenominator = [1, 0, 25]"),
@@ -131,8 +131,10 @@ fn rejects_unstable_poles_and_a_second_integrator() {
     );
     let discrete = "rate_hz = 5000\n";
     refused(
-        &zpk(&format!("{discrete}poles = [[1, 0], [1, 0]]\ngain = 1")),
-        &["unstable", "z = 1.0"],
+        &zpk(&format!(
+            "{discrete}poles = [[1, 0], [1, 0], [1, 0]]\ngain = 1"
+        )),
+        &["3 integrators", "z = 1"],
     );
     refused(
         &tf(&format!("{discrete}numerator = [1]\ndenominator = [1, 1]")),
@@ -144,8 +146,8 @@ fn rejects_unstable_poles_and_a_second_integrator() {
         &["z = -50", "leave out `rate_hz`"],
     );
     refused(
-        &ss("a = [[0, 1], [0, 0]]\nb = [0, 1]\nc = [1, 0]"),
-        &["unstable"],
+        &ss("a = [[0, 25], [-1, 0]]\nb = [0, 1]\nc = [1, 0]"),
+        &["unstable", "5.0000j"],
     );
 }
 

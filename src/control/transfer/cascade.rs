@@ -2,10 +2,11 @@
 
 use nalgebra::Complex;
 
+use super::boundary::check_sides;
 use super::check::{Agreement, agreement};
 use super::domain::Domain;
 use super::error::TransferError;
-use super::given::Given;
+use super::given::{self, Given};
 use super::pairing;
 use super::roots::Factors;
 use super::settings::{GainUnit, TransferSettings};
@@ -56,12 +57,29 @@ impl Cascade {
         let domain = Domain::of_rate(settings.rate_hz());
         let unit = per_micrometre(settings.gain_unit());
         let given = Given::of(settings)?;
-        let located = given.located(domain)?;
-        let sections = pairing::sections(&located.factors, unit, domain);
-        let agreement = agreement(&given, &located, &sections, unit, domain)?;
+        let mut failed = TransferError::NoResponse;
+        for factors in given.located(domain)? {
+            match Cascade::of_factors(&given, factors, unit, domain) {
+                Ok(cascade) => return Ok(cascade),
+                Err(why) => failed = why,
+            }
+        }
+        Err(failed)
+    }
+
+    fn of_factors(
+        given: &Given,
+        factors: Factors,
+        unit: f64,
+        domain: Domain,
+    ) -> Result<Cascade, TransferError> {
+        given::check(&factors, domain)?;
+        let sections = pairing::sections(&factors, unit, domain);
+        check_sides(&factors, &sections, domain)?;
+        let agreement = agreement(given, &factors, &sections, unit, domain)?;
         Ok(Cascade {
             sections,
-            factors: located.factors,
+            factors,
             domain,
             agreement,
         })

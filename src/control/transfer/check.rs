@@ -3,77 +3,87 @@
 use nalgebra::Complex;
 
 use super::domain::Domain;
-use super::error::TransferError;
+use super::error::{Inexact, RootPlace, TransferError};
 use super::frequencies::frequencies;
-use super::given::{Given, Located};
+use super::given::Given;
+use super::roots::Factors;
 use crate::control::Section;
 use crate::util::numeric::is_within;
+use crate::util::units::hz;
 
-/// Relative difference that is refused in any case: a millionth is 0.00001 dB or 0.00006 degrees.
+/// Largest difference of the responses, relative to the largest magnitude of the original: a millionth is 0.00001 dB or 0.00006 degrees.
 const MAX_DIFFERENCE: f64 = 1e-6;
 
-/// Roundings of a coefficient of a section, each of half a unit in the last place: of the root, of the product or sum of two, of
-/// the gain; those of the evaluation, two for each power; and as many of the original. 16 is above their number.
-const ROUNDINGS: f64 = 16.0;
-
-/// The bounds of rounding are of first order and leave out the gain, which is taken from one frequency.
-const MARGIN: f64 = 4.0;
-
-/// The largest relative difference of the responses of a cascade and of its original.
+/// The largest difference of the responses of a cascade and of its original.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Agreement {
-    /// |cascade/original - 1|.
+    /// |cascade - original| over the largest |original| from a tenth of the slowest pole to half the rate.
     pub difference: f64,
     /// The frequency in rad/s.
     pub rad_s: f64,
 }
 
-/// Compares the cascade, whose gain is `unit` times that of the original, over all frequencies.
+/// Both responses in amperes per micrometre at a frequency.
+struct Compared {
+    rad_s: f64,
+    given: Complex<f64>,
+    sections: Complex<f64>,
+}
+
+/// Compares the cascade, whose gain is `unit` times that of the original, from a tenth of its slowest pole to half the rate.
 ///
 /// # Errors
-/// At a frequency the difference exceeds what rounding explains (of the coefficients of the sections, of the matrices, and of a
-/// pole that was moved to the place of an integrator), or a millionth.
+/// The difference exceeds a millionth of the largest magnitude of the original.
 pub(super) fn agreement(
     given: &Given,
-    located: &Located,
+    factors: &Factors,
     sections: &[Section],
     unit: f64,
     domain: Domain,
 ) -> Result<Agreement, TransferError> {
+    let frequencies = frequencies(factors, domain).into_iter();
+    let compared = frequencies.map(|rad_s| Compared::at(rad_s, given, sections, unit, domain));
+    let compared: Vec<Compared> = compared.collect();
+    let magnitudes = compared.iter().map(|point| point.given.norm());
+    let largest = magnitudes.fold(0.0, f64::max);
     let mut worst = Agreement::default();
-    for rad_s in frequencies(&located.factors, domain) {
-        let v = domain.point(rad_s);
-        let original = given.response(v);
-        let cascade: Complex<f64> = sections.iter().map(|section| section.response(v)).product();
-        let difference = (cascade / (original.value * unit) - 1.0).norm();
-        let moved = located.integrator_shift / (v - domain.integrator()).norm();
-        let bound = original.relative_error + moved + rounding(sections, v);
-        let limit = (MARGIN * bound).min(MAX_DIFFERENCE);
-        if !is_within(difference, limit) {
-            return Err(TransferError::Inexact {
-                rad_s,
-                difference,
-                limit,
-            });
+    for point in &compared {
+        let difference = (point.sections - point.given).norm() / largest;
+        if !is_within(difference, MAX_DIFFERENCE) {
+            return Err(point.refused(difference, factors, domain));
         }
         if difference >= worst.difference {
+            let rad_s = point.rad_s;
             worst = Agreement { difference, rad_s };
         }
     }
     Ok(worst)
 }
 
-/// Relative error of the response of the cascade because its coefficients are rounded: the sum over all polynomials of
-/// sum |c_i| |v|^i/|p(v)| (Higham, *Accuracy and Stability of Numerical Algorithms*, section 5.1), in roundings.
-fn rounding(sections: &[Section], v: Complex<f64>) -> f64 {
-    let condition =
-        |section: &Section| condition(&section.numerator, v) + condition(&section.denominator, v);
-    let sum: f64 = sections.iter().map(condition).sum();
-    ROUNDINGS * f64::EPSILON * sum
-}
+impl Compared {
+    fn at(rad_s: f64, given: &Given, sections: &[Section], unit: f64, domain: Domain) -> Compared {
+        let v = domain.point(rad_s);
+        let responses = sections.iter().map(|section| section.response(v));
+        Compared {
+            rad_s,
+            given: given.response(v) * unit,
+            sections: responses.product(),
+        }
+    }
 
-fn condition([c0, c1, c2]: &[f64; 3], v: Complex<f64>) -> f64 {
-    let radius = v.norm();
-    let magnitude = (c2.abs() * radius + c1.abs()) * radius + c0.abs();
-    magnitude / ((v * *c2 + *c1) * v + *c0).norm()
+    fn refused(&self, difference: f64, factors: &Factors, domain: Domain) -> TransferError {
+        let v = domain.point(self.rad_s);
+        let distance = |pole: &Complex<f64>| (pole - v).norm();
+        let poles = factors.poles.all();
+        let nearest = poles.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        TransferError::Inexact(Box::new(Inexact {
+            hz: hz(self.rad_s),
+            rad_s: self.rad_s,
+            given: self.given,
+            sections: self.sections,
+            difference,
+            limit: MAX_DIFFERENCE,
+            pole: nearest.map(|pole| RootPlace::of(pole, domain)),
+        }))
+    }
 }

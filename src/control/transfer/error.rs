@@ -2,6 +2,11 @@
 
 use std::fmt;
 
+use nalgebra::Complex;
+
+use super::domain::Domain;
+use crate::control::unstable::{MAX_INTEGRATORS, ONLY_STABLE, WHY_TWO};
+
 /// A transfer function that is refused. The text follows the name of its file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TransferError {
@@ -19,9 +24,21 @@ pub enum TransferError {
         /// NaN or an infinity.
         value: f64,
     },
-    /// A matrix or vector whose size does not match A.
+    /// A matrix A that is not square.
     #[error(
-        "`{key}` has {given} numbers, but `ss.a` has {states} rows; give {states} numbers in each row of `ss.a`, in `ss.b` and in `ss.c`"
+        "row {row} of `ss.a` has {given} numbers, but there are {states} rows; give a square matrix, as many numbers in each row as there are rows"
+    )]
+    NotSquare {
+        /// Number of the row, from 1.
+        row: usize,
+        /// Number of its entries.
+        given: usize,
+        /// Number of rows.
+        states: usize,
+    },
+    /// A vector whose size does not match A.
+    #[error(
+        "`{key}` has {given} numbers, but `ss.a` has {states} rows; give {states} numbers in `ss.b` and in `ss.c`"
     )]
     Size {
         /// The key.
@@ -62,10 +79,29 @@ pub enum TransferError {
         im: f64,
     },
     /// A pole that is not stable.
-    #[error("it is unstable: it has a pole at {pole}; {remedy}", remedy = .pole.remedy())]
+    #[error("it is unstable: it has a pole at {pole}; {remedy}; {ONLY_STABLE}", remedy = .pole.remedy())]
     Unstable {
         /// The pole.
-        pole: UnstablePole,
+        pole: RootPlace,
+    },
+    /// A pole beside the place of an integrator that is not stable.
+    #[error(
+        "its pole at {pole} is not an integrator, which has its pole at exactly {place}, and it is not stable; if the controller was designed with an integrator, the numbers were rounded when they were computed or saved, and the pole moved: save zeros, poles and gain (zpk), or matrices (ss)",
+        place = .pole.integrator()
+    )]
+    NotIntegrator {
+        /// The pole.
+        pole: RootPlace,
+    },
+    /// More than two integrators.
+    #[error(
+        "it has {count} integrators (poles at {place}); the limit is {MAX_INTEGRATORS}, because {WHY_TWO}"
+    )]
+    Integrators {
+        /// Their number.
+        count: usize,
+        /// `s = 0` or `z = 1`.
+        place: &'static str,
     },
     /// A response that is 0 at all frequencies.
     #[error("its response is 0 at all frequencies; check B, C, D and the gain")]
@@ -79,16 +115,19 @@ pub enum TransferError {
         what: &'static str,
     },
     /// Sections whose response is not that of the transfer function.
+    #[error(transparent)]
+    Inexact(Box<Inexact>),
+    /// A zero or pole that the sections have on the other side of the stability boundary.
     #[error(
-        "its response cannot be reproduced by sections: at {rad_s:.6} rad/s the relative difference is {difference:.1e}, the limit {limit:.1e}, because the numbers given are too sensitive to rounding; give `[zpk]` (zeros, poles and gain), which is not"
+        "rounding of the sections moves its {what} from {from} across the boundary of stability to {to}; move it away from the boundary"
     )]
-    Inexact {
-        /// The frequency of the largest difference relative to its limit.
-        rad_s: f64,
-        /// Relative difference.
-        difference: f64,
-        /// Its limit.
-        limit: f64,
+    Crossed {
+        /// Zero or pole.
+        what: &'static str,
+        /// As given.
+        from: RootPlace,
+        /// In the sections.
+        to: RootPlace,
     },
     /// Another servo rate.
     #[error(
@@ -102,35 +141,83 @@ pub enum TransferError {
     },
 }
 
-/// A pole that is not stable, in the s or the z plane.
+/// Where the response of the sections differs from that of the transfer function.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "its response cannot be reproduced by sections: at {hz:.6} Hz ({rad_s:.6} rad/s) it is {}, that of the sections {}, a difference of {difference:.1e} of its largest magnitude, above the limit of {limit:.0e}{}; the numbers given are too sensitive to rounding: give `[zpk]` (zeros, poles and gain), which is not",
+    rectangular(.given), rectangular(.sections), nearest(.pole.as_ref())
+)]
+pub struct Inexact {
+    /// The frequency of the largest difference in hertz.
+    pub hz: f64,
+    /// The same frequency in rad/s.
+    pub rad_s: f64,
+    /// Response of the transfer function in amperes per micrometre.
+    pub given: Complex<f64>,
+    /// Response of the sections in amperes per micrometre.
+    pub sections: Complex<f64>,
+    /// Difference relative to the largest magnitude.
+    pub difference: f64,
+    /// Its limit.
+    pub limit: f64,
+    /// The pole of the sections that is nearest to this frequency.
+    pub pole: Option<RootPlace>,
+}
+
+fn rectangular(value: &Complex<f64>) -> String {
+    format!("{:.6e} {:+.6e}j A/um", value.re, value.im)
+}
+
+fn nearest(pole: Option<&RootPlace>) -> String {
+    pole.map_or_else(String::new, |pole| {
+        format!("; the pole that moved is near {pole}")
+    })
+}
+
+/// A zero or pole in the s or the z plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UnstablePole {
+pub struct RootPlace {
     /// Real part, in rad/s in the s plane.
     pub re: f64,
     /// Imaginary part, in rad/s in the s plane.
     pub im: f64,
-    /// Whether it is a pole in the z plane.
+    /// Whether it is in the z plane.
     pub discrete: bool,
 }
 
-impl UnstablePole {
+impl RootPlace {
+    pub(super) fn of(root: Complex<f64>, domain: Domain) -> RootPlace {
+        RootPlace {
+            re: root.re,
+            im: root.im,
+            discrete: domain != Domain::Continuous,
+        }
+    }
+
+    fn integrator(&self) -> &'static str {
+        match self.discrete {
+            true => "z = 1",
+            false => "s = 0",
+        }
+    }
+
     fn remedy(&self) -> &'static str {
         match self.discrete {
             true => {
-                "move the pole inside the unit circle (only a single pole at z = 1, an integrator, is allowed), leave out `rate_hz` if the controller is continuous, or give `[zpk]` if rounding of the numbers moved the pole there"
+                "move the pole inside the unit circle (at most two poles at exactly z = 1, integrators, are allowed), leave out `rate_hz` if the controller is continuous, or give `[zpk]` if rounding of the numbers moved the pole there"
             }
             false => {
-                "move the pole to the left of the imaginary axis (only a single pole at the origin, an integrator, is allowed), add `rate_hz` if the controller is discrete, or give `[zpk]` if rounding of the numbers moved the pole there"
+                "move the pole to the left of the imaginary axis (at most two poles at the origin, integrators, are allowed), add `rate_hz` if the controller is discrete, or give `[zpk]` if rounding of the numbers moved the pole there"
             }
         }
     }
 }
 
-impl fmt::Display for UnstablePole {
+impl fmt::Display for RootPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let UnstablePole { re, im, discrete } = self;
+        let RootPlace { re, im, discrete } = self;
         match discrete {
-            true => write!(f, "z = {re:.9} {im:+.9}j"),
+            true => write!(f, "z = {re:.12} {im:+.12}j"),
             false => write!(f, "s = {re:.4} {im:+.4}j rad/s"),
         }
     }

@@ -3,34 +3,31 @@
 use nalgebra::Complex;
 
 use super::domain::Domain;
-use super::roots::Factors;
+use super::roots::{Factors, Roots};
 
-/// Below the slowest and above the fastest root, as a ratio.
-const BEYOND: f64 = 1e3;
+/// The lowest frequency over the slowest pole. Below it the controller is a constant or integrators.
+const BELOW_SLOWEST: f64 = 0.1;
+/// The highest frequency of a continuous system over its fastest root.
+const ABOVE_FASTEST: f64 = 1e3;
 const POINTS_PER_DECADE: f64 = 40.0;
-/// Tustin's rule puts zeros at z = -1, half the servo rate, where the response is 0 and has no relative difference.
-const BELOW_NYQUIST: f64 = 0.99;
 /// Limits in rad/s, so that a root near the ends of the range of doubles gives a finite number of points.
 const LOWEST: f64 = 1e-100;
 const HIGHEST: f64 = 1e100;
 /// Distances from a root in units of its damping. None is 0: at an undamped root the response is 0 or infinite.
 const AROUND: [f64; 8] = [-10.0, -3.0, -1.0, -0.3, 0.3, 1.0, 3.0, 10.0];
 
-/// Rising frequencies in rad/s: an even logarithmic grid from below the slowest root to above the fastest one (to half the servo
-/// rate of a discrete system), and points around each root.
+/// Rising frequencies in rad/s: an even logarithmic grid from a tenth of the slowest pole to half the servo rate (to a thousand times
+/// the fastest root of a continuous system), and points around each root. Without poles other than integrators the zeros decide.
 pub(super) fn frequencies(factors: &Factors, domain: Domain) -> Vec<f64> {
-    let roots = factors.zeros.all().chain(factors.poles.all());
-    let roots: Vec<Complex<f64>> = roots.filter_map(|root| domain.rad_s(root)).collect();
-    let sizes = roots.iter().map(|root| root.norm());
-    let (low, high) = sizes.fold((f64::INFINITY, 0.0), |(low, high), size| {
-        (f64::min(low, size), f64::max(high, size))
-    });
-    let (low, high) = if roots.is_empty() {
-        (1.0, 1.0)
-    } else {
-        (low, high)
+    let poles = places(&factors.poles, domain);
+    let zeros = places(&factors.zeros, domain);
+    let roots: Vec<Complex<f64>> = zeros.iter().chain(&poles).copied().collect();
+    let slowest = match poles.is_empty() {
+        true => slowest(&zeros),
+        false => slowest(&poles),
     };
-    let (low, high) = limits(low, high, domain);
+    let fastest = roots.iter().map(|root| root.norm()).fold(0.0, f64::max);
+    let (low, high) = limits(slowest, fastest, domain);
     let (low, high) = (low.clamp(LOWEST, HIGHEST), high.clamp(LOWEST, HIGHEST));
     let mut frequencies = even(low, high);
     frequencies.extend(roots.iter().flat_map(|root| around(*root)));
@@ -39,12 +36,25 @@ pub(super) fn frequencies(factors: &Factors, domain: Domain) -> Vec<f64> {
     frequencies
 }
 
+/// The roots in rad/s, without integrators.
+fn places(roots: &Roots, domain: Domain) -> Vec<Complex<f64>> {
+    let places = roots.all().filter_map(|root| domain.rad_s(root));
+    places.collect()
+}
+
+/// The smallest magnitude; 1 rad/s without roots.
+fn slowest(roots: &[Complex<f64>]) -> f64 {
+    let sizes = roots.iter().map(|root| root.norm());
+    sizes.min_by(f64::total_cmp).unwrap_or(1.0)
+}
+
 fn limits(slowest: f64, fastest: f64, domain: Domain) -> (f64, f64) {
+    let low = BELOW_SLOWEST * slowest;
     match domain {
-        Domain::Continuous => (slowest / BEYOND, fastest * BEYOND),
+        Domain::Continuous => (low, ABOVE_FASTEST * fastest.max(slowest)),
         Domain::Discrete { rate_hz } => {
-            let highest = BELOW_NYQUIST * std::f64::consts::PI * rate_hz;
-            (slowest.min(highest) / BEYOND, highest)
+            let half = std::f64::consts::PI * rate_hz;
+            (low.min(BELOW_SLOWEST * half), half)
         }
     }
 }
@@ -68,8 +78,6 @@ fn around(root: Complex<f64>) -> impl Iterator<Item = f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::control::transfer::Roots;
-
     fn factors(poles: &[f64]) -> Factors {
         Factors {
             zeros: Roots::default(),
@@ -82,11 +90,21 @@ mod tests {
     }
 
     #[test]
-    fn grid_goes_from_below_the_slowest_to_above_the_fastest_root() {
+    fn grid_goes_from_below_the_slowest_pole_to_above_the_fastest_root() {
         let found = frequencies(&factors(&[-2.0, -500.0, 0.0]), Domain::Continuous);
-        assert!((found[0] - 2e-3).abs() < 1e-15);
+        assert!((found[0] - 0.2).abs() < 1e-15);
         assert!((found[found.len() - 1] / 5e5 - 1.0).abs() < 1e-12);
         assert!(found.windows(2).all(|pair| pair[0] <= pair[1]));
+    }
+
+    #[test]
+    fn grid_of_a_discrete_system_ends_at_half_the_rate() {
+        // A pole at 50 rad/s and an integrator at 1 kHz.
+        let domain = Domain::Discrete { rate_hz: 1000.0 };
+        let found = frequencies(&factors(&[1.0, f64::exp(-0.05)]), domain);
+        assert!((found[0] - 5.0).abs() < 1e-9, "{}", found[0]);
+        let half = 1000.0 * std::f64::consts::PI;
+        assert!((found[found.len() - 1] / half - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -2,7 +2,9 @@
 
 use nalgebra::{Complex, DMatrix, DVector};
 
+use super::refinement::Values;
 use super::roots::Roots;
+use super::wide::{characteristic, response};
 use crate::control::state_space::{StateSpace, balance, eigenvalues};
 
 /// A system in balanced coordinates, with B and C of the magnitude of A: H(v) = scale (C (v - A)^-1 B + D).
@@ -43,16 +45,42 @@ impl Matrices {
         self.system.a.nrows()
     }
 
-    /// The poles: the eigenvalues of A. An eigenvalue that differs from `integrator` by the error of the iteration becomes equal
-    /// to it.
+    /// The poles: the eigenvalues of A, refined by the values of det(v - A) in twice the working precision.
     pub fn poles(&self) -> Option<Roots> {
-        roots_of(eigenvalues(self.system.a.clone())?)
+        let mut poles = roots_of(eigenvalues(self.system.a.clone())?)?;
+        let values = Values {
+            leading: 1.0,
+            value: |v| characteristic(&self.system.a, v),
+            magnitude: |v| determinant_bound(&self.system.a, v),
+        };
+        values.refine(&mut poles);
+        Some(poles)
+    }
+
+    /// H(v), as if rounded once.
+    pub fn exact_response(&self, v: Complex<f64>) -> Complex<f64> {
+        response(&self.system, v) * self.scale
+    }
+
+    /// How many of the poles may be integrators that the error of the iteration has moved, most first: two, one, or none.
+    ///
+    /// A double eigenvalue moves by the square root of the error of the matrix.
+    pub fn integrators(&self, integrator: f64, poles: &Roots) -> Vec<usize> {
+        let (n, norm) = (self.order() as f64, non_zero(self.system.a.norm()));
+        let double = (BACKWARD_ERROR * n).sqrt() * norm;
+        let second = poles.distances(integrator).get(1).copied();
+        let is_double = second.is_some_and(|distance| distance <= double);
+        let distance = |root: &&f64| (**root - integrator).abs();
+        let nearest = (poles.real.iter()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let is_single = nearest.is_some_and(|root| self.is_eigenvalue(integrator, *root));
+        let counts = [is_double.then_some(2), is_single.then_some(1)];
+        counts.into_iter().flatten().collect()
     }
 
     /// Whether a real eigenvalue is `integrator`, apart from the error of the iteration.
     ///
     /// The error of a simple eigenvalue is that of the matrix times |x| |y|/|y' x| with its right and left eigenvectors x, y.
-    pub fn is_eigenvalue(&self, integrator: f64, found: f64) -> bool {
+    fn is_eigenvalue(&self, integrator: f64, found: f64) -> bool {
         let (n, norm) = (self.order(), non_zero(self.system.a.norm()));
         let difference = (found - integrator).abs();
         if difference > INTEGRATOR_DISTANCE * norm {
@@ -143,6 +171,12 @@ impl Matrices {
         let next = v - value / slope;
         (next.re.is_finite() && next.im.is_finite()).then_some(next)
     }
+}
+
+/// Hadamard's bound of det(v - A): the product of the norms of the rows.
+fn determinant_bound(a: &DMatrix<f64>, v: Complex<f64>) -> f64 {
+    let norms = a.row_iter().map(|row| row.norm() + v.norm());
+    norms.product()
 }
 
 fn non_zero(x: f64) -> f64 {

@@ -7,8 +7,10 @@
 //!                                                                                                     \  discrete: as given
 //! ```
 //!
-//! A transfer function whose numbers do not define its response to a millionth is refused.
+//! A transfer function is refused if the response of its sections differs by more than a millionth of its largest magnitude, or if a
+//! zero or pole crosses the boundary of stability.
 
+mod boundary;
 mod cascade;
 mod check;
 mod domain;
@@ -18,6 +20,7 @@ mod given;
 mod matrices;
 mod pairing;
 mod polynomial;
+mod refinement;
 mod roots;
 mod settings;
 mod wide;
@@ -25,7 +28,8 @@ mod wide;
 pub use cascade::{Cascade, DiscreteDesign};
 pub use check::Agreement;
 pub use domain::Domain;
-pub use error::{TransferError, UnstablePole};
+pub use error::{Inexact, RootPlace, TransferError};
+pub(in crate::control) use given::factors_of_rows;
 pub use roots::{Factors, Roots};
 pub use settings::{
     GainUnit, SsFile, SsSettings, TfFile, TfSettings, TransferSettings, TransferTable, ZpkFile,

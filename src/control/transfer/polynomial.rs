@@ -2,21 +2,16 @@
 
 use nalgebra::{Complex, DMatrix};
 
+use super::refinement::Values;
 use super::roots::Roots;
-use super::wide::{WIDE_EPSILON, horner};
+use super::wide::horner;
 use crate::control::state_space::eigenvalues;
-use crate::util::numeric::{is_within, larger};
 
 /// Coefficients by falling powers; the first one is not 0.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Polynomial {
     falling: Vec<f64>,
 }
-
-/// Largest number of refining steps. Simple roots need two or three, a root of multiplicity m converges by 1 - 1/m per step.
-const MAX_STEPS: usize = 100;
-/// Largest first step relative to its root. A larger one is not a refinement.
-const MAX_STEP: f64 = 0.1;
 
 impl Polynomial {
     /// The polynomial without leading zeros; `None` if all coefficients are 0.
@@ -42,15 +37,19 @@ impl Polynomial {
         horner(&self.falling, v)
     }
 
-    /// sum |a_i| |v|^i: the scale of rounding errors of p(v).
-    pub fn magnitude(&self, v: Complex<f64>) -> f64 {
-        magnitude(&self.falling, v)
-    }
-
-    /// Whether `v` is a root of a polynomial whose coefficients differ from these by their rounding to double precision.
-    pub fn is_root_by_rounding(&self, v: Complex<f64>) -> bool {
-        let terms = self.falling.len() as f64;
-        self.value(v).norm() <= terms * f64::EPSILON * self.magnitude(v)
+    /// How many times `v` is a root of a polynomial whose coefficients differ from these by their rounding to double precision, at
+    /// most `limit`: so many derivatives are 0.
+    pub fn multiplicity_by_rounding(&self, v: Complex<f64>, limit: usize) -> usize {
+        let mut rest = self.falling.clone();
+        for count in 0..limit {
+            let terms = rest.len() as f64;
+            let is_zero = horner(&rest, v).norm() <= terms * f64::EPSILON * magnitude(&rest, v);
+            if rest.len() < 2 || !is_zero {
+                return count;
+            }
+            rest = derivative(&rest);
+        }
+        limit
     }
 
     /// The roots: eigenvalues of the balanced companion matrix, refined by Weierstrass steps (Kerner, Numer. Math. 8, 290, 1966)
@@ -64,10 +63,21 @@ impl Polynomial {
         let roots = Roots::from_list(&start).ok();
         // An eigenvalue that is not a number is neither real nor one of a pair.
         let mut roots = roots.filter(|roots| roots.count() == start.len())?;
-        refine(rest, &mut roots);
+        let values = Values {
+            leading: rest[0],
+            value: |v| horner(rest, v),
+            magnitude: |v| magnitude(rest, v),
+        };
+        values.refine(&mut roots);
         roots.real.extend(std::iter::repeat_n(0.0, at_origin));
         Some(roots)
     }
+}
+
+fn derivative(falling: &[f64]) -> Vec<f64> {
+    let order = falling.len() - 1;
+    let coefficients = falling.iter().take(order).enumerate();
+    coefficients.map(|(i, c)| c * (order - i) as f64).collect()
 }
 
 /// The companion matrix, whose eigenvalues are the roots.
@@ -77,67 +87,6 @@ fn companion(falling: &[f64]) -> DMatrix<f64> {
         0 => -falling[j + 1] / falling[0],
         _ => f64::from(u8::from(i == j + 1)),
     })
-}
-
-/// Moves all roots at once by the steps of Newton's method for the coefficients as functions of the roots. The coefficients of
-/// the product converge also where roots are close to each other and single ones do not. Ends when the steps no longer decrease,
-/// or when rounding makes a noticeable part of them.
-fn refine(falling: &[f64], roots: &mut Roots) {
-    let mut previous = MAX_STEP;
-    for _ in 0..MAX_STEPS {
-        let steps = upper(roots).map(|root| Step::of(falling, roots, root));
-        let steps: Vec<Step> = steps.collect();
-        let largest = steps.iter().map(|step| step.size).fold(0.0, larger);
-        let is_noise = steps.iter().any(|step| step.noise > f64::EPSILON);
-        // Also if a step is not a number: two roots are equal.
-        if is_noise || !is_within(largest, previous) || largest < 0.5 * f64::EPSILON {
-            return;
-        }
-        previous = largest;
-        let (real, pairs) = steps.split_at(roots.real.len());
-        for (root, step) in roots.real.iter_mut().zip(real) {
-            *root -= step.change.re;
-        }
-        for (root, step) in roots.pairs.iter_mut().zip(pairs) {
-            *root -= step.change;
-        }
-    }
-}
-
-/// The real roots, and one of each pair.
-fn upper(roots: &Roots) -> impl Iterator<Item = Complex<f64>> + '_ {
-    let real = roots.real.iter().map(|root| Complex::new(*root, 0.0));
-    real.chain(roots.pairs.iter().copied())
-}
-
-/// A change of a root.
-struct Step {
-    /// p(r)/(a prod(r - other root)).
-    change: Complex<f64>,
-    /// The change relative to the root.
-    size: f64,
-    /// The part of the size that rounding makes.
-    noise: f64,
-}
-
-impl Step {
-    fn of(falling: &[f64], roots: &Roots, root: Complex<f64>) -> Step {
-        let mut slope = Complex::new(falling[0], 0.0);
-        let mut itself = true;
-        for other in roots.all() {
-            if itself && other == root {
-                itself = false;
-            } else {
-                slope *= root - other;
-            }
-        }
-        let change = horner(falling, root) / slope;
-        Step {
-            change,
-            size: change.norm() / root.norm(),
-            noise: WIDE_EPSILON * magnitude(falling, root) / (slope * root).norm(),
-        }
-    }
 }
 
 /// sum |a_i| |v|^i.

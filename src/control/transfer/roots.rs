@@ -47,6 +47,12 @@ impl Roots {
         }
     }
 
+    /// Adds the roots of a factor.
+    pub(super) fn append(&mut self, other: Roots) {
+        self.real.extend(other.real);
+        self.pairs.extend(other.pairs);
+    }
+
     /// Number of roots.
     pub fn count(&self) -> usize {
         self.real.len() + 2 * self.pairs.len()
@@ -64,15 +70,43 @@ impl Roots {
         self.all().map(|root| v - root).product()
     }
 
-    /// Moves the real root nearest to `target` onto it, if `is_same` accepts it. Returns the distance.
-    pub(super) fn snap(&mut self, target: f64, is_same: impl Fn(f64) -> bool) -> f64 {
-        let distance = |root: f64| (root - target).abs();
-        let roots = self.real.iter_mut();
-        let nearest = roots.min_by(|a, b| distance(**a).total_cmp(&distance(**b)));
-        match nearest {
-            Some(root) if is_same(*root) => distance(std::mem::replace(root, target)),
-            _ => 0.0,
+    /// Replaces the `count` roots nearest to `target` by it. A pair is two roots.
+    pub(super) fn snap(&mut self, target: f64, count: usize) {
+        let mut left = count;
+        while left > 0 {
+            let (real, pair) = (self.nearest_real(target), self.nearest_pair(target));
+            match (real, pair) {
+                (real, Some((index, distance)))
+                    if left > 1 && real.is_none_or(|(_, other)| distance < other) =>
+                {
+                    self.pairs.swap_remove(index);
+                    left -= 2;
+                }
+                (Some((index, _)), _) => {
+                    self.real.swap_remove(index);
+                    left -= 1;
+                }
+                _ => break,
+            }
         }
+        self.real.extend(std::iter::repeat_n(target, count - left));
+    }
+
+    fn nearest_real(&self, target: f64) -> Option<(usize, f64)> {
+        let distances = self.real.iter().map(|root| (root - target).abs());
+        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    fn nearest_pair(&self, target: f64) -> Option<(usize, f64)> {
+        let distances = self.pairs.iter().map(|root| (root - target).norm());
+        distances.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// Distances of all roots from `target`, rising.
+    pub(super) fn distances(&self, target: f64) -> Vec<f64> {
+        let mut distances: Vec<f64> = self.all().map(|root| (root - target).norm()).collect();
+        distances.sort_by(f64::total_cmp);
+        distances
     }
 }
 
@@ -119,6 +153,21 @@ mod tests {
         assert_eq!(Roots::from_list(&[alone]), Err(alone));
         let near = Complex::new(-1.0, 2.000_001);
         assert_eq!(Roots::from_list(&[alone, near]), Err(near));
+    }
+
+    #[test]
+    fn roots_nearest_to_an_integrator_become_it() {
+        let roots = Roots {
+            real: vec![0.5, 0.99],
+            pairs: vec![Complex::new(1.0, 1e-8)],
+        };
+        let (mut single, mut double) = (roots.clone(), roots);
+        double.snap(1.0, 2);
+        assert_eq!(double.real, [0.5, 0.99, 1.0, 1.0]);
+        assert!(double.pairs.is_empty());
+        single.snap(1.0, 1);
+        assert_eq!((single.real.len(), single.pairs.len()), (2, 1));
+        assert!(single.real.contains(&1.0) && single.real.contains(&0.5));
     }
 
     #[test]

@@ -76,8 +76,8 @@ pub struct SsSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1.0, max = 100000.0))]
     pub rate_hz: Option<f64>,
-    /// A, row by row.
-    #[schemars(length(min = 1, max = 32))]
+    /// A, row by row; empty for a static gain.
+    #[schemars(length(max = 32))]
     pub a: Vec<Vec<f64>>,
     /// B, one number per state.
     pub b: Vec<f64>,

@@ -1,10 +1,12 @@
-//! Polynomials in twice the working precision, for sums whose terms cancel.
+//! Polynomials, determinants and transfer functions of matrices in twice the working precision, for sums whose terms cancel.
 //!
 //! A number is an unevaluated sum of two doubles (Dekker, Numer. Math. 18, 224, 1971), with a relative precision of about 2^-104.
 
-use std::ops::{Add, Mul};
+use std::ops::{Add, Div, Mul, Sub};
 
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
+
+use crate::control::state_space::StateSpace;
 
 /// Relative error of a few operations.
 pub(super) const WIDE_EPSILON: f64 = 1e-31;
@@ -71,6 +73,37 @@ impl Mul<f64> for Wide {
     }
 }
 
+impl Sub for Wide {
+    type Output = Wide;
+
+    fn sub(self, other: Wide) -> Wide {
+        self + other.negative()
+    }
+}
+
+impl Mul for Wide {
+    type Output = Wide;
+
+    fn mul(self, other: Wide) -> Wide {
+        let high = self.high * other.high;
+        let rest = self.high * other.low + self.low * other.high;
+        Wide::normalised(high, libm::fma(self.high, other.high, -high) + rest)
+    }
+}
+
+impl Div for Wide {
+    type Output = Wide;
+
+    /// Long division with two digits, each of a double.
+    fn div(self, other: Wide) -> Wide {
+        let first = self.high / other.high;
+        let rest = self - other * first;
+        let second = rest.high / other.high;
+        let rest = rest - other * second;
+        Wide::normalised(first, second) + Wide::sum(rest.high / other.high, 0.0)
+    }
+}
+
 #[derive(Clone, Copy, Debug, Default)]
 struct WideComplex {
     re: Wide,
@@ -78,6 +111,24 @@ struct WideComplex {
 }
 
 impl WideComplex {
+    fn real(x: f64) -> WideComplex {
+        WideComplex {
+            re: Wide::sum(x, 0.0),
+            im: Wide::default(),
+        }
+    }
+
+    fn of(v: Complex<f64>) -> WideComplex {
+        WideComplex {
+            im: Wide::sum(v.im, 0.0),
+            ..WideComplex::real(v.re)
+        }
+    }
+
+    fn size(self) -> f64 {
+        self.re.high.abs() + self.im.high.abs()
+    }
+
     fn rounded(self) -> Complex<f64> {
         Complex::new(self.re.rounded(), self.im.rounded())
     }
@@ -94,6 +145,17 @@ impl Add for WideComplex {
     }
 }
 
+impl Mul<f64> for WideComplex {
+    type Output = WideComplex;
+
+    fn mul(self, factor: f64) -> WideComplex {
+        WideComplex {
+            re: self.re * factor,
+            im: self.im * factor,
+        }
+    }
+}
+
 impl Mul<Complex<f64>> for WideComplex {
     type Output = WideComplex;
 
@@ -105,15 +167,119 @@ impl Mul<Complex<f64>> for WideComplex {
     }
 }
 
+impl Sub for WideComplex {
+    type Output = WideComplex;
+
+    fn sub(self, other: WideComplex) -> WideComplex {
+        WideComplex {
+            re: self.re - other.re,
+            im: self.im - other.im,
+        }
+    }
+}
+
+impl Mul for WideComplex {
+    type Output = WideComplex;
+
+    fn mul(self, other: WideComplex) -> WideComplex {
+        WideComplex {
+            re: self.re * other.re - self.im * other.im,
+            im: self.re * other.im + self.im * other.re,
+        }
+    }
+}
+
+impl Div for WideComplex {
+    type Output = WideComplex;
+
+    fn div(self, other: WideComplex) -> WideComplex {
+        let square = other.re * other.re + other.im * other.im;
+        let conjugate = WideComplex {
+            im: other.im.negative(),
+            ..other
+        };
+        let product = self * conjugate;
+        WideComplex {
+            re: product.re / square,
+            im: product.im / square,
+        }
+    }
+}
+
+/// Rows of v - A, each followed by that of -B; and the row C, D at the end.
+fn bordered(system: &StateSpace, v: Complex<f64>) -> Vec<Vec<WideComplex>> {
+    let n = system.a.nrows();
+    let entry = |i: usize, j: usize| {
+        let constant = match (i < n, j < n) {
+            (true, true) => -system.a[(i, j)],
+            (true, false) => -system.b[(i, 0)],
+            (false, true) => system.c[(0, j)],
+            (false, false) => system.d,
+        };
+        match i == j && i < n {
+            true => WideComplex::of(v) + WideComplex::real(constant),
+            false => WideComplex::real(constant),
+        }
+    };
+    let row = |i: usize| (0..=n).map(|j| entry(i, j)).collect();
+    (0..=n).map(row).collect()
+}
+
+/// Eliminates the first columns of a bordered matrix with partial pivoting among all rows but the last one. Returns the determinant of
+/// the part without border, and the last entry, C (v - A)^-1 B + D.
+fn eliminated(mut rows: Vec<Vec<WideComplex>>) -> (WideComplex, WideComplex) {
+    let n = rows.len() - 1;
+    let mut determinant = WideComplex::real(1.0);
+    for step in 0..n {
+        let size = |row: &usize| rows[*row][step].size();
+        let pivot = (step..n).max_by(|a, b| size(a).total_cmp(&size(b)));
+        let pivot = pivot.unwrap_or(step);
+        if pivot != step {
+            rows.swap(step, pivot);
+            determinant = determinant * -1.0;
+        }
+        let (above, below) = rows.split_at_mut(step + 1);
+        let pivot_row = &above[step];
+        determinant = determinant * pivot_row[step];
+        for row in below {
+            subtract(row, pivot_row, step);
+        }
+    }
+    (determinant, rows[n][n])
+}
+
+fn subtract(row: &mut [WideComplex], pivot_row: &[WideComplex], step: usize) {
+    if row[step].size() == 0.0 {
+        return;
+    }
+    let factor = row[step] / pivot_row[step];
+    for (entry, pivot) in row.iter_mut().zip(pivot_row).skip(step + 1) {
+        *entry = *entry - factor * *pivot;
+    }
+}
+
+/// det(v - A), as if rounded once.
+pub(super) fn characteristic(a: &DMatrix<f64>, v: Complex<f64>) -> Complex<f64> {
+    let n = a.nrows();
+    let system = StateSpace {
+        a: a.clone(),
+        b: DMatrix::zeros(n, 1),
+        c: DMatrix::zeros(1, n),
+        d: 0.0,
+    };
+    eliminated(bordered(&system, v)).0.rounded()
+}
+
+/// C (v - A)^-1 B + D, as if rounded once unless more than 15 digits cancel.
+pub(super) fn response(system: &StateSpace, v: Complex<f64>) -> Complex<f64> {
+    eliminated(bordered(system, v)).1.rounded()
+}
+
 /// p(v) by Horner's rule; coefficients by falling powers. The result is that of exact arithmetic, rounded, unless more than 30
 /// digits cancel.
 pub(super) fn horner(falling: &[f64], v: Complex<f64>) -> Complex<f64> {
     let value = falling.iter().fold(WideComplex::default(), |value, &c| {
-        let constant = WideComplex {
-            re: Wide::sum(c, 0.0),
-            im: Wide::default(),
-        };
-        value * v + constant
+        value * v + WideComplex::real(c)
     });
     value.rounded()
 }
@@ -138,5 +304,34 @@ mod tests {
         // (v^2 + 1)(v - 2) = v^3 - 2 v^2 + v - 2 at v = 1 + j: v^2 + 1 = 1 + 2j, times (-1 + j) = -3 - j.
         let value = horner(&[1.0, -2.0, 1.0, -2.0], Complex::new(1.0, 1.0));
         assert_eq!(value, Complex::new(-3.0, -1.0));
+    }
+
+    #[test]
+    fn quotient_has_twice_the_precision() {
+        let third = Wide::sum(1.0, 0.0) / Wide::sum(3.0, 0.0);
+        let rest = third * 3.0 - Wide::sum(1.0, 0.0);
+        assert!(rest.rounded().abs() < WIDE_EPSILON, "{third:?}");
+        assert_eq!(third.high, 1.0 / 3.0);
+    }
+
+    #[test]
+    fn determinant_and_response_of_a_companion_matrix_are_exact() {
+        // (v - 1)^8, whose value at 1 + 2^-10 is 2^-80; and the response 1/(v - 1)^8.
+        let falling = [8.0, -28.0, 56.0, -70.0, 56.0, -28.0, 8.0, -1.0];
+        let a = DMatrix::from_fn(8, 8, |i, j| match i {
+            0 => falling[j],
+            _ => f64::from(u8::from(i == j + 1)),
+        });
+        let v = Complex::new(1.0 + libm::exp2(-10.0), 0.0);
+        let found = characteristic(&a, v).re / libm::exp2(-80.0);
+        assert!((found - 1.0).abs() < 1e-3, "{found}");
+        let system = StateSpace {
+            b: DMatrix::from_fn(8, 1, |i, _| f64::from(u8::from(i == 0))),
+            c: DMatrix::from_fn(1, 8, |_, j| f64::from(u8::from(j == 7))),
+            d: 0.0,
+            a,
+        };
+        let found = response(&system, v).re * libm::exp2(-80.0);
+        assert!((found - 1.0).abs() < 1e-3, "{found}");
     }
 }
