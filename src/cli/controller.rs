@@ -1,7 +1,6 @@
 //! `bench controller`: controllers of other programs.
 
-use std::fs::File;
-use std::io::Write;
+use std::fs::{File, remove_file};
 use std::path::{Path, PathBuf};
 
 use clap::{Subcommand, ValueEnum};
@@ -15,6 +14,7 @@ use crate::control::{
     Agreement, Cascade, Domain, GainUnit, ImportOptions, Imported, Roots, Section, TransferTable,
     import,
 };
+use crate::util::atomic_file::write_atomic;
 use crate::util::quantity::{OfFrequency, si};
 
 /// What to do with a controller.
@@ -29,12 +29,14 @@ enum ControllerCommand {
     /// Convert a controller that MATLAB or Python has saved to a controller file
     ///
     /// FILE is a MAT-file of level 5 (MATLAB `save`, without `-v7.3`; `scipy.io.savemat`), a numpy archive (`numpy.savez`) or a
-    /// JSON object. It contains the arrays `num`, `den` (falling powers), or `z`, `p`, `k`, or `A`, `B`, `C`, `D`, and the sampling
-    /// period `Ts` in seconds (0: continuous), at the top level or in a structure. A `tf`, `zpk` or `ss` object of MATLAB cannot be
-    /// read: save its arrays, for example with `[num, den, Ts] = tfdata(C, 'v'); save('c.mat', 'num', 'den', 'Ts', '-v7')`.
+    /// JSON object. It contains the arrays `num`, `den` (falling powers), or `z`, `p`, `k`, or `A`, `B`, `C`, `D`, or `sos` or `b`, `a`
+    /// of scipy.signal, and the sampling period `Ts` in seconds (0: continuous), at the top level or in a structure, which may be that of
+    /// `get(C)` in MATLAB. A `tf`, `zpk` or `ss` object of MATLAB cannot be read: save `S = get(C)`, or its arrays, for example with
+    /// `[num, den, Ts] = tfdata(C, 'v'); save('c.mat', 'num', 'den', 'Ts', '-v7')`.
     ///
-    /// The controller file has the numbers as they were saved. They are converted to first and second order sections whose response
-    /// must be that of the original; otherwise the controller is refused.
+    /// The controller file has the numbers as they were saved. Delays of whole samples, E, the unit of time and the variable are used;
+    /// every other field that may change the response is refused by its name. The controller is converted to first and second order
+    /// sections whose response must be that of the original to a millionth of its largest magnitude; otherwise it is refused.
     Import(ImportArgs),
 }
 
@@ -99,9 +101,10 @@ struct Report {
     poles: Vec<[f64; 2]>,
     /// In amperes per micrometre, by falling powers of s or z.
     sections: Vec<SectionReport>,
-    /// Largest relative difference of the responses of the sections and of the original.
+    /// Largest difference of the responses of the sections and of the original, over the largest magnitude.
     max_difference: f64,
     max_difference_rad_s: f64,
+    remarks: Vec<String>,
 }
 
 #[derive(Debug, Serialize)]
@@ -139,15 +142,22 @@ fn stem(file: &Path) -> String {
     stem.to_string_lossy().into_owned()
 }
 
+/// Writes a file that does not exist yet; it is complete, or absent after an error.
 fn write_new(file: &Path, text: &str) -> Result<(), CliError> {
-    let created = File::create_new(file);
-    let written = created.and_then(|mut file| file.write_all(text.as_bytes()));
-    written.map_err(|e| {
+    let failed = |e: std::io::Error| {
         let file = file.display();
         CliError::Failed(format!(
             "cannot write {file}: {e}; choose another file with --out"
         ))
-    })
+    };
+    // The empty file holds the name.
+    File::create_new(file).map_err(failed)?;
+    let written = write_atomic(file, text);
+    if written.is_err() {
+        // The error of writing is the one to report.
+        let _ = remove_file(file);
+    }
+    written.map_err(failed)
 }
 
 impl Report {
@@ -170,6 +180,7 @@ impl Report {
             sections: sections.iter().map(SectionReport::of).collect(),
             max_difference: difference,
             max_difference_rad_s: rad_s,
+            remarks: imported.remarks.clone(),
         }
     }
 }
@@ -203,11 +214,17 @@ fn text(report: &Report) -> String {
         ("sections", sections.to_string()),
         (
             "response",
-            format!("largest relative difference {difference:.1e}, at {rad_s:.4} rad/s"),
+            format!(
+                "largest difference {difference:.1e} of the largest magnitude, at {rad_s:.4} rad/s"
+            ),
         ),
     ];
+    let remarks = report
+        .remarks
+        .iter()
+        .map(|remark| ("remark", remark.clone()));
+    let lines = lines.into_iter().chain(remarks);
+    let lines: String = lines.map(|(name, value)| labelled(name, &value)).collect();
     let file = &report.file;
-    let lines = lines.map(|(name, value)| labelled(name, &value));
-    let next = format!("{file} written; `bench margins --controller {file}` evaluates it\n");
-    next + &lines.concat()
+    format!("{file} written; `bench margins --controller {file}` evaluates it\n{lines}")
 }

@@ -188,7 +188,7 @@ fn rejects_files_without_a_usable_controller() {
         (
             r#"{"A": [[1, 2]], "B": [1], "C": [1], "Ts": 0}"#,
             "",
-            &["`ss.a` has 2 numbers"],
+            &["`A` has the size 1x2 (rows x columns)"],
         ),
         (
             r#"{"num": [1], "den": [1, 2], "Ts": 0, "P": {"z": [], "p": [], "k": 1}}"#,

@@ -2,8 +2,12 @@
 //! as it is given, and files of other programs are read without loss.
 
 mod convert;
+mod fields;
 mod files;
+mod gates;
+mod integrators;
 mod refused;
+mod response;
 mod runs;
 
 use bench_test_support::program;

@@ -7,6 +7,14 @@
                     coefficients of polynomials; of matrices in a backward stable algorithm), and whether all poles of the numbers in the file are stable (1 or 0)
     fast FOLDER     the same for the fast controller of the thesis, Eq. (6-7), as tf, zpk and ss, continuous and discrete
     files FOLDER    writes the controllers of standard input (JSON: num, den, z, p, k, A, B, C, D, Ts) in every format
+    fields FOLDER   writes the JSON array of objects of standard input as INDEX-struct.mat, INDEX-top.mat and INDEX.npz
+    gain FOLDER     writes a static gain of 2e4 as matrices without states: gain.mat, gain.npz
+    butterworth FOLDER   writes 60 Butterworth filters at 5 kHz as INDEX.npz, as polynomials and as matrices; prints for each of them
+                    and each of its frequencies a line index, frequency in rad/s, the response of the numbers in the file with 60
+                    digits (re, im), the largest magnitude in the band, whether its poles are stable (1 or 0), the form (0: polynomials,
+                    1: zeros and poles, 2: matrices)
+    integrators FOLDER   the same for 40 random controllers with an integrator at 1 to 20 kHz, in three forms, by Tustin's rule and
+                    with a zero-order hold
     runs            reads a JSON array of controllers with `input`; prints a line for each: the output of scipy.signal.lfilter
                     (num, den) or dlsim (A, B, C, D)
 """
@@ -231,6 +239,105 @@ def files(folder):
     scipy.io.savemat(f"{folder}/ss-control.mat", {"A": system.A, "B": system.B, "C": system.C, "D": system.D, "dt": system.dt})
 
 
+def arrays(fields):
+    """A JSON object as arrays; texts and flags remain."""
+    keep = (bool, str)
+    return {name: value if isinstance(value, keep) else np.array(value) for name, value in fields.items()}
+
+
+def fields(folder):
+    for index, given in enumerate(json.load(sys.stdin)):
+        parts = arrays(given)
+        scipy.io.savemat(f"{folder}/{index}-struct.mat", {"S": parts})
+        scipy.io.savemat(f"{folder}/{index}-top.mat", parts, do_compression=True)
+        np.savez(f"{folder}/{index}.npz", **parts)
+
+
+def gain(folder):
+    parts = {"A": np.zeros((0, 0)), "B": np.zeros((0, 1)), "C": np.zeros((1, 0)), "D": [[2e4]], "Ts": 0.0}
+    scipy.io.savemat(f"{folder}/gain.mat", parts)
+    np.savez(f"{folder}/gain.npz", **parts)
+
+
+def saved(folder, index, form, parts, rate_hz, slowest):
+    """Writes a discrete controller, and prints its response from a tenth of its slowest mode to half the rate."""
+    names = {"tf": ("num", "den"), "zpk": ("z", "p", "k"), "ss": ("A", "B", "C", "D")}[form]
+    parts = [np.asarray(part) for part in parts]
+    np.savez(f"{folder}/{index}.npz", **dict(zip(names, parts)), Ts=1 / rate_hz)
+    omegas = np.geomspace(0.1 * slowest, np.pi * rate_hz, 25)
+    points = [np.exp(1j * omega / rate_hz) for omega in omegas]
+    truth = [complex(exact(form, parts, mpmath.mpc(v.real, v.imag))) for v in points]
+    largest = max(abs(value) for value in truth)
+    stable = are_stable(form, parts, rate_hz)
+    for omega, value in zip(omegas, truth):
+        print(index, omega, value.real, value.imag, largest, stable, ("tf", "zpk", "ss").index(form))
+
+
+def butterworth(folder):
+    index = 0
+    for order in range(1, 7):
+        for cutoff_hz in (20, 40, 70, 100, 200, 300, 500, 1000, 1500, 2000):
+            tf = scipy.signal.butter(order, cutoff_hz, fs=RATE_HZ)
+            for form, parts in (("tf", tf), ("ss", scipy.signal.tf2ss(*tf))):
+                saved(folder, index, form, parts, RATE_HZ, 2 * np.pi * cutoff_hz)
+                index += 1
+
+
+def random_factors(draw):
+    """Numerators and denominators of PI, lead, low-pass, one or two notches; s in rad/s."""
+    crossover = np.exp(draw.uniform(np.log(60), np.log(1500)))
+    gain, low_pass = np.exp(draw.uniform(-5, 10)), crossover * draw.uniform(8, 15)
+    factors = [
+        ([gain, gain * crossover / draw.uniform(5, 20)], [1, 0]),
+        ([3, crossover], [1, 3 * crossover]),
+        ([low_pass], [1, low_pass]),
+    ]
+    for _ in range(int(draw.integers(1, 3))):
+        omega = crossover * draw.uniform(1.5, 5)
+        zetas = draw.uniform(0.005, 0.05), draw.uniform(0.1, 0.7)
+        factors.append(tuple([1, 2 * zeta * omega, omega**2] for zeta in zetas))
+    return factors
+
+
+def matrices(system):
+    return system.A, system.B, system.C, system.D
+
+
+def integrators(folder):
+    draw = np.random.default_rng(20261126)
+    index = 0
+    for _ in range(40):
+        factors = random_factors(draw)
+        zeros, poles = (np.concatenate([np.roots(factor[part]) for factor in factors]) for part in (0, 1))
+        gain = np.prod([factor[0][0] / factor[1][0] for factor in factors])
+        fastest, slowest = max(abs(poles)), min(abs(pole) for pole in poles if pole != 0)
+        rate_hz = float(next(rate for rate in (1000, 2000, 5000, 10000, 20000) if rate > 0.5 * fastest))
+        series = control.ss([], [], [], [[1.0]])
+        for factor in factors:
+            series = control.ss(control.tf(*factor)) * series
+        tustin = scipy.signal.bilinear_zpk(zeros, poles, gain, rate_hz)
+        held = matrices(control.sample_system(series, 1 / rate_hz, "zoh"))
+        held_tf = scipy.signal.ss2tf(*held)
+        held_zeros = np.roots(np.trim_zeros(np.where(np.arange(len(held_tf[0][0])) < 1, 0, held_tf[0][0]), "f"))
+        forms = [
+            ("tf", [np.real(part) for part in scipy.signal.zpk2tf(*tustin)]),
+            ("zpk", tustin),
+            ("ss", matrices(control.sample_system(series, 1 / rate_hz, "tustin"))),
+            ("tf", [np.ravel(part) for part in held_tf]),
+            ("zpk", (closed(held_zeros), np.exp(poles / rate_hz), held_tf[0][0][1])),
+            ("ss", held),
+        ]
+        for form, parts in forms:
+            saved(folder, index, form, parts, rate_hz, slowest)
+            index += 1
+
+
+def closed(roots):
+    """The roots with exact conjugates."""
+    upper = [root for root in roots if root.imag > 0]
+    return np.array([complex(root.real) for root in roots if root.imag == 0] + upper + [root.conjugate() for root in upper])
+
+
 def runs():
     for case in json.load(sys.stdin):
         signal = np.array(case["input"])
@@ -244,7 +351,8 @@ def runs():
 
 def main():
     mode, *rest = sys.argv[1:]
-    {"random": random, "fast": fast, "files": files, "runs": runs}[mode](*rest)
+    modes = (random, fast, files, fields, gain, butterworth, integrators, runs)
+    {function.__name__: function for function in modes}[mode](*rest)
 
 
 main()

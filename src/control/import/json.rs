@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 use serde_json::Value as Json;
 
-use super::names::is_root_list;
+use super::names::RootList;
 use super::value::{MAX_ENTRIES, NumericArray, Value, Variables};
 use crate::control::import_error::FormatError;
 
@@ -33,19 +33,31 @@ fn value(name: &str, json: Json) -> Value {
             |x| Value::Numbers(NumericArray::scalar(x)),
         ),
         Json::Array(items) => {
-            let array = match is_root_list(name) {
-                true => root_list(&items),
-                false => numbers(&items),
+            let array = match RootList::of(name) {
+                _ if is_ambiguous(name, &items) => {
+                    return Value::Other("one pair of numbers, which may be a complex root or two real ones (write real roots as a list of numbers)".into());
+                }
+                Some(_) => root_list(&items),
+                None => numbers(&items),
             };
             array.map_or_else(
                 || Value::Other("an array whose entries are not numbers, or whose rows have different lengths".into()),
                 Value::Numbers,
             )
         }
-        Json::Null => Value::Other("null".into()),
-        Json::Bool(flag) => Value::Other(flag.to_string()),
-        Json::String(_) => Value::Other("text".into()),
+        Json::Null => Value::Empty,
+        Json::Bool(flag) => Value::Flag(flag),
+        Json::String(text) => Value::Text(text),
     }
+}
+
+/// Whether `[[a, 0]]` is the cell `{[a 0]}` of `jsonencode(get(C))`, or the real root `a`.
+fn is_ambiguous(name: &str, items: &[Json]) -> bool {
+    let is_cell = RootList::of(name) == Some(RootList::Cell);
+    let [Json::Array(pair)] = items else {
+        return false;
+    };
+    is_cell && pair.len() == 2 && pair[1].as_f64() == Some(0.0)
 }
 
 /// Zeros or poles: numbers and `[re, im]` pairs.

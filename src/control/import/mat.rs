@@ -25,6 +25,9 @@ const COMPRESSED: u32 = 15;
 /// Bit of the flags of an array with imaginary parts.
 const COMPLEX_FLAG: u32 = 0x800;
 
+/// Bit of the flags of an array of true and false.
+const LOGICAL_FLAG: u32 = 0x200;
+
 /// The variables of a MAT-file.
 pub(super) fn variables(bytes: &[u8]) -> Result<Variables, FormatError> {
     let mut file = Bytes::new(bytes, is_big_endian(bytes)?);
@@ -137,12 +140,12 @@ fn array(bytes: &mut Bytes<'_>, depth: usize) -> Result<(String, Value), FormatE
     let shape = shape(bytes)?;
     let name = text(Element::read(bytes)?.data);
     let value = match class {
-        6..=15 => numbers(bytes, shape, flags & COMPLEX_FLAG != 0)?,
+        6..=15 => numbers(bytes, shape, flags)?,
         1 | 2 if depth == 0 => Value::Other("a structure that is nested too deeply".into()),
         1 => cell(bytes, &shape, depth)?,
         2 => structure(bytes, &shape, depth)?,
         3 => Value::Other("an object".into()),
-        4 => Value::Other("text".into()),
+        4 => characters(bytes, &shape)?,
         5 => Value::Other("a sparse matrix (convert it with `full`)".into()),
         16 => Value::Other("a function".into()),
         _ => Value::Other("data of an unknown class".into()),
@@ -166,17 +169,35 @@ fn text(data: &[u8]) -> String {
     text.trim_end_matches('\0').to_string()
 }
 
+/// A text of one row.
+fn characters(bytes: &mut Bytes<'_>, shape: &[usize]) -> Result<Value, FormatError> {
+    let big_endian = bytes.is_big_endian();
+    let Element { kind, data } = Element::read(bytes)?;
+    let several_rows = shape.len() == 2 && shape.first().is_some_and(|rows| *rows > 1);
+    Ok(match kind {
+        _ if several_rows => Value::Other("a text of several rows".into()),
+        1 | 2 | 16 => Value::Text(text(data)),
+        4 | 17 => Value::Text(utf16(data, big_endian)),
+        _ => Value::Other("text".into()),
+    })
+}
+
+fn utf16(data: &[u8], big_endian: bool) -> String {
+    let units = data.chunks_exact(2);
+    let units: Vec<u16> = units
+        .map(|unit| unsigned(unit, big_endian) as u16)
+        .collect();
+    String::from_utf16_lossy(&units)
+}
+
 fn shape(bytes: &mut Bytes<'_>) -> Result<Vec<usize>, FormatError> {
     let sizes = Element::read(bytes)?.data.chunks_exact(4);
     let sizes = sizes.map(|part| unsigned(part, bytes.is_big_endian()) as usize);
     Ok(sizes.collect())
 }
 
-fn numbers(
-    bytes: &mut Bytes<'_>,
-    shape: Vec<usize>,
-    is_complex: bool,
-) -> Result<Value, FormatError> {
+fn numbers(bytes: &mut Bytes<'_>, shape: Vec<usize>, flags: u32) -> Result<Value, FormatError> {
+    let is_complex = flags & COMPLEX_FLAG != 0;
     let Some(count) = entry_count(&shape) else {
         return Ok(Value::Other("an array that is too large".into()));
     };
@@ -185,6 +206,9 @@ fn numbers(
         true => real_numbers(bytes, count)?,
         false => vec![0.0; count],
     };
+    if let (true, [flag]) = (flags & LOGICAL_FLAG != 0, re.as_slice()) {
+        return Ok(Value::Flag(*flag != 0.0));
+    }
     let entries = re.into_iter().zip(im).map(|(re, im)| Complex::new(re, im));
     Ok(Value::Numbers(NumericArray {
         shape,
@@ -251,6 +275,7 @@ impl Number {
 /// A cell of one element is its element: `num` of a transfer function with one input and one output.
 fn cell(bytes: &mut Bytes<'_>, shape: &[usize], depth: usize) -> Result<Value, FormatError> {
     match entry_count(shape) {
+        Some(0) => Ok(Value::Empty),
         Some(1) => inner(bytes, depth),
         _ => Ok(Value::Other("a cell array of several elements".into())),
     }

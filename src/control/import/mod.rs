@@ -1,14 +1,25 @@
 //! Controllers in files of other programs: MAT-files of level 5 (MATLAB, scipy), archives of numpy, JSON.
 //!
-//! A file has the arrays num, den, Ts of a ratio of polynomials, or z, p, k, Ts, or A, B, C, D, Ts, at its top level or in a
-//! structure. The result is a controller file with the table `[tf]`, `[zpk]` or `[ss]` and the numbers as they were saved.
+//! A file has the arrays num, den, Ts of a ratio of polynomials, or z, p, k, Ts, or A, B, C, D, Ts, or those of scipy.signal, at its
+//! top level or in a structure. The result is a controller file with the table `[tf]`, `[zpk]` or `[ss]` and the numbers as they were
+//! saved, unless another field of the file (a delay, a unit of time, E) changes the response.
+//!
+//! ```text
+//!  bytes --mat, npz, json--> variables --select--> form, domain, properties --convert--> TransferSettings --> controller file
+//! ```
 
 mod bytes;
+mod convert;
+mod form;
 mod json;
 mod mat;
 mod names;
 mod npy;
 mod npz;
+mod parts;
+mod period;
+mod properties;
+mod remarks;
 mod select;
 mod value;
 
@@ -32,6 +43,8 @@ pub struct Imported {
     pub cascade: Cascade,
     /// The controller file (TOML).
     pub text: String,
+    /// Fields that changed the numbers, and poles that deserve attention.
+    pub remarks: Vec<String>,
 }
 
 /// Servo rate at which a continuous controller is checked: its sections are stable and proper at any rate.
@@ -59,7 +72,8 @@ pub fn import(
         path: path.into(),
         why,
     };
-    let settings = select::select(&variables, options).map_err(content)?;
+    let selected = select::select(&variables, options).map_err(content)?;
+    let settings = convert::settings(&selected, options.gain_unit).map_err(content)?;
     let text = settings.toml(title);
     let text = text.map_err(|e| content(format!("{e}; report this with the file")))?;
     let name = path.display().to_string();
@@ -77,6 +91,7 @@ pub fn import(
     controller.design(settings.rate_hz().unwrap_or(ANY_RATE_HZ))?;
     Ok(Imported {
         settings,
+        remarks: remarks::of(&selected, &cascade),
         cascade,
         text: controller.text,
     })

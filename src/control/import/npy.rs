@@ -6,6 +6,9 @@ use super::bytes::{Bytes, float, signed, unsigned};
 use super::value::{NumericArray, Value, entry_count};
 use crate::control::import_error::FormatError;
 
+/// Longest text in characters.
+const MAX_TEXT: usize = 4096;
+
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// The array of a `.npy` file.
@@ -23,10 +26,7 @@ pub(super) fn array(bytes: &[u8]) -> Result<Value, FormatError> {
     let header = std::str::from_utf8(header).unwrap_or_default();
     let description = Description::of(header).ok_or_else(|| rest.damaged("the header"))?;
     let Some(kind) = Kind::of(&description.kind) else {
-        return Ok(Value::Other(format!(
-            "an array of the type {}",
-            description.kind
-        )));
+        return other(&description, &mut rest);
     };
     let Some(count) = entry_count(&description.shape) else {
         return Ok(Value::Other("an array that is too large".into()));
@@ -43,6 +43,36 @@ pub(super) fn array(bytes: &[u8]) -> Result<Value, FormatError> {
         },
         false => NumericArray::from_rows(description.shape, &entries),
     }))
+}
+
+/// An array of another type: one text or flag is read.
+fn other(description: &Description, rest: &mut Bytes<'_>) -> Result<Value, FormatError> {
+    let is_one = entry_count(&description.shape) == Some(1);
+    let (class, size) = description.kind.split_at_checked(2).unwrap_or_default();
+    let size: usize = size.parse().unwrap_or(0);
+    match class {
+        "|b" if is_one => Ok(Value::Flag(rest.take(1, "a flag")? != [0])),
+        "<U" if is_one && size <= MAX_TEXT => {
+            Ok(Value::Text(unicode(rest.take(4 * size, "a text")?)))
+        }
+        "|S" if is_one && size <= MAX_TEXT => {
+            let text = String::from_utf8_lossy(rest.take(size, "a text")?);
+            Ok(Value::Text(text.trim_end_matches('\0').into()))
+        }
+        _ => Ok(Value::Other(format!(
+            "an array of the type {}",
+            description.kind
+        ))),
+    }
+}
+
+/// A text of numpy: four bytes for each character, zeros at its end.
+fn unicode(bytes: &[u8]) -> String {
+    let codes = bytes
+        .chunks_exact(4)
+        .map(|part| unsigned(part, false) as u32);
+    let characters = codes.take_while(|code| *code != 0);
+    characters.filter_map(char::from_u32).collect()
 }
 
 /// The header: `{'descr': '<f8', 'fortran_order': False, 'shape': (3, 3), }`.

@@ -1,12 +1,9 @@
 //! The controller among the variables of a file.
 
-use nalgebra::Complex;
-
-use super::super::transfer::{
-    Domain, GainUnit, SsSettings, TfSettings, TransferSettings, TransferTable, ZpkSettings,
-};
-use super::names;
-use super::value::{NumericArray, Value, Variables};
+use super::super::transfer::{Domain, GainUnit};
+use super::form::Form;
+use super::value::{Value, Variables};
+use super::{period, properties};
 
 /// What a file does not say, or says several times.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,7 +16,8 @@ pub struct ImportOptions {
     pub variable: Option<String>,
 }
 
-const WHAT_TO_SAVE: &str =
+/// What a user saves to have a controller in a file.
+pub(super) const WHAT_TO_SAVE: &str =
     "save the arrays num, den and Ts, or z, p, k and Ts, or A, B, C, D and Ts";
 const FROM_MATLAB_OBJECT: &str = "save its arrays, in MATLAB: [num, den, Ts] = tfdata(C, 'v'); save('c.mat', 'num', 'den', 'Ts', '-v7')";
 
@@ -29,33 +27,59 @@ struct Group<'a> {
     fields: &'a Variables,
 }
 
+/// A controller as a file has it: its parts, its time domain, its other properties.
+pub(super) struct Selected<'a> {
+    pub form: Form,
+    pub fields: &'a Variables,
+    pub domain: Domain,
+    pub properties: properties::Properties,
+}
+
 /// The controller of a file.
 ///
 /// # Errors
 /// What is wrong, and the remedy.
-pub(super) fn select(
-    variables: &Variables,
+pub(super) fn select<'a>(
+    variables: &'a Variables,
     options: &ImportOptions,
-) -> Result<TransferSettings, String> {
+) -> Result<Selected<'a>, String> {
     let groups = groups(variables);
     let wanted = |group: &&Group<'_>| {
         let name = options.variable.as_ref();
         name.is_none_or(|name| *name == group.name)
     };
-    let forms = |group: &'_ Group<'_>| forms(group.fields);
-    let found: Vec<(&Group<'_>, TransferTable)> = groups
+    let found: Vec<(&Group<'a>, Form)> = groups
         .iter()
         .filter(wanted)
-        .flat_map(|group| forms(group).map(move |form| (group, form)))
+        .flat_map(|group| Form::all_of(group.fields).map(move |form| (group, form)))
         .collect();
     match found.as_slice() {
         [] => Err(nothing_found(variables, options)),
-        [(group, form)] => {
-            let domain = domain(group, variables, options.domain)?;
-            settings(group, *form, options.gain_unit, domain)
-        }
+        [(group, form)] => selected(group, *form, variables, options),
         several => Err(ambiguous(several)),
     }
+}
+
+fn selected<'a>(
+    group: &Group<'a>,
+    form: Form,
+    variables: &'a Variables,
+    options: &ImportOptions,
+) -> Result<Selected<'a>, String> {
+    let fields = group.fields;
+    // A structure may leave properties of its system to the top level.
+    let shared: &[(String, Value)] = match group.name.is_empty() {
+        true => &[],
+        false => variables,
+    };
+    let properties = properties::of(fields, shared, form, options.gain_unit)?;
+    let domain = period::domain(fields, shared, properties.time_unit_s, options.domain)?;
+    Ok(Selected {
+        form,
+        fields,
+        domain,
+        properties,
+    })
 }
 
 /// The top level, and all structures below it.
@@ -79,32 +103,6 @@ fn groups(variables: &Variables) -> Vec<Group<'_>> {
         next += 1;
     }
     groups
-}
-
-fn get<'a>(fields: &'a Variables, names: &[&str]) -> Option<(&'a str, &'a Value)> {
-    let found = fields
-        .iter()
-        .find(|(name, _)| names.contains(&name.as_str()));
-    found.map(|(name, value)| (name.as_str(), value))
-}
-
-/// The forms whose parts are all present.
-fn forms(fields: &Variables) -> impl Iterator<Item = TransferTable> + use<> {
-    let has = |parts: &[&[&str]]| {
-        let mut parts = parts.iter();
-        parts.all(|names| matches!(get(fields, names), Some((_, Value::Numbers(_)))))
-    };
-    let tf = has(&[names::NUMERATOR, names::DENOMINATOR]);
-    let zpk = has(&[names::ZEROS, names::POLES, names::GAIN]);
-    let ss = has(&[names::A, names::B, names::C]);
-    let forms = [
-        (tf, TransferTable::Tf),
-        (zpk, TransferTable::Zpk),
-        (ss, TransferTable::Ss),
-    ];
-    forms
-        .into_iter()
-        .filter_map(|(present, form)| present.then_some(form))
 }
 
 fn nothing_found(variables: &Variables, options: &ImportOptions) -> String {
@@ -132,200 +130,21 @@ fn nothing_found(variables: &Variables, options: &ImportOptions) -> String {
 fn described(name: &str, value: &Value) -> String {
     match value {
         Value::Numbers(array) => format!("{name} ({})", array.size()),
-        Value::Fields(fields) => {
-            let names: Vec<&str> = fields.iter().map(|(name, _)| name.as_str()).collect();
-            format!("{name} (a structure of {})", names.join(", "))
-        }
-        Value::Other(what) => format!("{name} ({what})"),
+        Value::Text(_) => format!("{name} (text)"),
+        other => format!("{name} ({})", other.summary()),
     }
 }
 
-fn ambiguous(found: &[(&Group<'_>, TransferTable)]) -> String {
+fn ambiguous(found: &[(&Group<'_>, Form)]) -> String {
     let names: Vec<String> = found
         .iter()
         .map(|(group, form)| match group.name.as_str() {
-            "" => format!("{} at the top level", form.key()),
-            name => format!("{} in {name}", form.key()),
+            "" => format!("{} at the top level", form.name()),
+            name => format!("{} in {name}", form.name()),
         })
         .collect();
     format!(
         "it contains several controllers ({}); name the structure of one with --variable, or save only one form",
         names.join(", ")
     )
-}
-
-/// The time domain: of the file, or of the options if the file has no sampling period.
-fn domain(
-    group: &Group<'_>,
-    variables: &Variables,
-    option: Option<Domain>,
-) -> Result<Domain, String> {
-    let period = get(group.fields, names::PERIOD).or_else(|| get(variables, names::PERIOD));
-    let in_file = match period {
-        Some((name, value)) => domain_of_period(name, value)?,
-        None => None,
-    };
-    match (in_file, option) {
-        (Some(in_file), None) => Ok(in_file),
-        (None, Some(option)) => Ok(option),
-        (Some(in_file), Some(option)) if same(in_file, option) => Ok(in_file),
-        (Some(in_file), Some(_)) => Err(format!(
-            "it is {} by its sampling period; leave out --rate and --continuous",
-            description(in_file)
-        )),
-        (None, None) => Err("it has no sampling period Ts; add --continuous, or --rate HZ if the controller is discrete".into()),
-    }
-}
-
-fn same(a: Domain, b: Domain) -> bool {
-    match (a, b) {
-        (Domain::Discrete { rate_hz: a }, Domain::Discrete { rate_hz: b }) => {
-            (a / b - 1.0).abs() < RATE_ROUNDING
-        }
-        (a, b) => a == b,
-    }
-}
-
-fn description(domain: Domain) -> String {
-    match domain {
-        Domain::Continuous => "continuous".into(),
-        Domain::Discrete { rate_hz } => format!("discrete at {rate_hz} Hz"),
-    }
-}
-
-/// A rate that differs from an integer by less than this ratio was an integer before 1/Ts was rounded.
-const RATE_ROUNDING: f64 = 1e-9;
-
-/// The domain of a sampling period in seconds: 0 is continuous. `None` if the period is not known (-1 in MATLAB, None or True in
-/// python-control).
-fn domain_of_period(name: &str, value: &Value) -> Result<Option<Domain>, String> {
-    let period_s = match value {
-        Value::Numbers(array) => match array.entries.as_slice() {
-            [one] if one.im == 0.0 => one.re,
-            _ => {
-                return Err(format!(
-                    "`{name}` is not one number; save the sampling period in seconds, 0 for a continuous controller"
-                ));
-            }
-        },
-        _ => return Ok(None),
-    };
-    if period_s == 0.0 {
-        return Ok(Some(Domain::Continuous));
-    }
-    if period_s < 0.0 {
-        return Ok(None);
-    }
-    let exact_hz = 1.0 / period_s;
-    let rounded_hz = libm::round(exact_hz);
-    let is_integer = (exact_hz / rounded_hz - 1.0).abs() < RATE_ROUNDING;
-    let rate_hz = if is_integer { rounded_hz } else { exact_hz };
-    Ok(Some(Domain::Discrete { rate_hz }))
-}
-
-fn settings(
-    group: &Group<'_>,
-    form: TransferTable,
-    gain_unit: GainUnit,
-    domain: Domain,
-) -> Result<TransferSettings, String> {
-    let fields = group.fields;
-    let rate_hz = match domain {
-        Domain::Continuous => None,
-        Domain::Discrete { rate_hz } => Some(rate_hz),
-    };
-    Ok(match form {
-        TransferTable::Tf => TransferSettings::Tf(TfSettings {
-            gain_unit,
-            rate_hz,
-            numerator: real_vector(fields, names::NUMERATOR)?,
-            denominator: real_vector(fields, names::DENOMINATOR)?,
-        }),
-        TransferTable::Zpk => TransferSettings::Zpk(ZpkSettings {
-            gain_unit,
-            rate_hz,
-            zeros: pairs(fields, names::ZEROS)?,
-            poles: pairs(fields, names::POLES)?,
-            gain: scalar(fields, names::GAIN)?,
-        }),
-        TransferTable::Ss => TransferSettings::Ss(SsSettings {
-            gain_unit,
-            rate_hz,
-            a: real_rows(fields, names::A)?,
-            b: real_vector(fields, names::B)?,
-            c: real_vector(fields, names::C)?,
-            d: match get(fields, names::D) {
-                Some(_) => scalar(fields, names::D)?,
-                None => 0.0,
-            },
-        }),
-    })
-}
-
-fn array<'a>(fields: &'a Variables, names: &[&str]) -> Result<(&'a str, &'a NumericArray), String> {
-    match get(fields, names) {
-        Some((name, Value::Numbers(array))) => Ok((name, array)),
-        Some((name, Value::Other(what))) => Err(format!(
-            "`{name}` is {what}; save it as an array of numbers"
-        )),
-        _ => Err(format!(
-            "`{}` is missing; {WHAT_TO_SAVE}",
-            names.first().unwrap_or(&"")
-        )),
-    }
-}
-
-fn vector<'a>(
-    fields: &'a Variables,
-    names: &[&str],
-) -> Result<(&'a str, &'a [Complex<f64>]), String> {
-    let (name, array) = array(fields, names)?;
-    let vector = array.vector().ok_or_else(|| {
-        let size = array.size();
-        format!("`{name}` has the size {size}; save a controller with one input and one output")
-    })?;
-    Ok((name, vector))
-}
-
-fn real(name: &str, number: &Complex<f64>) -> Result<f64, String> {
-    match number.im == 0.0 {
-        true => Ok(number.re),
-        false => Err(format!(
-            "`{name}` contains the complex number {}{:+}j; save a controller with real coefficients",
-            number.re, number.im
-        )),
-    }
-}
-
-fn real_vector(fields: &Variables, names: &[&str]) -> Result<Vec<f64>, String> {
-    let (name, vector) = vector(fields, names)?;
-    vector.iter().map(|number| real(name, number)).collect()
-}
-
-fn real_rows(fields: &Variables, names: &[&str]) -> Result<Vec<Vec<f64>>, String> {
-    let (name, array) = array(fields, names)?;
-    let rows = array.rows().ok_or_else(|| {
-        format!(
-            "`{name}` has the size {}; save a square matrix",
-            array.size()
-        )
-    })?;
-    let row = |row: &Vec<Complex<f64>>| row.iter().map(|number| real(name, number)).collect();
-    rows.iter().map(row).collect()
-}
-
-fn scalar(fields: &Variables, names: &[&str]) -> Result<f64, String> {
-    let (name, array) = array(fields, names)?;
-    match array.entries.as_slice() {
-        [one] => real(name, one),
-        _ => Err(format!(
-            "`{name}` has the size {}; save a controller with one input and one output",
-            array.size()
-        )),
-    }
-}
-
-fn pairs(fields: &Variables, names: &[&str]) -> Result<Vec<[f64; 2]>, String> {
-    let (_, vector) = vector(fields, names)?;
-    Ok(vector.iter().map(|root| [root.re, root.im]).collect())
 }

@@ -16,10 +16,56 @@ pub struct NumericArray {
 pub enum Value {
     /// Numbers.
     Numbers(NumericArray),
+    /// A text.
+    Text(String),
+    /// True or false.
+    Flag(bool),
     /// A structure: its fields by name.
     Fields(Vec<(String, Value)>),
+    /// Nothing: `null`, or a cell array without elements.
+    Empty,
     /// Anything else, with what it is.
     Other(String),
+}
+
+impl Value {
+    /// Whether it has no content.
+    pub fn is_empty(&self) -> bool {
+        match self {
+            Value::Numbers(array) => array.entries.is_empty(),
+            Value::Text(text) => text.trim().is_empty(),
+            Value::Fields(fields) => fields.iter().all(|(_, value)| value.is_empty()),
+            Value::Empty => true,
+            Value::Flag(_) | Value::Other(_) => false,
+        }
+    }
+
+    /// Whether it has no content other than zeros.
+    pub fn is_zero(&self) -> bool {
+        match self {
+            Value::Numbers(array) => array.entries.iter().all(|x| x.norm() == 0.0),
+            Value::Fields(fields) => fields.iter().all(|(_, value)| value.is_zero()),
+            other => other.is_empty(),
+        }
+    }
+
+    /// The content in a few words, as in `InputDelay is 0.03`.
+    pub fn summary(&self) -> String {
+        match self {
+            Value::Numbers(array) => match array.entries.as_slice() {
+                [one] if one.im == 0.0 => one.re.to_string(),
+                _ => format!("an array of the size {}", array.size()),
+            },
+            Value::Text(text) => format!("\"{}\"", text.trim()),
+            Value::Flag(flag) => flag.to_string(),
+            Value::Fields(fields) => {
+                let names: Vec<&str> = fields.iter().map(|(name, _)| name.as_str()).collect();
+                format!("a structure of {}", names.join(", "))
+            }
+            Value::Empty => "empty".into(),
+            Value::Other(what) => what.clone(),
+        }
+    }
 }
 
 /// The variables of a file, by name.
@@ -57,9 +103,10 @@ impl NumericArray {
         (long <= 1 || self.entries.is_empty()).then_some(&self.entries)
     }
 
-    /// The rows of a matrix; a scalar is a matrix of one row and one column.
+    /// The rows of a matrix; a scalar is a matrix of one row and one column. A matrix without entries has no rows.
     pub fn rows(&self) -> Option<Vec<Vec<Complex<f64>>>> {
         let [rows, columns] = match self.shape.as_slice() {
+            _ if self.entries.is_empty() => [0, 0],
             [] | [1] => [1, 1],
             [rows, columns] => [*rows, *columns],
             _ => return None,
