@@ -4,7 +4,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::refinement::Values;
 use super::roots::Roots;
-use super::wide::{characteristic, response};
+use super::wide::{characteristic, numerator, response};
 use crate::control::state_space::{StateSpace, balance, eigenvalues};
 
 /// A system in balanced coordinates, with B and C of the magnitude of A: H(v) = scale (C (v - A)^-1 B + D).
@@ -17,6 +17,9 @@ pub(super) struct Matrices {
 /// Error of the eigenvalue iteration and of the elimination, per order and in units of the norm: both are backward stable, and
 /// the constant is far below 10 in practice (Golub and Van Loan, *Matrix Computations*, sections 3.3 and 7.5).
 const BACKWARD_ERROR: f64 = 10.0 * f64::EPSILON;
+
+/// A point far away from all zeros, over the largest of them.
+const FAR: f64 = 4.0;
 
 /// Largest distance of an integrator from the origin or from z = 1, relative to the norm of A. A pole farther away is a slow one, even
 /// if rounding could have moved it that far.
@@ -129,47 +132,22 @@ impl Matrices {
         (value * self.scale, error)
     }
 
-    /// The zeros after two Newton steps on H, where a step lowers |H|.
-    fn refined(&self, zeros: Roots) -> Roots {
-        let real = zeros.real.iter().map(|zero| {
-            let refined = self.refined_zero(Complex::new(*zero, 0.0));
-            refined.re
-        });
-        let real = real.collect();
-        let pairs = zeros.pairs.iter().map(|zero| {
-            let refined = self.refined_zero(*zero);
-            if refined.im > 0.0 { refined } else { *zero }
-        });
-        let pairs = pairs.collect();
-        Roots { real, pairs }
+    /// The zeros, refined by the values of their polynomial in twice the working precision.
+    fn refined(&self, mut zeros: Roots) -> Roots {
+        let values = Values {
+            leading: self.leading(&zeros),
+            value: |v| numerator(&self.system, v),
+            magnitude: |v| numerator_bound(&self.system, v),
+        };
+        values.refine(&mut zeros);
+        zeros
     }
 
-    fn refined_zero(&self, zero: Complex<f64>) -> Complex<f64> {
-        let mut best = zero;
-        for _ in 0..2 {
-            let Some(next) = self.newton(best) else {
-                break;
-            };
-            let is_better = self.response(next).0.norm() < self.response(best).0.norm();
-            if !is_better || (next - best).norm() > 0.01 * best.norm() {
-                break;
-            }
-            best = next;
-        }
-        best
-    }
-
-    /// v - H/H', with H' = -C (v - A)^-2 B.
-    fn newton(&self, v: Complex<f64>) -> Option<Complex<f64>> {
-        let (system, n) = (&self.system, self.order());
-        let shifted = DMatrix::identity(n, n) * v - system.a.map(Complex::from);
-        let elimination = shifted.lu();
-        let first = elimination.solve(&system.b.map(Complex::from))?;
-        let second = elimination.solve(&first)?;
-        let c = system.c.map(Complex::from);
-        let (value, slope) = ((&c * first)[0] + system.d, -(&c * second)[0]);
-        let next = v - value / slope;
-        (next.re.is_finite() && next.im.is_finite()).then_some(next)
+    /// The coefficient of the highest power of the numerator, from its value far away from the zeros.
+    fn leading(&self, zeros: &Roots) -> f64 {
+        let largest = zeros.all().map(|zero| zero.norm()).fold(0.0, f64::max);
+        let far = Complex::new(FAR * largest.max(self.system.a.amax()), 0.0);
+        (numerator(&self.system, far) / zeros.product(far)).re
     }
 }
 
@@ -177,6 +155,13 @@ impl Matrices {
 fn determinant_bound(a: &DMatrix<f64>, v: Complex<f64>) -> f64 {
     let norms = a.row_iter().map(|row| row.norm() + v.norm());
     norms.product()
+}
+
+/// The same bound for the numerator, the determinant of [v - A, -B; C, D].
+fn numerator_bound(system: &StateSpace, v: Complex<f64>) -> f64 {
+    let rows = system.a.row_iter().zip(system.b.iter());
+    let norms = rows.map(|(row, b)| row.norm() + b.abs() + v.norm());
+    norms.product::<f64>() * (system.c.norm() + system.d.abs())
 }
 
 fn non_zero(x: f64) -> f64 {

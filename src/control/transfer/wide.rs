@@ -270,6 +270,12 @@ pub(super) fn characteristic(a: &DMatrix<f64>, v: Complex<f64>) -> Complex<f64> 
     eliminated(bordered(&system, v)).0.rounded()
 }
 
+/// det [v - A, -B; C, D], the numerator of the response over det(v - A).
+pub(super) fn numerator(system: &StateSpace, v: Complex<f64>) -> Complex<f64> {
+    let (determinant, response) = eliminated(bordered(system, v));
+    (determinant * response).rounded()
+}
+
 /// C (v - A)^-1 B + D, as if rounded once unless more than 15 digits cancel.
 pub(super) fn response(system: &StateSpace, v: Complex<f64>) -> Complex<f64> {
     eliminated(bordered(system, v)).1.rounded()
