@@ -55,7 +55,7 @@ fn double_integrator(cascade: &Cascade) -> Option<String> {
     let poles = cascade.factors.poles.real.iter();
     let count = poles.filter(|pole| **pole == place).count();
     (count == MAX_INTEGRATORS).then(|| {
-        "two integrators: the loop follows a ramp without error, and is stable only between two limits of the gain; `bench margins` evaluates it".into()
+        "two integrators: a stable loop follows a ramp without error; `bench margins` decides whether it is stable".into()
     })
 }
 
