@@ -2,6 +2,7 @@
 
 use crate::report::number::angular_frequency;
 use crate::report::run_pages::LoopOutputs;
+use crate::report::{crossing_count, place};
 use crate::util::decimal::Decimal;
 
 /// The files of the responses, and the measured margins beside those of the model.
@@ -25,9 +26,26 @@ fn margins_text(outputs: &LoopOutputs) -> String {
         _ => "none".into(),
     };
     format!(
-        "crossover {crossover}, phase margin {phase_margin},\n             modulus margin {:.4} ± {:.4} (by the model {:.4})",
+        "crossover {crossover}, phase margin there {phase_margin},\n             {}modulus margin {:.4} ± {:.4} (by the model {:.4})",
+        smallest_text(outputs),
         outputs.modulus_margin,
         2.0 * outputs.modulus_margin_sigma,
         outputs.predicted_modulus_margin
     )
+}
+
+/// The smallest phase margin, if it belongs to another crossing than the crossover.
+fn smallest_text(outputs: &LoopOutputs) -> String {
+    let smallest = outputs
+        .smallest_phase_margin_deg
+        .zip(outputs.smallest_phase_margin_rad_s);
+    match smallest.filter(|(_, rad_s)| Some(*rad_s) != outputs.crossover_rad_s) {
+        Some((deg, rad_s)) => format!(
+            "smallest phase margin {:.2} deg {}{},\n             ",
+            Decimal(deg),
+            place(rad_s),
+            crossing_count(outputs.crossings)
+        ),
+        None => String::new(),
+    }
 }

@@ -12,13 +12,14 @@ use super::help::GLOSSARY;
 use super::measured_margins::{self, Measured};
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use super::output::{print_result, warn};
+use super::output::{no_json, print_result, warn};
 use super::table::{table, wrap};
 use crate::config::{Config, ProbeSettings, Purpose};
 use crate::control::{ClosedLoop, Margins, Pole, listed_poles};
 use crate::experiment::{LoopModel, Stage, check_calibration, closed_loop};
-use crate::report::number::angular_frequency;
-use crate::report::{LoopPlot, Picture, ReportError, joined, loop_svg, plant_conditions};
+use crate::report::{
+    LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
+};
 use crate::util::decimal::Decimal;
 
 /// The bench and the controller.
@@ -122,12 +123,7 @@ fn drawn(
 
 /// The margins with their names; `null` where the loop is unstable.
 fn margins_json(margins: &Margins) -> Result<Value, CliError> {
-    let failed = |e| {
-        CliError::Failed(format!(
-            "cannot write JSON: {e}; report this with the command"
-        ))
-    };
-    let mut json = serde_json::to_value(margins).map_err(failed)?;
+    let mut json = serde_json::to_value(margins).map_err(|e| no_json(&e))?;
     if let (false, Some(object)) = (margins.stable, json.as_object_mut()) {
         let figures = object.iter_mut().filter(|(_, value)| value.is_number());
         figures.for_each(|(_, value)| *value = Value::Null);
@@ -207,20 +203,10 @@ fn unstable_text(poles: &[Pole]) -> String {
 }
 
 fn margin_lines(margins: &Margins) -> String {
-    let degrees = |deg| format!("{:.2} deg", Decimal(deg));
-    let decibels = |db| format!("{:.2} dB", Decimal(db));
-    let (modulus, peak_db) = (margins.modulus_margin, Decimal(margins.sensitivity_peak_db));
-    let modulus = format!("{modulus:.4} (peak of S {peak_db:.2} dB)");
-    let bandwidth = margins.sensitivity_bandwidth_rad_s;
-    let lines = [
-        ("crossover", margins.crossover_rad_s.map(angular_frequency)),
-        ("phase margin", margins.phase_margin_deg.map(degrees)),
-        ("gain margin", margins.gain_margin_db.map(decibels)),
-        ("modulus margin", Some(modulus)),
-        ("sensitivity bandwidth", bandwidth.map(angular_frequency)),
-    ];
-    let lines = lines.map(|(name, value)| margin_line(name, value));
-    format!("  stable\n{}", lines.concat())
+    let rows = margin_rows(margins).into_iter();
+    // The terminal has the ordinary minus sign.
+    let lines = rows.map(|(name, value)| margin_line(name, value).replace('\u{2212}', "-"));
+    format!("  stable\n{}", lines.collect::<String>())
 }
 
 fn margin_line(name: &str, value: Option<String>) -> String {

@@ -17,6 +17,7 @@ use crate::experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_m
 use crate::identify::Estimate;
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
+use crate::report::{crossing_count, place};
 use crate::util::units::{UM_PER_M, hz};
 
 /// The margins with a measured plant, and the files of the loop.
@@ -128,11 +129,21 @@ fn margin_lines(margins: &MeasuredMargins) -> String {
     );
     [
         line("crossover", margins.crossover_rad_s.map(frequency)),
+        line("phase margin", phase_margin_text(margins)),
         line(
-            "phase margin",
-            margins.phase_margin_deg.map(unit(1.0, "deg")),
+            "gain margin",
+            at(margins.gain_margin_db, margins.gain_margin_rad_s, 1.0, "dB"),
         ),
-        line("gain margin", margins.gain_margin_db.map(unit(1.0, "dB"))),
+        gain_margin_lines(margins),
+        line(
+            "delay margin",
+            at(
+                margins.delay_margin_s,
+                margins.delay_margin_rad_s,
+                1e3,
+                "ms",
+            ),
+        ),
         line("modulus margin", Some(number(margins.modulus_margin, 1.0))),
         line("peak of S", Some(peak)),
         line(
@@ -141,6 +152,43 @@ fn margin_lines(margins: &MeasuredMargins) -> String {
         ),
     ]
     .concat()
+}
+
+/// A margin and its frequency.
+fn at(margin: Option<Estimate>, rad_s: Option<f64>, factor: f64, unit: &str) -> Option<String> {
+    let (margin, rad_s) = margin.zip(rad_s)?;
+    Some(format!(
+        "{} {unit} {}",
+        number(margin, factor),
+        place(rad_s)
+    ))
+}
+
+fn phase_margin_text(margins: &MeasuredMargins) -> Option<String> {
+    let text = at(
+        margins.phase_margin_deg,
+        margins.phase_margin_rad_s,
+        1.0,
+        "deg",
+    )?;
+    Some(text + &crossing_count(margins.crossings.len()))
+}
+
+/// Both gain margins, if the loop gain may not fall without limit.
+fn gain_margin_lines(margins: &MeasuredMargins) -> String {
+    if margins.lower_gain_margin_db.is_none() {
+        return String::new();
+    }
+    let (upper_db, upper_rad_s) = (
+        margins.upper_gain_margin_db,
+        margins.upper_gain_margin_rad_s,
+    );
+    let (lower_db, lower_rad_s) = (
+        margins.lower_gain_margin_db,
+        margins.lower_gain_margin_rad_s,
+    );
+    line("upper gain margin", at(upper_db, upper_rad_s, 1.0, "dB"))
+        + &line("lower gain margin", at(lower_db, lower_rad_s, 1.0, "dB"))
 }
 
 fn peak_lines(peaks: &LoopPeaks) -> String {

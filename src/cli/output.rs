@@ -6,13 +6,16 @@ use serde::Serialize;
 
 use super::error::CliError;
 
+/// The result has no form in JSON.
+pub(super) fn no_json(why: &serde_json::Error) -> CliError {
+    CliError::Failed(format!(
+        "the result cannot be written as JSON: {why}; leave out --json to see it as text"
+    ))
+}
+
 /// Prints the one JSON object of a command.
 pub(super) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
-    let text = serde_json::to_string_pretty(value).map_err(|e| {
-        CliError::Failed(format!(
-            "cannot write JSON: {e}; report this with the command"
-        ))
-    })?;
+    let text = serde_json::to_string_pretty(value).map_err(|e| no_json(&e))?;
     print_text(&format!("{text}\n"))
 }
 

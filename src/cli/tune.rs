@@ -266,7 +266,11 @@ fn write(
     let failed = |what: String| CliError::Failed(what);
     std::fs::create_dir_all(&args.out).map_err(|e| cannot_write(&args.out, &e))?;
     let json = serde_json::to_string_pretty(certificate);
-    let json = json.map_err(|e| failed(format!("cannot write JSON: {e}; report this")))?;
+    let json = json.map_err(|e| {
+        failed(format!(
+            "the certificate cannot be written as JSON, so no file was written: {e}"
+        ))
+    })?;
     let curves = loop_curves(task, design);
     let limits = DesignLimits::of(&task.requirements, design.attained);
     let title = certificate.title();

@@ -125,7 +125,7 @@ fn failure(frf: &FrfEvidence, least: f64) -> String {
             frf.modulus_margin_lower, frf.modulus_margin_lower_at_hz
         ),
         Stability::Unstable => format!(
-            "the loop with the measured response of {file} is unstable by Nyquist's criterion; do not use this controller, and report this with the file"
+            "the loop with the measured response of {file} is unstable by Nyquist's criterion, although it is stable with the fitted modes: fit and measurement differ where L is near -1; do not use this controller; measure with a larger amplitude or for longer, or raise --modulus-margin"
         ),
         Stability::Undecided => format!(
             "the stability of the loop with the measured response of {file} is undecided, because the curve passes -1 within its noise; measure with a larger amplitude or for longer"

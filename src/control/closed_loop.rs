@@ -1,12 +1,15 @@
 //! A loop of plant, amplifier, hold, delay and control law: its response, its poles, its step.
 
+use std::sync::OnceLock;
+
 use nalgebra::Complex;
 
 use super::Section;
 use super::controller::continuous_response;
 use super::error::ControllerError;
+use super::features;
 use super::law::{ControlDesign, LawInput, LinearLaw};
-use super::margins::{Margins, grid, margins};
+use super::margins::{Known, Margins, grid, margins};
 use super::state_space::StateSpace;
 use crate::excitation::command::LoopCommand;
 use crate::model::plant::{LoopPlant, Mode};
@@ -19,7 +22,14 @@ pub struct ClosedLoop {
     plant: LoopPlant,
     design: Box<dyn ControlDesign>,
     linear: Box<dyn LinearLaw>,
+    /// Poles of the sampled closed loop, once they are computed.
+    poles: OnceLock<Option<Vec<Complex<f64>>>>,
 }
+
+/// Upper end of the grid as a ratio of half the rate, where L is real.
+const HIGHEST: f64 = 1.0 - 1e-9;
+/// Lowest frequency of the grid as a ratio of half the rate: poles closer to 1 are not told apart from an integrator.
+const LEAST_PART: f64 = 1e-9;
 
 /// The poles of an open loop that are not inside the unit circle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,6 +72,7 @@ impl ClosedLoop {
             plant,
             design,
             linear,
+            poles: OnceLock::new(),
         })
     }
 
@@ -137,14 +148,16 @@ impl ClosedLoop {
         plant * self.force_constant_n_per_a * continuous_response(sections, s)
     }
 
-    /// Margins of the sampled loop.
+    /// Margins of the sampled loop, from 0 to half the rate.
     pub fn margins(&self) -> Margins {
-        let grid = grid(
-            self.lowest_rad_s(),
-            self.nyquist_rad_s() * (1.0 - 1e-9),
-            &self.features(),
-        );
-        margins(&|w| self.sampled_loop(w), &grid, self.is_stable(), false)
+        let nyquist_rad_s = self.nyquist_rad_s();
+        let known = Known {
+            grid_rad_s: &self.frequencies(self.lowest_change_rad_s(), HIGHEST * nyquist_rad_s),
+            ends_rad_s: &[0.0, nyquist_rad_s],
+            stable: self.is_stable(),
+            continuous: false,
+        };
+        margins(&|w| self.sampled_loop(w), &known)
     }
 
     /// Margins in continuous time, without hold, delay and amplifier.
@@ -156,13 +169,19 @@ impl ClosedLoop {
         let sections = sections.ok_or(ControllerError::NotSections)?;
         let highest = self.modes.last().map_or(1.0, |mode| mode.omega_rad_s);
         let high_rad_s = 10.0 * highest.max(self.nyquist_rad_s());
-        let grid = grid(self.lowest_rad_s(), high_rad_s, &self.features());
-        let response = |w| self.continuous_response(sections, w);
-        let stable = self.is_stable_in_continuous_time(sections);
-        Ok(margins(&response, &grid, stable, true))
+        let poles = self.poles_in_continuous_time(sections);
+        let features = self.continuous_features(sections, poles.as_deref().unwrap_or_default());
+        let known = Known {
+            grid_rad_s: &grid(self.lowest_rad_s(), high_rad_s, &features),
+            ends_rad_s: &[0.0],
+            stable: poles.is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0)),
+            continuous: true,
+        };
+        Ok(margins(&|w| self.continuous_response(sections, w), &known))
     }
 
-    /// Frequencies in rad/s that follow every resonance of plant and controller.
+    /// Frequencies in rad/s that follow every resonance of plant, controller and closed loop, also those that sampling moves below half
+    /// the rate.
     pub fn frequencies(&self, low_rad_s: f64, high_rad_s: f64) -> Vec<f64> {
         grid(low_rad_s, high_rad_s, &self.features())
     }
@@ -220,7 +239,7 @@ impl ClosedLoop {
         let poles = self.sampled_poles().unwrap_or_default();
         let pairs = poles.iter().filter(|z| z.im > 0.0);
         let mut modes: Vec<StepMode> = pairs
-            .map(|z| self.step_mode(*z, &poles))
+            .map(|z| self.step_mode(*z, poles))
             .filter(|mode| mode.damping_ratio < 0.5 && mode.step_ratio >= least_ratio)
             .collect();
         modes.sort_by(|a, b| b.step_ratio.total_cmp(&a.step_ratio));
@@ -271,26 +290,40 @@ impl ClosedLoop {
             .min(self.nyquist_rad_s())
     }
 
-    /// Frequency and damping ratio of each resonance and antiresonance of the loop: the modes of the plant and the lightly
-    /// damped pairs of the control law.
-    fn features(&self) -> Vec<(f64, f64)> {
-        let modes = self.modes.iter();
-        let modes = modes.map(|mode| (mode.omega_rad_s, mode.damping_ratio));
-        let pairs = match self.design.sections() {
-            Some(sections) => section_pairs(sections),
-            None => self.law_roots(),
-        };
-        let lightly_damped = |(w, zeta): &(f64, f64)| w.is_finite() && *zeta < 0.5;
-        let pairs = pairs.into_iter().filter(lightly_damped);
-        modes.filter(|(w, _)| *w > 0.0).chain(pairs).collect()
+    /// Below this frequency in rad/s nothing changes: a tenth of the slowest pole or zero, of the closed loop too.
+    fn lowest_change_rad_s(&self) -> f64 {
+        let slowest = self.pairs().map(features::magnitude_rad_s);
+        let slowest_rad_s = slowest.fold(f64::INFINITY, f64::min);
+        let least_rad_s = LEAST_PART * self.nyquist_rad_s();
+        self.lowest_rad_s()
+            .min(0.1 * slowest_rad_s)
+            .max(least_rad_s)
     }
 
-    /// Frequency and damping ratio of the roots of the sampled law: z = exp(s T).
-    fn law_roots(&self) -> Vec<(f64, f64)> {
+    /// Frequency and damping ratio of each resonance and antiresonance of the sampled loop.
+    fn features(&self) -> Vec<(f64, f64)> {
+        features::distinct(self.pairs())
+    }
+
+    /// Frequency and damping ratio of the modes, of the roots of the law and of the poles of the closed loop, as they appear below half
+    /// the rate.
+    fn pairs(&self) -> impl Iterator<Item = (f64, f64)> {
+        let period_s = self.plant.period_s();
+        let modes = self.modes.iter().filter(|mode| mode.omega_rad_s > 0.0);
+        let modes = modes
+            .map(move |mode| features::alias((mode.omega_rad_s, mode.damping_ratio), period_s));
         let roots = self.linear.roots();
-        let continuous = roots.iter().map(|z| z.ln() / self.plant.period_s());
-        let pairs = continuous.filter(|s| s.im > 0.0);
-        pairs.map(|s| (s.norm(), (s.re / s.norm()).abs())).collect()
+        let poles = self.sampled_poles().unwrap_or_default().iter().copied();
+        let roots = roots.into_iter().chain(poles);
+        modes.chain(roots.filter_map(move |z| features::of_root(z, period_s)))
+    }
+
+    /// The same of the loop in continuous time.
+    fn continuous_features(&self, sections: &[Section], poles: &[Complex<f64>]) -> Vec<(f64, f64)> {
+        let modes = self.modes.iter();
+        let modes = modes.map(|mode| (mode.omega_rad_s, mode.damping_ratio));
+        let poles = poles.iter().map(|s| (s.norm(), s.re.abs() / s.norm()));
+        features::distinct(modes.chain(section_pairs(sections)).chain(poles))
     }
 
     /// Poles of the sampled closed loop in rad/s, s = ln(z)/T. Empty if they cannot be computed.
@@ -308,10 +341,13 @@ impl ClosedLoop {
         poles.unwrap_or_default()
     }
 
-    fn sampled_poles(&self) -> Option<Vec<Complex<f64>>> {
-        let (a, b, c) = self.plant.state_space();
-        let plant = StateSpace { a, b, c, d: 0.0 };
-        self.linear.state_space().then(&plant).closed_poles()
+    fn sampled_poles(&self) -> Option<&[Complex<f64>]> {
+        let poles = self.poles.get_or_init(|| {
+            let (a, b, c) = self.plant.state_space();
+            let plant = StateSpace { a, b, c, d: 0.0 };
+            self.linear.state_space().then(&plant).closed_poles()
+        });
+        poles.as_deref()
     }
 
     fn poles_in_continuous_time(&self, sections: &[Section]) -> Option<Vec<Complex<f64>>> {
@@ -327,12 +363,6 @@ impl ClosedLoop {
     pub fn is_stable(&self) -> bool {
         let poles = self.sampled_poles();
         poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
-    }
-
-    /// All poles of the continuous closed loop lie left of the imaginary axis.
-    fn is_stable_in_continuous_time(&self, sections: &[Section]) -> bool {
-        let poles = self.poles_in_continuous_time(sections);
-        poles.is_some_and(|poles| poles.iter().all(|pole| pole.re < 0.0))
     }
 }
 

@@ -2,13 +2,15 @@
 //!
 //! Crossover is the lowest frequency at which |L| falls through 1; the phase margin, 180 deg + arg L, is the one of
 //! smallest magnitude over all crossings; the gain margin is the smallest |20 log10 |L|| over all crossings of the
-//! negative real axis; the modulus margin is 1/max |S| with S = 1/(1 + L); the sensitivity bandwidth is the lowest frequency
+//! negative real axis; the upper one is the smallest factor above 1, the lower one the largest factor below 1, by which L can be
+//! multiplied before it reaches -1; the delay margin is the smallest phase margin over frequency, with phase margins from 0 to 360 deg;
+//! the modulus margin is 1/max |S| with S = 1/(1 + L); the sensitivity bandwidth is the lowest frequency
 //! at which |S| rises through 1/sqrt(2).
 
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::landmarks::{landmarks, phase_margin_deg};
+use super::landmarks::{Landmarks, landmarks, phase_margin_deg};
 use crate::util::numeric::is_within;
 
 /// A frequency at which |L| passes through 1.
@@ -20,17 +22,49 @@ pub struct Crossing {
     pub phase_margin_deg: f64,
 }
 
+/// A frequency at which L crosses the negative real axis.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PhaseCrossing {
+    /// Frequency in rad/s.
+    pub rad_s: f64,
+    /// -20 log10 |L| there.
+    pub gain_margin_db: f64,
+}
+
+/// The delay that L tolerates at one of its crossings of |L| = 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct DelayMargin {
+    /// Frequency of the crossing in rad/s.
+    pub rad_s: f64,
+    /// Additional delay in seconds with which L is -1 there.
+    pub delay_s: f64,
+}
+
 /// Margins of a loop. `null` in JSON where there is no such crossing.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Margins {
     /// Lowest frequency at which |L| falls through 1.
     pub crossover_rad_s: Option<f64>,
     /// Phase margin of smallest magnitude over all crossings of |L| = 1, in degrees.
     pub phase_margin_deg: Option<f64>,
+    /// Frequency of this phase margin in rad/s.
+    pub phase_margin_rad_s: Option<f64>,
     /// Smallest gain margin over all phase crossover frequencies, in dB.
     pub gain_margin_db: Option<f64>,
     /// Frequency of this gain margin in rad/s.
     pub gain_margin_rad_s: Option<f64>,
+    /// Smallest positive gain margin in dB: the loop gain may rise by less.
+    pub upper_gain_margin_db: Option<f64>,
+    /// Its frequency in rad/s.
+    pub upper_gain_margin_rad_s: Option<f64>,
+    /// Largest negative gain margin in dB: the loop gain may fall by less.
+    pub lower_gain_margin_db: Option<f64>,
+    /// Its frequency in rad/s.
+    pub lower_gain_margin_rad_s: Option<f64>,
+    /// Smallest additional delay in seconds with which L reaches -1.
+    pub delay_margin_s: Option<f64>,
+    /// The crossing of |L| = 1 at which it does, in rad/s.
+    pub delay_margin_rad_s: Option<f64>,
     /// 1/max |S|: the distance of L from -1.
     pub modulus_margin: f64,
     /// 20 log10 max |S|.
@@ -43,6 +77,8 @@ pub struct Margins {
     pub stable: bool,
     /// All crossings of |L| = 1.
     pub crossings: Vec<Crossing>,
+    /// All crossings of the negative real axis.
+    pub phase_crossings: Vec<PhaseCrossing>,
     /// Whether sampling, delay and amplifier are neglected.
     pub continuous: bool,
 }
@@ -54,47 +90,95 @@ impl Margins {
     }
 }
 
-/// Margins of `response`, from a rising grid that is fine enough to show every crossing. Each crossing and the peak of |S|
-/// are then refined on the function itself.
-pub(super) fn margins(
-    response: &dyn Fn(f64) -> Complex<f64>,
-    grid_rad_s: &[f64],
-    stable: bool,
-    continuous: bool,
-) -> Margins {
-    let places = landmarks(response, grid_rad_s);
-    let crossings: Vec<Crossing> = places
-        .crossings_rad_s
-        .iter()
+/// What is known of a loop beside its response.
+pub(super) struct Known<'a> {
+    /// Rising frequencies in rad/s, fine enough to show every crossing.
+    pub grid_rad_s: &'a [f64],
+    /// Frequencies below and above the grid at which L is real.
+    pub ends_rad_s: &'a [f64],
+    /// Whether all poles of the closed loop are stable.
+    pub stable: bool,
+    /// Whether sampling, delay and amplifier are neglected.
+    pub continuous: bool,
+}
+
+/// Margins of `response`. Each crossing and the peak of |S| are found on the grid and then refined on the function itself.
+pub(super) fn margins(response: &dyn Fn(f64) -> Complex<f64>, known: &Known<'_>) -> Margins {
+    let places = landmarks(response, known.grid_rad_s, known.ends_rad_s);
+    let crossings = crossings(response, &places);
+    let phase_crossings = phase_crossings(response, &places);
+    let phase_margin = smallest(crossings.iter(), |crossing| crossing.phase_margin_deg);
+    let gain_db = |crossing: &PhaseCrossing| crossing.gain_margin_db;
+    let gain_margin = smallest(phase_crossings.iter(), gain_db);
+    let upper = smallest(
+        phase_crossings.iter().filter(|c| c.gain_margin_db > 0.0),
+        gain_db,
+    );
+    let lower = smallest(
+        phase_crossings.iter().filter(|c| c.gain_margin_db < 0.0),
+        gain_db,
+    );
+    let delay = delay_margin(&crossings);
+    let peak = places.sensitivity_peak;
+    Margins {
+        crossover_rad_s: places.crossover_rad_s,
+        phase_margin_deg: phase_margin.map(|crossing| crossing.phase_margin_deg),
+        phase_margin_rad_s: phase_margin.map(|crossing| crossing.rad_s),
+        gain_margin_db: gain_margin.map(|crossing| crossing.gain_margin_db),
+        gain_margin_rad_s: gain_margin.map(|crossing| crossing.rad_s),
+        upper_gain_margin_db: upper.map(|crossing| crossing.gain_margin_db),
+        upper_gain_margin_rad_s: upper.map(|crossing| crossing.rad_s),
+        lower_gain_margin_db: lower.map(|crossing| crossing.gain_margin_db),
+        lower_gain_margin_rad_s: lower.map(|crossing| crossing.rad_s),
+        delay_margin_s: delay.map(|margin| margin.delay_s),
+        delay_margin_rad_s: delay.map(|margin| margin.rad_s),
+        modulus_margin: 1.0 / peak.value,
+        sensitivity_peak_db: 20.0 * libm::log10(peak.value),
+        sensitivity_peak_rad_s: peak.rad_s,
+        sensitivity_bandwidth_rad_s: places.sensitivity_bandwidth_rad_s,
+        stable: known.stable,
+        crossings,
+        phase_crossings,
+        continuous: known.continuous,
+    }
+}
+
+fn crossings(response: &dyn Fn(f64) -> Complex<f64>, places: &Landmarks) -> Vec<Crossing> {
+    let places = places.crossings_rad_s.iter();
+    places
         .map(|&rad_s| Crossing {
             rad_s,
             phase_margin_deg: phase_margin_deg(response(rad_s)),
         })
-        .collect();
-    let gain_margin_db = |w: &f64| -20.0 * libm::log10(response(*w).norm());
-    let gain_margins = places.phase_crossings_rad_s.iter();
-    let gain_margin = gain_margins
-        .map(|w| (*w, gain_margin_db(w)))
-        .min_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-    let peak = places.sensitivity_peak.value;
-    Margins {
-        crossover_rad_s: places.crossover_rad_s,
-        phase_margin_deg: smallest(crossings.iter().map(|c| c.phase_margin_deg)),
-        gain_margin_db: gain_margin.map(|(_, db)| db),
-        gain_margin_rad_s: gain_margin.map(|(rad_s, _)| rad_s),
-        modulus_margin: 1.0 / peak,
-        sensitivity_peak_db: 20.0 * libm::log10(peak),
-        sensitivity_peak_rad_s: places.sensitivity_peak.rad_s,
-        sensitivity_bandwidth_rad_s: places.sensitivity_bandwidth_rad_s,
-        stable,
-        crossings,
-        continuous,
-    }
+        .collect()
 }
 
-/// The value of smallest magnitude.
-fn smallest(values: impl Iterator<Item = f64>) -> Option<f64> {
-    values.min_by(|a, b| a.abs().total_cmp(&b.abs()))
+fn phase_crossings(
+    response: &dyn Fn(f64) -> Complex<f64>,
+    places: &Landmarks,
+) -> Vec<PhaseCrossing> {
+    let places = places.phase_crossings_rad_s.iter();
+    places
+        .map(|&rad_s| PhaseCrossing {
+            rad_s,
+            gain_margin_db: -20.0 * libm::log10(response(rad_s).norm()),
+        })
+        .collect()
+}
+
+/// The crossing at which the least additional delay turns L to -1.
+fn delay_margin(crossings: &[Crossing]) -> Option<DelayMargin> {
+    let moving = crossings.iter().filter(|crossing| crossing.rad_s > 0.0);
+    let margins = moving.map(|crossing| DelayMargin {
+        rad_s: crossing.rad_s,
+        delay_s: crossing.phase_margin_deg.rem_euclid(360.0).to_radians() / crossing.rad_s,
+    });
+    margins.min_by(|a, b| a.delay_s.total_cmp(&b.delay_s))
+}
+
+/// The item with the value of smallest magnitude.
+fn smallest<'a, T>(items: impl Iterator<Item = &'a T>, value: impl Fn(&T) -> f64) -> Option<&'a T> {
+    items.min_by(|a, b| value(a).abs().total_cmp(&value(b).abs()))
 }
 
 /// A logarithmic grid, with additional points w (1 + zeta sinh x) around each resonance or antiresonance (w, zeta): they are
@@ -113,14 +197,33 @@ pub fn grid(low_rad_s: f64, high_rad_s: f64, features: &[(f64, f64)]) -> Vec<f64
     grid
 }
 
+/// Points for each increase of the distance from a resonance by a factor of e: their distance is at most 1/40 of that to the resonance.
+const PER_E_FOLD: f64 = 40.0;
+/// Distance from a resonance, relative to its frequency, beyond which the logarithmic grid is denser.
+const NEAR: f64 = 0.25;
+
 /// Frequencies around a resonance or antiresonance.
 fn around((w, zeta): (f64, f64)) -> impl Iterator<Item = f64> {
-    (-240..=240).map(move |i| w * (1.0 + zeta.max(1e-6) * libm::sinh(f64::from(i) / 40.0)))
+    let zeta = zeta.max(1e-6);
+    let reach = NEAR.max(zeta);
+    let folds = libm::asinh(reach / zeta);
+    let count = libm::ceil(PER_E_FOLD * folds) as i32;
+    (-count..=count).map(move |i| w * (1.0 + zeta * libm::sinh(f64::from(i) / PER_E_FOLD)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn of(response: &dyn Fn(f64) -> Complex<f64>, grid_rad_s: &[f64]) -> Margins {
+        let known = Known {
+            grid_rad_s,
+            ends_rad_s: &[],
+            stable: true,
+            continuous: true,
+        };
+        margins(response, &known)
+    }
 
     #[test]
     fn an_integrator_with_delay_has_the_margins_of_its_closed_form() {
@@ -129,13 +232,20 @@ mod tests {
         let (k, d): (f64, f64) = (100.0, 4e-3);
         let l =
             move |w: f64| Complex::new((-w * d).cos(), (-w * d).sin()) * k / Complex::new(0.0, w);
-        let found = margins(&l, &grid(0.1, 700.0, &[]), true, true);
+        let found = of(&l, &grid(0.1, 700.0, &[]));
         assert!((found.crossover_rad_s.unwrap() - k).abs() < 1e-9);
         assert!((found.phase_margin_deg.unwrap() - (90.0 - (k * d).to_degrees())).abs() < 1e-9);
         let gain_margin = 20.0 * (std::f64::consts::PI / (2.0 * k * d)).log10();
         assert!((found.gain_margin_db.unwrap() - gain_margin).abs() < 1e-9);
         let at = found.gain_margin_rad_s.unwrap();
         assert!((at - std::f64::consts::FRAC_PI_2 / d).abs() < 1e-9);
+        // The same delay margin at the only crossing, and no lower gain margin.
+        let delay_margin_s = (std::f64::consts::FRAC_PI_2 - k * d) / k;
+        assert!((found.delay_margin_s.unwrap() - delay_margin_s).abs() < 1e-12);
+        assert!((found.delay_margin_rad_s.unwrap() - k).abs() < 1e-9);
+        assert!((found.phase_margin_rad_s.unwrap() - k).abs() < 1e-9);
+        assert_eq!(found.upper_gain_margin_db, found.gain_margin_db);
+        assert_eq!(found.lower_gain_margin_db, None);
         // The peak of |S| against a brute force search in steps of 7 mrad/s.
         let (place, brute) = (1..100_000)
             .map(|i| f64::from(i) * 7e-3)
@@ -148,16 +258,40 @@ mod tests {
     #[test]
     fn a_loop_that_is_not_a_number_has_no_modulus_margin() {
         let unknown = |_: f64| Complex::new(f64::NAN, f64::NAN);
-        let found = margins(&unknown, &grid(1.0, 100.0, &[]), true, true);
+        let found = of(&unknown, &grid(1.0, 100.0, &[]));
         assert!(!found.has_modulus_margin(0.0), "{found:?}");
         // L = 1 at all frequencies: S = 1/2, so the modulus margin is 2.
-        let known = margins(
-            &|_| Complex::new(1.0, 0.0),
-            &grid(1.0, 100.0, &[]),
-            true,
-            true,
-        );
+        let known = of(&|_| Complex::new(1.0, 0.0), &grid(1.0, 100.0, &[]));
         assert!(known.has_modulus_margin(2.0) && !known.has_modulus_margin(2.1));
+    }
+
+    #[test]
+    fn conditionally_stable_loop_has_an_upper_and_a_lower_gain_margin() {
+        // L = k (s + 1)^2/s^3: arg L = -270 deg + 2 atan w is -180 deg at w = 1, where |L| = 2 k. The loop is stable for k > 1/2, so
+        // k = 1 allows a fall by 20 log10 2 and any rise.
+        let l = |w: f64| {
+            let s = Complex::new(0.0, w);
+            (s + 1.0) * (s + 1.0) / (s * s * s)
+        };
+        let found = of(&l, &grid(1e-3, 1e3, &[]));
+        let lower_db = -20.0 * libm::log10(2.0);
+        assert!((found.lower_gain_margin_db.unwrap() - lower_db).abs() < 1e-9);
+        assert!((found.lower_gain_margin_rad_s.unwrap() - 1.0).abs() < 1e-9);
+        assert_eq!(found.upper_gain_margin_db, None);
+    }
+
+    #[test]
+    fn two_crossings_between_two_points_of_the_grid_are_found() {
+        // Im L = (ln w - a)^2 - 1e-7 with a between two points of the grid, and Re L = -1/2.
+        let a = 3.5 * std::f64::consts::LN_10 / 400.0;
+        let l = move |w: f64| Complex::new(-0.5, (libm::log(w) - a).powi(2) - 1e-7);
+        let found = of(&l, &grid(1e-2, 1e2, &[]));
+        let places: Vec<f64> = found.phase_crossings.iter().map(|c| c.rad_s).collect();
+        assert_eq!(places.len(), 2, "{places:?}");
+        for (place, sign) in places.iter().zip([-1.0, 1.0]) {
+            let expected = libm::exp(a + sign * 1e-7_f64.sqrt());
+            assert!((place / expected - 1.0).abs() < 1e-9, "{place} {expected}");
+        }
     }
 
     #[test]
@@ -167,7 +301,7 @@ mod tests {
         let l = move |w: f64| {
             Complex::new(0.01 * w0 * w0, 0.0) / Complex::new(w0 * w0 - w * w, 2.0 * zeta * w0 * w)
         };
-        let found = margins(&l, &grid(1.0, 1e4, &[(w0, zeta)]), true, true);
+        let found = of(&l, &grid(1.0, 1e4, &[(w0, zeta)]));
         assert_eq!(found.crossings.len(), 2, "{:?}", found.crossings);
         // |L| = 1 at w^2 = w0^2 (1 +- 0.01), except for the effect of the damping.
         assert!((found.crossings[0].rad_s - w0 * 0.99f64.sqrt()).abs() < 1e-3);

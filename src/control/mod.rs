@@ -21,6 +21,7 @@ mod biquad;
 mod closed_loop;
 mod controller;
 mod error;
+mod features;
 mod file;
 mod import;
 mod import_error;
@@ -54,7 +55,7 @@ pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 pub use laws::{LawSettings, StateSpaceLaw};
 pub use margins::grid;
-pub use margins::{Crossing, Margins};
+pub use margins::{Crossing, Margins, PhaseCrossing};
 pub use minimum_time::{
     MinimumTime, MinimumTimeError, StepLimits, StepPlant, StepTiming, minimum_time,
 };

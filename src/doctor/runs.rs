@@ -139,17 +139,11 @@ mod tests {
 
     fn margins(stable: bool) -> Margins {
         Margins {
-            crossover_rad_s: None,
-            phase_margin_deg: None,
-            gain_margin_db: None,
-            gain_margin_rad_s: None,
             modulus_margin: 0.5,
             sensitivity_peak_db: 6.0,
             sensitivity_peak_rad_s: 300.0,
-            sensitivity_bandwidth_rad_s: None,
             stable,
-            crossings: vec![],
-            continuous: false,
+            ..Margins::default()
         }
     }
 

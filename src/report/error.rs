@@ -54,6 +54,8 @@ pub enum ReportError {
     )]
     NoMagnitude,
     /// The drawing library failed.
-    #[error("drawing failed: {0}; report this with the data")]
+    #[error(
+        "the plot cannot be drawn: {0}; check that the data are finite numbers, or leave out the plot"
+    )]
     Drawing(String),
 }

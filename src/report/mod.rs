@@ -27,6 +27,7 @@ mod identification;
 mod labels;
 mod loops;
 mod magnitude;
+mod margin_text;
 mod model_pictures;
 pub mod number;
 mod nyquist;
@@ -60,6 +61,7 @@ pub use loops::{
     measured_bode_svg, measured_nyquist_svg, measured_sensitivity_svg, sensitivity_svg,
 };
 pub use magnitude::MagnitudeAxis;
+pub use margin_text::{crossing_count, margin_rows, place};
 pub use model_pictures::{
     CnmpMap, locus_svg, map_svg, model_step_svg, study_svg, veering_caption, veering_svg,
 };

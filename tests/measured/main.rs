@@ -5,6 +5,7 @@ mod closed_loop;
 mod command;
 mod nyquist;
 mod python_control;
+mod random_loops;
 mod refused;
 mod sampled;
 

@@ -17,18 +17,15 @@ fn margins() -> Margins {
     Margins {
         crossover_rad_s: Some(TAU * CROSSOVER_HZ),
         phase_margin_deg: Some(40.0),
-        gain_margin_db: None,
-        gain_margin_rad_s: None,
         modulus_margin: 0.5,
         sensitivity_peak_db: 6.0,
         sensitivity_peak_rad_s: TAU * CROSSOVER_HZ,
-        sensitivity_bandwidth_rad_s: None,
         stable: true,
         crossings: vec![Crossing {
             rad_s: TAU * CROSSOVER_HZ,
             phase_margin_deg: 40.0,
         }],
-        continuous: false,
+        ..Margins::default()
     }
 }
 

@@ -10,6 +10,7 @@
 use super::count::{NyquistCount, Stability};
 use super::measured_loop::MeasuredLoop;
 use crate::control::ClosedLoop;
+use crate::control::landmarks::{Peak, lowest};
 use crate::util::estimate::SIGMAS_95;
 use crate::util::units::hz;
 
@@ -36,47 +37,34 @@ impl LowerMargin {
     /// computed.
     pub fn of(measured: &MeasuredLoop<'_>, model: &ClosedLoop) -> Option<LowerMargin> {
         let count = NyquistCount::of(measured, model)?;
-        let bounds = in_band(measured).chain(outside_band(measured, model));
-        let (margin, omega_rad_s) = bounds.fold((f64::INFINITY, f64::NAN), smaller);
+        let bounds = [in_band(measured)].into_iter();
+        let bounds = bounds.chain(outside_band(measured, model));
+        let least = bounds.min_by(|a, b| a.value.total_cmp(&b.value))?;
         Some(LowerMargin {
-            margin,
-            at_hz: hz(omega_rad_s),
+            margin: least.value,
+            at_hz: hz(least.rad_s),
             stability: count.stability,
             distance_sigmas: count.distance_sigmas,
         })
     }
 }
 
-/// The smaller bound; one that is not a number counts as the smallest.
-fn smaller(least: (f64, f64), found: (f64, f64)) -> (f64, f64) {
-    match found.0 < least.0 || found.0.is_nan() {
-        true => found,
-        false => least,
-    }
-}
-
-/// The bound and its frequency in rad/s at each frequency of the band.
-fn in_band(measured: &MeasuredLoop<'_>) -> impl Iterator<Item = (f64, f64)> {
-    let frequencies = measured.grid_rad_s().iter();
-    frequencies.map(|w| {
-        let loop_gain = measured.loop_gain(*w);
-        let sigma = loop_gain.norm() * measured.relative_sigma(*w);
-        ((loop_gain + 1.0).norm() - SIGMAS_95 * sigma, *w)
-    })
-}
-
-/// |1 + L| and its frequency in rad/s below and above the band, by the model.
-fn outside_band(
-    measured: &MeasuredLoop<'_>,
-    model: &ClosedLoop,
-) -> impl Iterator<Item = (f64, f64)> {
-    let (low, high) = measured.band_rad_s();
-    let last = HIGHEST * model.nyquist_rad_s();
-    let below = model.frequencies(LOWEST * low, low);
-    let above = match high < last {
-        true => model.frequencies(high, last),
-        false => Vec::new(),
+/// The smallest bound in the band and its frequency.
+fn in_band(measured: &MeasuredLoop<'_>) -> Peak {
+    let bound = |w: f64| {
+        let loop_gain = measured.loop_gain(w);
+        let sigma = loop_gain.norm() * measured.relative_sigma(w);
+        (loop_gain + 1.0).norm() - SIGMAS_95 * sigma
     };
-    let frequencies = below.into_iter().chain(above);
-    frequencies.map(|w| ((model.sampled_loop(w) + 1.0).norm(), w))
+    lowest(&bound, measured.grid_rad_s())
+}
+
+/// The smallest |1 + L| below and above the band, by the model, each with its frequency.
+fn outside_band(measured: &MeasuredLoop<'_>, model: &ClosedLoop) -> impl Iterator<Item = Peak> {
+    let (low, high) = measured.band_rad_s();
+    let distance = |w: f64| (model.sampled_loop(w) + 1.0).norm();
+    let last = HIGHEST * model.nyquist_rad_s();
+    let below = lowest(&distance, &model.frequencies(LOWEST * low, low));
+    let above = (high < last).then(|| lowest(&distance, &model.frequencies(high, last)));
+    [Some(below), above].into_iter().flatten()
 }

@@ -27,8 +27,24 @@ pub struct MeasuredMargins {
     pub crossover_rad_s: Option<Estimate>,
     /// Phase margin of smallest magnitude over all crossings of |L| = 1, in degrees.
     pub phase_margin_deg: Option<Estimate>,
+    /// Frequency of this phase margin in rad/s.
+    pub phase_margin_rad_s: Option<f64>,
     /// Smallest gain margin over all phase crossover frequencies, in dB.
     pub gain_margin_db: Option<Estimate>,
+    /// Frequency of this gain margin in rad/s.
+    pub gain_margin_rad_s: Option<f64>,
+    /// Smallest positive gain margin in dB: the loop gain may rise by less.
+    pub upper_gain_margin_db: Option<Estimate>,
+    /// Its frequency in rad/s.
+    pub upper_gain_margin_rad_s: Option<f64>,
+    /// Largest negative gain margin in dB: the loop gain may fall by less.
+    pub lower_gain_margin_db: Option<Estimate>,
+    /// Its frequency in rad/s.
+    pub lower_gain_margin_rad_s: Option<f64>,
+    /// Smallest additional delay in seconds with which L reaches -1.
+    pub delay_margin_s: Option<Estimate>,
+    /// The crossing of |L| = 1 at which it does, in rad/s.
+    pub delay_margin_rad_s: Option<f64>,
     /// 1/max |S|: the distance of L from -1.
     pub modulus_margin: Estimate,
     /// 20 log10 max |S|.
@@ -56,17 +72,43 @@ impl MeasuredMargins {
     /// The margins of a loop.
     pub fn of(measured: &MeasuredLoop<'_>) -> MeasuredMargins {
         let response = |w: f64| measured.loop_gain(w);
-        let places = landmarks(&response, measured.grid_rad_s());
+        let places = landmarks(&response, measured.grid_rad_s(), &[]);
         let crossings = crossings(measured, &places);
-        let phase_margins = crossings.iter().map(|crossing| crossing.phase_margin_deg);
-        let phase_crossings = places.phase_crossings_rad_s.iter();
-        let gain_margins = phase_crossings.map(|w| gain_margin_db(measured, *w));
+        let phase_margin = crossings
+            .iter()
+            .map(|crossing| (crossing.rad_s.value, crossing.phase_margin_deg));
+        let phase_margin = smallest(phase_margin);
+        let gain_margins = places.phase_crossings_rad_s.iter();
+        let gain_margins = gain_margins.map(|w| (*w, gain_margin_db(measured, *w)));
+        let gain_margins: Vec<(f64, Estimate)> = gain_margins.collect();
+        let gain_margin = smallest(gain_margins.iter().copied());
+        let upper = smallest(
+            gain_margins
+                .iter()
+                .copied()
+                .filter(|(_, db)| db.value > 0.0),
+        );
+        let lower = smallest(
+            gain_margins
+                .iter()
+                .copied()
+                .filter(|(_, db)| db.value < 0.0),
+        );
+        let delay_margin = smallest(crossings.iter().map(delay_margin_s));
         let crossover = at(&crossings, places.crossover_rad_s);
         let modulus_margin = modulus_margin(measured, places.sensitivity_peak);
         MeasuredMargins {
             crossover_rad_s: crossover.map(|crossing| crossing.rad_s),
-            phase_margin_deg: smallest(phase_margins),
-            gain_margin_db: smallest(gain_margins),
+            phase_margin_deg: phase_margin.map(|(_, deg)| deg),
+            phase_margin_rad_s: phase_margin.map(|(rad_s, _)| rad_s),
+            gain_margin_db: gain_margin.map(|(_, db)| db),
+            gain_margin_rad_s: gain_margin.map(|(rad_s, _)| rad_s),
+            upper_gain_margin_db: upper.map(|(_, db)| db),
+            upper_gain_margin_rad_s: upper.map(|(rad_s, _)| rad_s),
+            lower_gain_margin_db: lower.map(|(_, db)| db),
+            lower_gain_margin_rad_s: lower.map(|(rad_s, _)| rad_s),
+            delay_margin_s: delay_margin.map(|(_, delay_s)| delay_s),
+            delay_margin_rad_s: delay_margin.map(|(rad_s, _)| rad_s),
             modulus_margin,
             sensitivity_peak_db: Estimate {
                 value: -DB_PER_NEPER * libm::log(modulus_margin.value),
@@ -177,7 +219,20 @@ fn slope_and_sigma(measured: &MeasuredLoop<'_>, omega_rad_s: f64) -> (Complex<f6
     (slope, measured.relative_sigma(omega_rad_s))
 }
 
-/// The estimate of smallest magnitude.
-fn smallest(estimates: impl Iterator<Item = Estimate>) -> Option<Estimate> {
-    estimates.min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
+/// The frequency of a crossing and the additional delay with which L is -1 there: phi/w with the phase margin phi from 0 to 360 deg.
+/// The errors of phase margin and frequency have a correlation that is not known; their sum bounds the standard deviation.
+fn delay_margin_s(crossing: &MeasuredCrossing) -> (f64, Estimate) {
+    let (margin_deg, rad_s) = (crossing.phase_margin_deg, crossing.rad_s);
+    let delay_s = margin_deg.value.rem_euclid(360.0).to_radians() / rad_s.value;
+    let sigma = margin_deg.sigma.to_radians() / rad_s.value + delay_s * rad_s.sigma / rad_s.value;
+    let delay = Estimate {
+        value: delay_s,
+        sigma,
+    };
+    (rad_s.value, delay)
+}
+
+/// The frequency and the estimate of smallest magnitude.
+fn smallest(estimates: impl Iterator<Item = (f64, Estimate)>) -> Option<(f64, Estimate)> {
+    estimates.min_by(|a, b| a.1.value.abs().total_cmp(&b.1.value.abs()))
 }

@@ -5,6 +5,7 @@ use nalgebra::Complex;
 use super::error::MeasuredLoopError;
 use super::point::ResponsePoint;
 use super::smoothing::SmoothResponse;
+use crate::control::landmarks::lowest;
 use crate::util::units::hz;
 
 /// Step of a numerical derivative as a ratio of frequency; measured points are about ten times farther apart.
@@ -65,21 +66,15 @@ impl<'a> MeasuredLoop<'a> {
         (0.5 * self.plant.variance(omega_rad_s)).sqrt()
     }
 
-    /// The smallest |1 + L| - `sigmas` sigma |C| over the grid, with sigma the standard deviation of one component of P, and its
+    /// The smallest |1 + L| - `sigmas` sigma |C| over the band, with sigma the standard deviation of one component of P, and its
     /// frequency in rad/s. An error that is not a number makes the distance minus infinity.
     pub fn least_distance(&self, sigmas: f64) -> (f64, f64) {
-        let mut least = (f64::INFINITY, self.band_rad_s().0);
-        for w in self.grid_rad_s.iter().copied() {
+        let distance = |w: f64| {
             let radius = sigmas * self.plant_sigma(w) * self.law(w).norm();
-            let distance = (self.loop_gain(w) + 1.0).norm() - radius;
-            if distance.is_nan() {
-                return (f64::NEG_INFINITY, w);
-            }
-            if distance < least.0 {
-                least = (distance, w);
-            }
-        }
-        least
+            (self.loop_gain(w) + 1.0).norm() - radius
+        };
+        let least = lowest(&distance, &self.grid_rad_s);
+        (least.value, least.rad_s)
     }
 
     /// C.

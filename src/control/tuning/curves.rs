@@ -3,6 +3,7 @@
 use nalgebra::Complex;
 
 use super::design::{Design, DesignTask};
+use super::figures::loop_pairs;
 use super::sampled::{SampledPlant, Spacing};
 
 /// Loop and controller over frequency.
@@ -21,8 +22,10 @@ pub struct LoopCurve {
 /// The loop of a design with each of its plants, without the modes that these lack.
 pub fn loop_curves(task: &DesignTask, design: &Design) -> Vec<LoopCurve> {
     let plants = task.plants.iter();
-    let pairs = design.cascade.pairs();
-    let sampled = plants.map(|plant| SampledPlant::of(plant, &task.bound, Spacing::Fine, &pairs));
+    let sampled = plants.map(|plant| {
+        let pairs = loop_pairs(plant, &design.cascade);
+        SampledPlant::of(plant, &task.bound, Spacing::Fine, &pairs)
+    });
     sampled.map(|plant| LoopCurve::of(plant, design)).collect()
 }
 

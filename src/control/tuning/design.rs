@@ -80,7 +80,7 @@ pub fn design(task: &DesignTask, progress: &Progress) -> Result<Design, TuneErro
     let (order, effort, seed) = (task.order, &task.effort, task.seed);
     let extremes = task.with_extreme_plants(&problem);
     let mut candidates = search(&extremes, &problem, order, effort, seed, progress);
-    candidates.truncate(VERIFIED);
+    let further = candidates.split_off(VERIFIED.min(candidates.len()));
     progress.begin("verification", candidates.len() as u64);
     let designs = candidates.into_iter().map(|candidate| {
         let design = task.mended(problem.clone(), candidate);
@@ -88,7 +88,15 @@ pub fn design(task: &DesignTask, progress: &Progress) -> Result<Design, TuneErro
         design
     });
     let best = designs.reduce(|best, other| task.better(best, other));
-    best.unwrap_or(Err(TuneError::NoPlant))
+    let mut best = best.unwrap_or(Err(TuneError::NoPlant));
+    // The others are tried if those are unstable between the frequencies of the search.
+    for candidate in further {
+        if !matches!(best, Err(TuneError::Unstable { .. })) {
+            break;
+        }
+        best = task.mended(problem.clone(), candidate);
+    }
+    best
 }
 
 /// The figures of a controller with other plants than those of its design, at the same signal path and with the same disturbances.
@@ -165,7 +173,7 @@ impl DesignTask {
     /// Frequencies in rad/s of the modes of the operating points, and of those that the model lacks.
     fn modes_rad_s(&self) -> Vec<f64> {
         let last = self.plants.iter().rfind(|plant| plant.is_nominal);
-        let modelled = last.map(DesignPlant::features);
+        let modelled = last.map(DesignPlant::sampled_features);
         let features = modelled.unwrap_or_default().into_iter();
         features.chain(self.bound.edges()).map(|(w, _)| w).collect()
     }

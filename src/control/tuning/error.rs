@@ -12,11 +12,15 @@ pub enum TuneError {
     Conflict(Box<Conflict>),
     /// The closed loop of the result is unstable.
     #[error(
-        "the loop designed for {plant} is unstable by its poles, although its Nyquist curve does not enclose -1; report this with the configuration"
+        "the search ended with a controller of order {order} that is unstable with {plant}: a pole of the closed loop at {pole_hz:.3} Hz is so lightly damped that the frequencies of the search do not resolve it; choose a lower --order, a larger --modulus-margin or another --seed"
     )]
     Unstable {
         /// The plant.
         plant: String,
+        /// Frequency of an unstable pole.
+        pole_hz: f64,
+        /// Order of the controller.
+        order: usize,
     },
     /// No plant to design for.
     #[error("there is no plant to design for; give at least one operating point")]

@@ -1,5 +1,6 @@
 //! The verification of a design: stability from the poles of the closed loop, and margins on a fine grid.
 
+use nalgebra::Complex;
 use serde::Serialize;
 
 use super::cascade::Cascade;
@@ -7,10 +8,12 @@ use super::classical_margins::{gain_margin, phase_margin_deg};
 use super::disturbance::Disturbance;
 use super::plant::DesignPlant;
 use super::requirement::{sensitivity_bandwidth_rad_s, slope_bandwidth_rad_s};
-use super::sampled::{SampledPlant, Spacing};
+use super::sampled::{SampledPlant, Spacing, warped};
 use super::unmodelled::UnmodelledBound;
 use super::variance::{current_sigma_a, sigma_m};
 use crate::control::StateSpace;
+use crate::control::features;
+use crate::control::landmarks::lowest;
 use crate::util::units::UM_PER_M;
 
 /// Figures of the loop with one plant, with the modes that its model lacks at their most unfavourable phase.
@@ -43,21 +46,76 @@ pub struct PlantFigures {
     pub phase_margin_deg: Option<f64>,
 }
 
-/// The plants on fine grids that also follow the zeros and poles of the controller.
+/// Local minima of |1 + L| - |C| U above the smallest one by more than this ratio are not refined.
+const NEAR_LOWEST: f64 = 1.02;
+
+/// The plants on fine grids that also follow the zeros and poles of the controller and the poles of the closed loop. The points at which
+/// |1 + L| - |C| U is smallest are among them, so that nothing lower is between two points.
 pub fn fine_samples(
     plants: &[DesignPlant],
     bound: &UnmodelledBound,
     disturbance: &Disturbance,
     cascade: &Cascade,
 ) -> Vec<SampledPlant> {
-    let mut features = cascade.pairs();
-    features.retain(|(_, damping_ratio)| *damping_ratio < 0.5);
-    features.extend(disturbance.features());
     let sampled = plants.iter().map(|plant| {
+        let mut features = loop_pairs(plant, cascade);
+        features.extend(disturbance.features());
         let sampled = SampledPlant::of(plant, bound, Spacing::Fine, &features);
-        with_variances(sampled, plant, disturbance)
+        let minima = minima_rad_s(plant, bound, &sampled, cascade);
+        with_variances(
+            sampled.with_points(plant, bound, minima),
+            plant,
+            disturbance,
+        )
     });
     sampled.collect()
+}
+
+/// Frequency and damping ratio of the resonances of the controller and of the closed loop with a plant.
+pub fn loop_pairs(plant: &DesignPlant, cascade: &Cascade) -> Vec<(f64, f64)> {
+    let period_s = plant.plant.period_s();
+    let pairs = cascade.pairs().into_iter();
+    let controller = pairs.filter_map(|pair| features::by_tustin(pair, period_s));
+    let poles = closed_poles(plant, cascade).unwrap_or_default();
+    let poles = poles
+        .into_iter()
+        .filter_map(|z| features::of_root(z, period_s));
+    features::distinct(controller.chain(poles))
+}
+
+/// The frequencies in rad/s of the lowest minima of |1 + L| - |C| U, each between the neighbours of a point of the grid.
+fn minima_rad_s(
+    plant: &DesignPlant,
+    bound: &UnmodelledBound,
+    sampled: &SampledPlant,
+    cascade: &Cascade,
+) -> Vec<f64> {
+    let period_s = plant.plant.period_s();
+    let distance = |w: f64| {
+        let controller = cascade.response(warped(w, period_s));
+        let unmodelled = bound.at(w) + plant.uncertainty.at(w);
+        (plant.plant.response(w) * controller + 1.0).norm() - controller.norm() * unmodelled
+    };
+    let grid = &sampled.omega_rad_s;
+    let on_grid: Vec<f64> = (0..grid.len())
+        .map(|i| {
+            let controller = cascade.response(sampled.warped[i]);
+            let difference = sampled.response[i] * controller + 1.0;
+            difference.norm() - controller.norm() * sampled.unmodelled[i]
+        })
+        .collect();
+    let least = on_grid.iter().copied().fold(f64::INFINITY, f64::min);
+    let inner = 1..grid.len().saturating_sub(1);
+    let minima = inner.filter(|&i| {
+        let here = on_grid[i];
+        here <= least.abs() * (NEAR_LOWEST - 1.0) + least
+            && here <= on_grid[i - 1]
+            && here <= on_grid[i + 1]
+    });
+    minima
+        .map(|i| lowest(&distance, &grid[i - 1..=i + 1]).rad_s)
+        .filter(|w| w.is_finite())
+        .collect()
 }
 
 /// The sampled plant with the variances of disturbance and noise.
@@ -125,6 +183,12 @@ impl PlantFigures {
 
 /// Whether all poles of the sampled closed loop lie inside the unit circle.
 fn is_stable(plant: &DesignPlant, cascade: &Cascade) -> bool {
+    let poles = closed_poles(plant, cascade);
+    poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+}
+
+/// Poles z of the sampled closed loop. `None` if they cannot be computed.
+pub fn closed_poles(plant: &DesignPlant, cascade: &Cascade) -> Option<Vec<Complex<f64>>> {
     let period_s = plant.plant.period_s();
     let sections = cascade.sections();
     let biquads = sections
@@ -135,6 +199,5 @@ fn is_stable(plant: &DesignPlant, cascade: &Cascade) -> bool {
     });
     let (a, b, c) = plant.plant.state_space();
     let plant = StateSpace { a, b, c, d: 0.0 };
-    let poles = controller.then(&plant).closed_poles();
-    poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+    controller.then(&plant).closed_poles()
 }

@@ -1,6 +1,7 @@
 //! The plants for which one controller is designed: operating points, each with tolerances of its modes.
 
 use super::uncertainty::Uncertainty;
+use crate::control::features::alias;
 use crate::model::plant::{LoopPlant, Mode, SignalPath};
 
 /// A mode whose residue is below this part of the largest one is neither varied nor resolved.
@@ -58,6 +59,13 @@ impl DesignPlant {
             ..DesignPlant::new(format!("{name}{change}"), path, modes)
         });
         plants.collect()
+    }
+
+    /// Frequency in rad/s and damping ratio of the modes that the probe sees, as they appear below half the rate.
+    pub fn sampled_features(&self) -> Vec<(f64, f64)> {
+        let period_s = self.plant.period_s();
+        let features = self.features().into_iter();
+        features.map(|mode| alias(mode, period_s)).collect()
     }
 
     /// Frequency in rad/s and damping ratio of the modes that the probe sees.

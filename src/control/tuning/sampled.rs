@@ -35,6 +35,18 @@ pub enum Spacing {
     Fine,
 }
 
+/// A plant at one frequency.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    omega_rad_s: f64,
+    warped: Complex<f64>,
+    response: Complex<f64>,
+    unmodelled: f64,
+}
+
+/// Upper end of the fine grid as a ratio of half the rate.
+const HIGHEST: f64 = 1.0 - 1e-9;
+
 impl SampledPlant {
     /// Samples of a plant at frequencies that follow its modes and `more` pairs of frequency (rad/s) and damping ratio.
     pub fn of(
@@ -43,7 +55,7 @@ impl SampledPlant {
         spacing: Spacing,
         more: &[(f64, f64)],
     ) -> SampledPlant {
-        let mut features = plant.features();
+        let mut features = plant.sampled_features();
         features.extend_from_slice(more);
         let nyquist_rad_s = std::f64::consts::PI / plant.plant.period_s();
         let range = (lowest_rad_s(plant), nyquist_rad_s * (1.0 - 1e-6));
@@ -51,10 +63,40 @@ impl SampledPlant {
             Spacing::Search => coarse_grid(range, &features, &bound.edges()),
             Spacing::Fine => {
                 features.extend(bound.edges());
-                grid(range.0, range.1, &features)
+                grid(range.0, HIGHEST * nyquist_rad_s, &features)
             }
         };
         SampledPlant::at(plant, bound, omega_rad_s)
+    }
+
+    /// The plant with more points, without its variances.
+    pub fn with_points(
+        self,
+        plant: &DesignPlant,
+        bound: &UnmodelledBound,
+        more_rad_s: Vec<f64>,
+    ) -> SampledPlant {
+        let more = SampledPlant::at(plant, bound, more_rad_s);
+        let mut points: Vec<Point> = self.points().chain(more.points()).collect();
+        points.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        points.dedup_by(|a, b| a.omega_rad_s == b.omega_rad_s);
+        SampledPlant {
+            omega_rad_s: points.iter().map(|point| point.omega_rad_s).collect(),
+            warped: points.iter().map(|point| point.warped).collect(),
+            response: points.iter().map(|point| point.response).collect(),
+            unmodelled: points.iter().map(|point| point.unmodelled).collect(),
+            variances: Vec::new(),
+            ..self
+        }
+    }
+
+    fn points(&self) -> impl Iterator<Item = Point> {
+        (0..self.omega_rad_s.len()).map(|i| Point {
+            omega_rad_s: self.omega_rad_s[i],
+            warped: self.warped[i],
+            response: self.response[i],
+            unmodelled: self.unmodelled[i],
+        })
     }
 
     /// Samples of a plant at some frequencies.

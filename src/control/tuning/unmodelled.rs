@@ -1,6 +1,7 @@
 //! Bound of modes that the plant's model lacks: their magnitudes add, their phases are unknown.
 
 use crate::config::UnmodelledMode;
+use crate::control::features::alias;
 use crate::model::plant::{LoopPlant, Mode, SignalPath};
 use crate::util::units::rad_s;
 
@@ -45,6 +46,7 @@ impl UnmodelledBound {
             .iter()
             .flatten()
             .flat_map(|mode| edges(mode, tolerance_ratio))
+            .map(|edge| alias(edge, path.period_s))
             .collect();
         let plants: Vec<Vec<LoopPlant>> = groups
             .iter()

@@ -6,9 +6,12 @@ use super::cascade::Cascade;
 use super::descent::{Candidate, Problem};
 use super::design::{Design, DesignTask, RESERVE};
 use super::error::{Conflict, TuneError};
-use super::figures::{figures, fine_samples};
+use super::figures::{closed_poles, figures, fine_samples};
+use super::plant::DesignPlant;
 use super::requirement::{Goal, Kind};
 use super::sampled::SampledPlant;
+use crate::control::features;
+use crate::util::units::hz;
 
 /// Rounds of verification and improvement of each candidate.
 const ROUNDS: usize = 10;
@@ -64,6 +67,12 @@ impl DesignTask {
             let target = candidate
                 .target
                 .ok_or_else(|| self.conflict(&problem, &candidate))?;
+            if let Some(unstable) = self.unstable(&candidate.cascade.clone().rounded()) {
+                self.add_points(&mut problem, &unstable);
+                let start = stable(&problem, candidate.cascade);
+                candidate = problem.improve(&start, self.effort.final_steps);
+                continue;
+            }
             let missed = self.missed(&candidate.cascade.clone().rounded(), target);
             if missed.frequencies_rad_s.iter().all(Vec::is_empty) {
                 break;
@@ -77,6 +86,22 @@ impl DesignTask {
             Some(_) => self.verified(candidate.cascade),
             None => Err(self.conflict(&problem, &candidate)),
         }
+    }
+
+    /// Frequencies in rad/s for each plant around its unstable poles; `None` if the loop with every plant is stable. The search counts
+    /// the turns of the Nyquist curve on its grid, which leaves out a resonance that it does not resolve.
+    fn unstable(&self, cascade: &Cascade) -> Option<Vec<Vec<f64>>> {
+        let around = self.plants.iter().map(|plant| {
+            let period_s = plant.plant.period_s();
+            unstable_pairs(plant, cascade)
+                .into_iter()
+                .flat_map(around_pole)
+                .filter(|w| *w > 0.0 && w * period_s < std::f64::consts::PI)
+                .collect()
+        });
+        let around: Vec<Vec<f64>> = around.collect();
+        let is_unstable = around.iter().any(|w| !w.is_empty());
+        is_unstable.then_some(around)
     }
 
     /// The design that keeps the modulus margin and attains more.
@@ -124,8 +149,16 @@ impl DesignTask {
         let attained = self.requirements.attained(&fine, &cascade);
         let figures = figures(&self.plants, &fine, &cascade);
         if let Some(unstable) = figures.iter().find(|figures| !figures.stable) {
+            let plant = self
+                .plants
+                .iter()
+                .find(|plant| plant.name == unstable.plant);
+            let pairs = plant.map(|plant| unstable_pairs(plant, &cascade));
+            let pole = pairs.and_then(|pairs| pairs.first().copied());
             return Err(TuneError::Unstable {
                 plant: unstable.plant.clone(),
+                pole_hz: pole.map_or(f64::NAN, |(w, _)| hz(w)),
+                order: self.order,
             });
         }
         let slacks = self.requirements.slacks(&fine, &cascade, attained);
@@ -155,4 +188,30 @@ impl DesignTask {
             excluded_plant: excluded_plant(&pairs, &self.bends_rad_s(), &self.requirements),
         }))
     }
+}
+
+/// Centre in rad/s and relative width of the poles outside the unit circle.
+fn unstable_pairs(plant: &DesignPlant, cascade: &Cascade) -> Vec<(f64, f64)> {
+    let poles = closed_poles(plant, cascade).unwrap_or_default().into_iter();
+    let outside = poles.filter(|z| z.norm() >= 1.0);
+    let pairs = outside.filter_map(|z| features::of_root(z, plant.plant.period_s()));
+    pairs.collect()
+}
+
+/// Frequencies in rad/s around a pole, from a hundredth of its width to three times its width beside it.
+fn around_pole((w, zeta): (f64, f64)) -> impl Iterator<Item = f64> {
+    let width = (zeta * w).max(1e-6 * w);
+    (-8..=8).map(move |i| w + width * libm::sinh(f64::from(i) / 4.0))
+}
+
+/// A cascade with the same zeros and poles and so small a gain that the loop with every plant is stable.
+fn stable(problem: &Problem, mut cascade: Cascade) -> Cascade {
+    const HALVINGS: usize = 60;
+    for _ in 0..HALVINGS {
+        if problem.is_stable(&cascade) {
+            break;
+        }
+        cascade = cascade.scaled(0.5);
+    }
+    cascade
 }

@@ -13,7 +13,7 @@ use crate::recording::Recording;
 use crate::report::conditions::lines;
 use crate::report::html::row;
 use crate::report::number::{angular_frequency, significant};
-use crate::report::{MagnitudeAxis, ReportError};
+use crate::report::{MagnitudeAxis, ReportError, crossing_count, place};
 
 const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a band of two sigma, and by the model. Dotted: |L| = 1 \
     and -180 degrees.";
@@ -23,8 +23,7 @@ const SENSITIVITY_CAPTION: &str = "S from reference to error and T from referenc
     of the modulus margin.";
 const SENSITIVITY_LIMIT_CAPTION: &str =
     " Dashed: the limit of |S|, the inverse of the least allowed modulus margin.";
-const MARGINS_NOTE: &str = "The measured phase margin is that at the crossover, the predicted one the smallest of all \
-    crossings. ± is the 95 % confidence interval.";
+const MARGINS_NOTE: &str = "The phase margin is the smallest one of all crossings of |L| = 1. ± is the 95 % confidence interval.";
 
 const MA_PER_A: f64 = 1e3;
 /// Significant digits of an amplitude.
@@ -242,11 +241,14 @@ fn crossovers(closed: &ClosedResponses) -> String {
 }
 
 fn phase_margins(closed: &ClosedResponses) -> String {
-    let crossover = closed.margins.crossover();
-    let measured = crossover.map(|crossing| crossing.phase_margin_deg);
-    let measured = measured.map(|margin| format!("{} deg", with_interval(margin, 1.0)));
-    let predicted = closed.predicted.phase_margin_deg;
-    let predicted = predicted.map(|margin| format!("{margin:.2} deg"));
+    let (measured, predicted) = (&closed.margins, &closed.predicted);
+    let measured = measured.phase_margin_deg.zip(measured.phase_margin_rad_s);
+    let measured = measured.map(|(margin, rad_s)| {
+        let count = crossing_count(closed.margins.crossings.len());
+        format!("{} deg {}{count}", with_interval(margin, 1.0), place(rad_s))
+    });
+    let predicted = predicted.phase_margin_deg.zip(predicted.phase_margin_rad_s);
+    let predicted = predicted.map(|(deg, rad_s)| format!("{deg:.2} deg {}", place(rad_s)));
     row(&["Phase margin".into(), or_none(measured), or_none(predicted)])
 }
 

@@ -9,10 +9,10 @@ use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
 use crate::report::conditions::{joined, lines};
 use crate::report::html::{facts, note, row, section};
-use crate::report::number::{angular_frequency, interval, plain};
+use crate::report::number::{interval, plain};
 use crate::report::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
-    loop_nyquist_svg, sensitivity_svg, signals_svg,
+    loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
 };
 
 const SIGNALS_CAPTION: &str =
@@ -158,17 +158,9 @@ impl ControlReport<'_> {
         if !margins.stable {
             return row(&["Closed loop".into(), String::new(), "unstable".into()]);
         }
-        let degrees = margins.phase_margin_deg.map(|deg| plain(deg, 2));
-        let decibels = margins.gain_margin_db.map(|db| plain(db, 2));
-        let crossover = margins.crossover_rad_s.map(angular_frequency);
-        let rows = [
-            ("Crossover", or_none(crossover)),
-            ("Phase margin (deg)", or_none(degrees)),
-            ("Gain margin (dB)", or_none(decibels)),
-            ("Modulus margin", plain(margins.modulus_margin, 4)),
-        ];
-        let rows = rows.map(|(name, value)| row(&[name.into(), String::new(), value]));
-        rows.concat()
+        let rows = margin_rows(margins).into_iter();
+        let rows = rows.map(|(name, value)| row(&[capital(name), String::new(), or_none(value)]));
+        rows.collect()
     }
 
     /// Largest values and heat.
@@ -352,4 +344,11 @@ fn um(metres: f64) -> String {
 
 fn or_none(text: Option<String>) -> String {
     text.unwrap_or_else(|| "none".into())
+}
+
+/// A name at the beginning of a row.
+fn capital(name: &str) -> String {
+    let mut letters = name.chars();
+    let first = letters.next().map(|first| first.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }

@@ -71,6 +71,12 @@ pub struct LoopOutputs {
     pub phase_margin_deg: Option<f64>,
     /// Its standard deviation.
     pub phase_margin_sigma_deg: Option<f64>,
+    /// Phase margin of smallest magnitude over all crossings of the measured |L| = 1.
+    pub smallest_phase_margin_deg: Option<f64>,
+    /// Its frequency.
+    pub smallest_phase_margin_rad_s: Option<f64>,
+    /// Number of these crossings.
+    pub crossings: usize,
     /// 1/max |S| in the swept band.
     pub modulus_margin: f64,
     /// Its standard deviation.
@@ -95,6 +101,9 @@ impl LoopOutputs {
             crossover_rad_s: margins.crossover_rad_s.map(|crossover| crossover.value),
             phase_margin_deg: phase_margin_deg.map(|margin| margin.value),
             phase_margin_sigma_deg: phase_margin_deg.map(|margin| margin.sigma),
+            smallest_phase_margin_deg: margins.phase_margin_deg.map(|margin| margin.value),
+            smallest_phase_margin_rad_s: margins.phase_margin_rad_s,
+            crossings: margins.crossings.len(),
             modulus_margin: margins.modulus_margin.value,
             modulus_margin_sigma: margins.modulus_margin.sigma,
             predicted_modulus_margin: closed.predicted.modulus_margin,
