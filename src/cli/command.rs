@@ -10,7 +10,8 @@ use super::outcome::Outcome;
 use super::output::{print_json, print_note};
 use super::{
     calibrate, campaign, chirp, compare, completions, config, control, controller, doctor, emulate,
-    export, identify, linearity, margins, model, recover, remote, replay, report, serve, tune,
+    export, identify, linearity, margins, model, recover, remote, replay, report, resume, serve,
+    tune,
 };
 use crate::experiment::survive_file_size_limit;
 
@@ -38,6 +39,8 @@ enum Command {
     /// Run as a daemon that owns the bench: live page, HTTP interface, queue of commands; other `bench` commands on this
     /// machine then use its bench
     Serve(serve::Args),
+    /// Release the bench of a daemon after a stop or a trip, and acknowledge the trip: waiting commands then begin
+    Resume(resume::Args),
     /// Run a chirp at each point of a grid of operating points and asymmetries; prints a map of the verdicts, the
     /// asymmetry offset and a recommendation
     Campaign(campaign::Args),
@@ -109,11 +112,11 @@ pub fn main() -> Outcome {
 fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
     let arguments: Vec<String> = arguments().collect();
     match remote::target(&arguments)? {
-        Some(target) => {
+        Some(target) if !matches!(cli.command, Command::Resume(_)) => {
             let description = cli.command.description().cloned().unwrap_or_default();
             remote::carry_out(&target, &arguments, &description)
         }
-        None => run(cli),
+        Some(_) | None => run(cli),
     }
 }
 
@@ -152,6 +155,7 @@ pub fn run(cli: Cli) -> Result<Outcome, CliError> {
         Command::Linearity(args) => linearity::run(&args),
         Command::Control(args) => control::run(&args),
         Command::Serve(args) => serve::run(&args),
+        Command::Resume(args) => resume::run(&args),
         Command::Campaign(args) => campaign::run(&args),
         Command::Calibrate(args) => calibrate::run(&args),
         Command::Model(args) => model::run(&args),

@@ -51,7 +51,7 @@ impl DescriptionOptions {
 }
 
 /// The user of this process, if it is known.
-fn user() -> Option<String> {
+pub(super) fn user() -> Option<String> {
     let user = std::env::var("USER").ok();
     user.and_then(|user| operator_name(&user).ok())
 }

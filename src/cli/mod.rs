@@ -45,6 +45,7 @@ mod recover;
 mod remote;
 mod replay;
 mod report;
+mod resume;
 mod run_options;
 mod serve;
 mod table;

@@ -4,6 +4,7 @@ use bytes::{Buf, Bytes};
 use http_body_util::BodyExt;
 use hyper::Method;
 use hyper::body::Incoming;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{Duration, interval};
 
@@ -11,9 +12,9 @@ use super::connection::SCHEME;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::outcome::Outcome;
-use super::output::{print_message, print_text};
-use crate::daemon::OutputPiece;
+use super::output::{print_message, print_note, print_text};
 use crate::daemon::http_client::{Ask, HttpError, Target, json as answer, send};
+use crate::daemon::{Hold, OutputPiece};
 use crate::experiment::StopSignals;
 
 /// Period of the renewals of the arm lease.
@@ -28,9 +29,14 @@ pub(super) fn target(arguments: &[String]) -> Result<Option<Target>, CliError> {
     let Some(address) = value.as_deref().and_then(|url| url.strip_prefix(SCHEME)) else {
         return Ok(None);
     };
-    require_plain_address(address)?;
     let (_, file) = split(arguments, "--token-file");
-    Ok(Some(Target::tcp(address, token(file.as_deref())?)))
+    Ok(Some(tcp_target(address, file.as_deref())?))
+}
+
+/// The daemon at `HOST:PORT`, with the token of a file or of the environment.
+pub(super) fn tcp_target(address: &str, token_file: Option<&str>) -> Result<Target, CliError> {
+    require_plain_address(address)?;
+    Ok(Target::tcp(address, token(token_file)?))
 }
 
 /// Other users of the machine see the arguments of a process, so that the address must not contain the token.
@@ -92,11 +98,19 @@ pub(super) fn carry_out(
     description: &DescriptionOptions,
 ) -> Result<Outcome, CliError> {
     let arguments = command_line(arguments);
+    in_runtime(target, carried_out(target, &arguments, description))
+}
+
+/// Waits for requests to a daemon.
+pub(super) fn in_runtime<T>(
+    target: &Target,
+    requests: impl Future<Output = Result<T, CliError>>,
+) -> Result<T, CliError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build();
     let runtime = runtime.map_err(|error| unreachable(target, &error.to_string()))?;
-    runtime.block_on(carried_out(target, &arguments, description))
+    runtime.block_on(requests)
 }
 
 async fn carried_out(
@@ -131,12 +145,26 @@ async fn carried_out(
     )
     .await;
     let outcome = match run {
+        Ok(run) if run["phase"] == "held" => {
+            let state = ask(target, Method::GET, "/api/v1/state", None, None).await?;
+            print_note(&held_text(&state["held"]));
+            follow(target, &lease, run["id"].as_u64().unwrap_or_default()).await
+        }
         Ok(run) => follow(target, &lease, run["id"].as_u64().unwrap_or_default()).await,
         Err(error) => Err(error),
     };
     // Without a release the lease expires by itself.
     let _ = ask(target, Method::DELETE, "/api/v1/lease", Some(&lease), None).await;
     outcome
+}
+
+/// What the operator of a command reads that was accepted while the bench is held. The command keeps the lease.
+fn held_text(held: &Value) -> String {
+    let hold = Hold::deserialize(held).map(|hold| format!(": {hold}"));
+    format!(
+        "the bench is held{}; this command waits with the arm lease. End it with Ctrl-C, remove the cause, resume with `bench resume --connect URL`, and start it again",
+        hold.unwrap_or_default()
+    )
 }
 
 /// Prints what the run prints, keeps the lease, and passes stop signals on, until the run has ended.
@@ -205,7 +233,7 @@ impl Lines {
 }
 
 /// The JSON of an answer; an error object is the error of the command.
-async fn ask(
+pub(super) async fn ask(
     target: &Target,
     method: Method,
     path: &str,
@@ -230,11 +258,11 @@ async fn ask(
 
 fn unreachable(target: &Target, why: &str) -> CliError {
     let address = match target {
-        Target::Tcp { address, .. } => address.clone(),
+        Target::Tcp { address, .. } => format!("http://{address}"),
         Target::Socket(path) => path.display().to_string(),
     };
     CliError::Failed(format!(
-        "--connect http://{address}: the daemon does not answer ({why}); check the address, and that `bench serve --listen` runs there"
+        "--connect {address}: the daemon does not answer ({why}); check the address, and that `bench serve` runs there (over TCP with --listen)"
     ))
 }
 

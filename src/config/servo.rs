@@ -79,9 +79,13 @@ impl LoopSettings {
         wanted_s.min(MAX_AWAKE_SHARE * self.period_s())
     }
 
+    /// Time in seconds after which a run ends whose arm lease was not renewed.
+    pub fn arm_lease_s(&self) -> f64 {
+        self.arm_lease_s.unwrap_or(DEFAULT_ARM_LEASE_S)
+    }
+
     /// Time in ticks after which a run ends whose arm lease was not renewed.
     pub fn arm_lease_ticks(&self) -> u64 {
-        let lease_s = self.arm_lease_s.unwrap_or(DEFAULT_ARM_LEASE_S);
-        (lease_s * self.rate_hz).ceil() as u64
+        (self.arm_lease_s() * self.rate_hz).ceil() as u64
     }
 }

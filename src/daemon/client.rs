@@ -5,10 +5,12 @@ use std::io;
 use std::os::unix::net::UnixStream as BlockingStream;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
 use tokio::net::UnixStream;
 use tokio::runtime::Runtime;
+use tokio::time::{Interval, MissedTickBehavior, interval};
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
 
@@ -25,6 +27,11 @@ use crate::experiment::{
 use crate::recording::{RecordingError, Totals};
 use crate::rt::thread::Pace;
 use crate::util::progress::Progress;
+
+/// Longest time between two renewals of the arm lease of a run.
+const RENEWAL: Duration = Duration::from_millis(250);
+/// Renewals in the time of an arm lease.
+const RENEWALS_PER_LEASE: f64 = 8.0;
 
 /// The path of the session on the socket.
 pub const SESSION_PATH: &str = "/api/v1/session";
@@ -227,6 +234,24 @@ struct Connection {
     runtime: Runtime,
     socket: PathBuf,
     stream: WebSocketStream<UnixStream>,
+    /// When the arm lease of the run is renewed.
+    renewals: Interval,
+}
+
+/// Period of the renewals of the arm lease of a run.
+fn renewal_period(order: &RunOrder) -> Duration {
+    let lease_s = order
+        .plan()
+        .map_or(f64::INFINITY, |plan| plan.config.servo.arm_lease_s());
+    let period = Duration::try_from_secs_f64(lease_s / RENEWALS_PER_LEASE);
+    period.map_or(RENEWAL, |period| period.min(RENEWAL))
+}
+
+/// Renewals from now on. Those that a suspended process has missed are not made up for.
+fn renewals(period: Duration) -> Interval {
+    let mut renewals = interval(period);
+    renewals.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    renewals
 }
 
 impl Connection {
@@ -238,10 +263,12 @@ impl Connection {
             let connected = tokio_tungstenite::client_async(request, stream).await;
             connected.map_err(io::Error::other)
         })?;
+        let renewals = runtime.block_on(async { renewals(RENEWAL) });
         Ok(Connection {
             runtime,
             socket: socket.into(),
             stream: stream.0,
+            renewals,
         })
     }
 
@@ -254,7 +281,7 @@ impl Connection {
                 FromDaemon::Refused(error) => return Err(error.into()),
                 FromDaemon::Waiting(text) => {
                     progress.begin("waiting for the bench", 0);
-                    tracing::warn!("the bench is in use: {text}");
+                    tracing::warn!("{text}");
                 }
                 other => return Err(self.unexpected(&other)),
             }
@@ -262,6 +289,8 @@ impl Connection {
     }
 
     fn run(&mut self, order: &RunOrder, progress: &Progress) -> Result<RunReport, ExperimentError> {
+        let period = renewal_period(order);
+        self.renewals = self.runtime.block_on(async { renewals(period) });
         self.send(&FromCommand::Run(Box::new(order.clone())))?;
         loop {
             match self.receive()? {
@@ -291,9 +320,11 @@ impl Connection {
         sent.map_err(|error| lost(&self.socket, &error.to_string()))
     }
 
-    /// The next message. Stop signals are sent on to the daemon: the first one settles the run, the second one cuts the current.
+    /// The next message. Meanwhile the arm lease is renewed: here and not in a thread of its own, so that a process that hangs renews
+    /// nothing. Stop signals are sent on to the daemon: the first one settles the run, the second one cuts the current.
     fn receive(&mut self) -> Result<FromDaemon, ExperimentError> {
         let (stream, socket) = (&mut self.stream, &self.socket);
+        let renewals = &mut self.renewals;
         let received = self.runtime.block_on(async {
             let mut signals = StopSignals::listen().map_err(|error| error.to_string())?;
             let mut kind = StopKind::Settle;
@@ -306,10 +337,10 @@ impl Connection {
                         Some(Err(error)) => return Err(error.to_string()),
                     },
                     () = signals.received() => {
-                        let stop = serde_json::to_string(&FromCommand::Stop(kind)).map_err(|e| e.to_string())?;
-                        stream.send(Message::text(stop)).await.map_err(|error| error.to_string())?;
+                        send_to(stream, &FromCommand::Stop(kind)).await?;
                         kind = StopKind::Cut;
                     }
+                    _ = renewals.tick() => send_to(stream, &FromCommand::Alive).await?,
                 }
             }
         });
@@ -320,6 +351,15 @@ impl Connection {
     fn unexpected(&self, message: &FromDaemon) -> ExperimentError {
         lost(&self.socket, &format!("unexpected message {message:?}"))
     }
+}
+
+async fn send_to(
+    stream: &mut WebSocketStream<UnixStream>,
+    message: &FromCommand,
+) -> Result<(), String> {
+    let text = serde_json::to_string(message).map_err(|error| error.to_string())?;
+    let sent = stream.send(Message::text(text)).await;
+    sent.map_err(|error| error.to_string())
 }
 
 /// An order is sent as JSON, which contains text only.

@@ -4,19 +4,29 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::output::RunOutput;
-use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome};
+use super::run_entry::{Carrier, Phase, RunOutcome};
+use super::schedule::Schedule;
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::worker;
 
 /// Longest time between two looks at the lease.
 const LEASE_CHECK: Duration = Duration::from_millis(200);
+/// Longest time in which a process completes its results after its turn.
+const RESULTS: Duration = Duration::from_secs(60);
 
 /// Serves the queue until the daemon ends.
 pub async fn serve(daemon: Arc<Daemon>) {
     let mut changes = daemon.changes();
+    let mut last = None;
     loop {
-        if let Some(id) = next(&daemon) {
+        let begun = next(&daemon);
+        let current = daemon.read(|schedule| schedule.current().map(|entry| entry.id));
+        if let Some(ended) = last.filter(|_| last != current) {
+            daemon.owner.end_command(ended);
+        }
+        last = current;
+        if let Some(id) = begun {
             begin(&daemon, id);
         }
         let changed = tokio::time::timeout(LEASE_CHECK, changes.changed()).await;
@@ -49,10 +59,15 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
     let Carrier::Started { ticket } = entry.carrier else {
         return;
     };
+    daemon.change(|schedule, _| {
+        if let Ok(entry) = schedule.open_entry(id) {
+            entry.has_process = true;
+        }
+    });
     let daemon = Arc::clone(daemon);
     tokio::spawn(async move {
         let output = daemon.output(id);
-        let stopped = stopped_before_its_run(&daemon, id);
+        let stopped = process_must_end(&daemon, id);
         let ended = worker::run(&daemon, &entry.request, &ticket, &output, stopped).await;
         finish(
             &daemon,
@@ -63,25 +78,46 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
     });
 }
 
-/// Waits until somebody stops a command whose run has not begun, or that has none: a calculation, or a run in its own process.
-async fn stopped_before_its_run(daemon: &Daemon, id: u64) {
+/// Waits until the process of a command must end: somebody stopped it before its run, or it has no run (a calculation, or a run in its
+/// own process). One that still works on its results after its turn has some time for them.
+async fn process_must_end(daemon: &Daemon, id: u64) {
     let mut changes = daemon.changes();
-    let is_stopped = |entry: &RunEntry| entry.is_stopped && entry.phase == Phase::Starting;
-    while !daemon.read(|schedule| schedule.entry(id).is_ok_and(is_stopped)) {
+    loop {
+        match daemon.read(|schedule| work(schedule, id)) {
+            Work::MayGoOn => {}
+            Work::Stopped => return,
+            Work::AfterItsTurn => return tokio::time::sleep(RESULTS).await,
+        }
         if changes.changed().await.is_err() {
             return;
         }
     }
 }
 
+/// What the process of a command may do.
+enum Work {
+    MayGoOn,
+    Stopped,
+    /// Its turn has ended.
+    AfterItsTurn,
+}
+
+fn work(schedule: &Schedule, id: u64) -> Work {
+    match schedule.open().find(|entry| entry.id == id) {
+        None => Work::AfterItsTurn,
+        Some(entry) if entry.is_stopped && entry.phase == Phase::Starting => Work::Stopped,
+        Some(_) => Work::MayGoOn,
+    }
+}
+
 /// Ends a command whose process has ended.
 fn finish(daemon: &Daemon, id: u64, ended: &Result<i32, String>, output: &RunOutput) {
     daemon.change(|schedule, now| {
+        schedule.end_process(id, ended.as_ref().ok().copied());
         let Ok(entry) = schedule.open_entry(id) else {
-            return;
+            return; // its turn has ended before
         };
         let noted = entry.outcome.take();
-        entry.exit_code = ended.as_ref().ok().copied();
         let (outcome, message) = match (ended, noted) {
             (Ok(0 | 3), _) => (RunOutcome::Completed, None),
             (Ok(_), Some(noted @ (RunOutcome::Tripped | RunOutcome::Stopped))) => (noted, None),
@@ -96,5 +132,4 @@ fn finish(daemon: &Daemon, id: u64, ended: &Result<i32, String>, output: &RunOut
         };
         schedule.finish(id, outcome, message, now);
     });
-    daemon.owner.end_command();
 }

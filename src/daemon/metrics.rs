@@ -62,6 +62,12 @@ pub async fn text(daemon: &Daemon) -> String {
     write_loop(&mut out, daemon);
     write_devices(&mut out, daemon);
     write_runs(&mut out, daemon);
+    let is_held = daemon.read(|schedule| schedule.hold().is_some());
+    out.gauge(
+        "bench_held",
+        "1 while nothing begins after a stop or a trip, until an operator resumes.",
+        u8::from(is_held),
+    );
     let defect = daemon.owner.recording_defect();
     out.gauge(
         "bench_recording_defect",

@@ -10,6 +10,7 @@ mod dispatch;
 mod files;
 #[cfg(feature = "foxglove")]
 mod foxglove;
+mod hold;
 pub mod http_client;
 mod lease;
 pub mod live;
@@ -36,6 +37,7 @@ mod start;
 mod warnings;
 mod worker;
 
+pub use hold::Hold;
 pub use output::OutputPiece;
 pub use run_entry::{Command, OnDisconnect, RunRequest};
 pub use serve::serve;

@@ -13,10 +13,10 @@ use super::warnings::copy_warnings;
 use crate::config::Config;
 use crate::experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
-    RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause,
+    RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
 };
 use crate::rig::motor::Moment;
-use crate::rt::supervision::StopFlags;
+use crate::rt::supervision::{ArmLease, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
 use crate::util::progress::Progress;
 
@@ -35,6 +35,8 @@ pub struct OwnerOrder {
     pub order: RunOrder,
     /// Ends the run.
     pub stop: StopFlags,
+    /// The arm lease of the run, if its client renews it.
+    pub lease: Option<Arc<ArmLease>>,
     /// Receives the progress.
     pub progress: Progress,
     /// Receives warnings for the operator.
@@ -45,7 +47,7 @@ pub struct OwnerOrder {
 
 enum Message {
     Run(Box<OwnerOrder>),
-    EndCommand,
+    EndCommand(u64),
 }
 
 /// The rig, for display.
@@ -71,6 +73,7 @@ pub struct Owner {
     status: Arc<Mutex<RigStatus>>,
     tuner: Sender<crate::rt::tuning::Tune>,
     recording_defect: RecordingDefect,
+    trips: TripCount,
     thread: Option<JoinHandle<()>>,
 }
 
@@ -84,6 +87,7 @@ impl Owner {
         let hooks = RunHooks::watched(feeds);
         let tuner = hooks.tuner();
         let recording_defect = hooks.recording_defect.clone();
+        let trips = hooks.trips.clone();
         let status = Arc::new(Mutex::new(RigStatus {
             names: None,
             scheduling: Scheduling::default(),
@@ -107,6 +111,7 @@ impl Owner {
             status,
             tuner,
             recording_defect,
+            trips,
             thread: Some(thread),
         })
     }
@@ -131,9 +136,14 @@ impl Owner {
         self.send(Message::Run(Box::new(order)));
     }
 
-    /// The command has ended: the rig goes back to its own configuration.
-    pub fn end_command(&self) {
-        self.send(Message::EndCommand);
+    /// The turn of a command has ended: the rig goes back to its own configuration.
+    pub fn end_command(&self, command: u64) {
+        self.send(Message::EndCommand(command));
+    }
+
+    /// Number of runs that an interlock ended, and the reason of the last one.
+    pub fn trips(&self) -> (u64, &'static str) {
+        self.trips.get()
     }
 
     fn send(&self, message: Message) {
@@ -174,7 +184,7 @@ impl OwnerThread {
         loop {
             match messages.recv_timeout(RETRY) {
                 Ok(Message::Run(order)) => self.run(*order),
-                Ok(Message::EndCommand) => self.end_command(),
+                Ok(Message::EndCommand(command)) => self.end_command(command),
                 Err(RecvTimeoutError::Timeout) => self.check_idle(),
                 Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -251,7 +261,10 @@ impl OwnerThread {
         let calibration = order.order.calibration()?;
         let mut runner = self.runner(order);
         lock(&self.status).pace = order.order.pace;
-        runner.set_hooks(self.hooks.with_stop(order.stop.clone()));
+        runner.set_hooks(
+            self.hooks
+                .with_stop(order.stop.clone(), order.lease.clone()),
+        );
         runner.progress = order.progress.clone();
         runner.setup.folder.clone_from(&order.order.folder);
         let result = runner.run_calibrated(&plan, plan.kind.name(), calibration);
@@ -293,9 +306,11 @@ impl OwnerThread {
         Stage::of(&self.config) == Stage::Simulated
     }
 
-    fn end_command(&mut self) {
+    /// Another command may have begun to use the rig.
+    fn end_command(&mut self, ended: u64) {
         self.defects = 0;
-        if let Some((_, runner)) = self.command.take() {
+        let runner = self.command.take_if(|(command, _)| *command == ended);
+        if let Some((_, runner)) = runner {
             let bench = runner.into_bench();
             self.idle = bench.filter(|_| !self.is_simulated());
         }

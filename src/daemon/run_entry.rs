@@ -1,5 +1,7 @@
 //! One command of the queue, from its entry to its end.
 
+use std::time::Instant;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -121,6 +123,8 @@ pub enum Carrier {
 pub enum Phase {
     /// It waits for the commands before it.
     Queued,
+    /// It waits until the bench is resumed after a stop or a trip.
+    Held,
     /// It is next, but another operator holds the lease.
     WaitingForLease,
     /// It has its turn and prepares its run.
@@ -188,6 +192,10 @@ pub struct RunEntry {
     pub stop: StopFlags,
     /// Whether somebody stopped it.
     pub is_stopped: bool,
+    /// When its turn ends at the latest, because it was stopped and has no run.
+    pub turn_ends: Option<Instant>,
+    /// Whether a process that the daemon started for it still works, perhaps after the end of its turn.
+    pub has_process: bool,
     /// Whether its client has disappeared.
     pub is_orphan: bool,
     /// How it ended.
@@ -220,7 +228,7 @@ impl RunEntry {
     pub fn is_current(&self) -> bool {
         match self.phase {
             Phase::Starting | Phase::Running | Phase::Analysing => true,
-            Phase::Queued | Phase::WaitingForLease | Phase::Finished => false,
+            Phase::Queued | Phase::Held | Phase::WaitingForLease | Phase::Finished => false,
         }
     }
 }

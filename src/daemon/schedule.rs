@@ -5,11 +5,15 @@
 //!    command is cancelled.
 //! 3. A process of this machine (`bench chirp` beside the daemon) takes the lease at its turn. It waits while another operator holds it.
 //! 4. When a lease expires, a run that ends with its client is stopped; another run keeps the lease until its end.
-//! 5. Anyone may stop.
+//! 5. Anyone may stop. After a stop or a trip the bench is held (see [`hold`](super::hold)): no command gets its turn and no run begins
+//!    until the holder of the lease resumes.
+//! 6. A stopped command whose run has ended, or has not begun, keeps its turn for [`GRACE`] only, whatever its process does.
 
 use std::collections::{BTreeMap, VecDeque};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+pub use super::hold::StopKind;
+use super::hold::{Hold, HoldCause};
 use super::lease::{Keeper, LEASE, Lease};
 use super::run_entry::{Carrier, Command, Phase, RunEntry, RunOutcome, RunRequest};
 use super::secret::Secret;
@@ -19,6 +23,8 @@ use crate::rt::supervision::StopFlags;
 pub const MAX_QUEUED: usize = 100;
 /// Ended commands that are remembered.
 const MAX_FINISHED: usize = 200;
+/// Time in which the process of a stopped command ends by itself. Then another command may have the bench.
+pub const GRACE: Duration = Duration::from_millis(500);
 
 /// A moment by both clocks. Rules use the monotonic clock; the wall clock is for display.
 #[derive(Clone, Copy, Debug)]
@@ -29,29 +35,8 @@ pub struct Now {
     pub unix_s: f64,
 }
 
-/// How a run is stopped.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    serde::Serialize,
-    serde::Deserialize,
-    schemars::JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum StopKind {
-    /// The current goes to zero along a ramp.
-    #[default]
-    Settle,
-    /// Zero current at once.
-    Cut,
-}
-
 /// A request that the rules refuse.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// Another operator holds the lease.
     #[error("{operator} holds the arm lease of the bench; wait until it is released")]
@@ -75,6 +60,14 @@ pub enum ScheduleError {
     /// No open command has this ticket.
     #[error("the ticket of this command is not valid; start it again without BENCH_TICKET")]
     NoTicket,
+    /// The bench is held.
+    #[error(
+        "the bench is held: {0}; when the cause is removed, resume with `bench resume` or on the live page, and start the command again"
+    )]
+    OnHold(Hold),
+    /// The command was stopped.
+    #[error("the command was stopped, so that it begins no further run; start it again")]
+    Stopped,
     /// The daemon ends.
     #[error("the daemon is shutting down; start the command again when it runs")]
     ShuttingDown,
@@ -91,6 +84,7 @@ pub struct Schedule {
     /// Numbers of ended commands.
     ended: BTreeMap<(Command, RunOutcome), u64>,
     last_id: u64,
+    hold: Option<Hold>,
     is_shutting_down: bool,
 }
 
@@ -98,6 +92,11 @@ impl Schedule {
     /// The lease, if somebody holds it.
     pub fn lease(&self) -> Option<&Lease> {
         self.lease.as_ref()
+    }
+
+    /// Why nothing begins; `None` while the bench is released.
+    pub fn hold(&self) -> Option<&Hold> {
+        self.hold.as_ref()
     }
 
     /// The command that has its turn.
@@ -233,12 +232,26 @@ impl Schedule {
         lease.ok_or(ScheduleError::NoLease)
     }
 
-    /// Ends a lease that was not renewed in time.
+    /// Ends a lease that was not renewed in time, and the turn of a stopped command whose process does not end.
     pub fn expire(&mut self, now: Now) {
+        self.end_turn(now);
         let lease = self.lease.as_ref();
         if lease.is_some_and(|lease| lease.has_expired(now.instant)) {
             self.lose_lease(now);
         }
+    }
+
+    /// Ends the turn of a stopped command at its time.
+    fn end_turn(&mut self, now: Now) {
+        let is_over = |entry: &&RunEntry| entry.turn_ends.is_some_and(|ends| now.instant >= ends);
+        let Some(entry) = self.current().filter(is_over) else {
+            return;
+        };
+        let outcome = match entry.outcome {
+            Some(RunOutcome::Tripped) => RunOutcome::Tripped,
+            _ => RunOutcome::Stopped,
+        };
+        self.finish(entry.id, outcome, None, now);
     }
 
     /// The client of the lease is disconnected.
@@ -258,7 +271,7 @@ impl Schedule {
         let keeper = Keeper::Run(current.id);
         current.is_orphan = true;
         if current.request.ends_with_client() {
-            stop_entry(current, StopKind::Settle);
+            stop_entry(current, StopKind::Settle, now);
         }
         self.lease = Some(Lease { keeper, ..lease });
     }
@@ -282,13 +295,15 @@ impl Schedule {
             carrier: new.carrier,
             operator: new.operator,
             lease: new.lease,
-            phase: Phase::Queued,
+            phase: self.waiting_phase(),
             queued_unix_s: now.unix_s,
             started_unix_s: None,
             ended_unix_s: None,
             estimated_s: None,
             stop: StopFlags::default(),
             is_stopped: false,
+            turn_ends: None,
+            has_process: false,
             is_orphan: false,
             outcome: None,
             exit_code: None,
@@ -303,6 +318,9 @@ impl Schedule {
     /// process takes.
     pub fn advance(&mut self, secret: impl FnOnce() -> Option<Secret>, now: Now) -> Option<u64> {
         self.expire(now);
+        if self.hold.is_some() {
+            return None;
+        }
         let entry = self.open.front_mut().filter(|entry| !entry.is_current())?;
         if let Some(lease) = &self.lease
             && !may_begin(entry, lease)
@@ -326,6 +344,98 @@ impl Schedule {
         Some(entry.id)
     }
 
+    /// Begins a run of the command that has its turn: `order` gives it to the rig. Nobody can stop or hold the bench in between.
+    ///
+    /// # Errors
+    /// While the bench is held, when the command was stopped, and when its turn has ended.
+    pub fn begin_run<R>(
+        &mut self,
+        id: u64,
+        order: impl FnOnce(&mut RunEntry) -> R,
+    ) -> Result<R, ScheduleError> {
+        let hold = self.hold.clone();
+        let current = self.open.front_mut();
+        let current = current.filter(|entry| entry.is_current() && entry.id == id);
+        let entry = current.ok_or(ScheduleError::Stopped)?;
+        match hold {
+            Some(hold) => Err(ScheduleError::OnHold(hold)),
+            None if entry.is_stopped => Err(ScheduleError::Stopped),
+            None => {
+                entry.phase = Phase::Running;
+                Ok(order(entry))
+            }
+        }
+    }
+
+    /// A run has ended; its process analyses the recording. One that an interlock ended holds the bench.
+    pub fn end_run(&mut self, id: u64, ended: EndedRun, now: Now) {
+        if let Some(by) = ended.tripped_by {
+            self.trip(id, by, now);
+        }
+        let Ok(entry) = self.open_entry(id) else {
+            return;
+        };
+        entry.phase = Phase::Analysing;
+        entry.outcome = Some(ended.outcome);
+        entry.recording = ended.recording.or(entry.recording.take());
+        entry.message = ended.message.or(entry.message.take());
+        if entry.is_stopped {
+            entry.turn_ends = Some(now.instant + GRACE);
+        }
+    }
+
+    /// An interlock ended the run of a command.
+    fn trip(&mut self, id: u64, by: String, now: Now) {
+        self.begin_hold(Hold {
+            cause: HoldCause::Trip,
+            by,
+            since_unix_s: now.unix_s,
+            how: None,
+            run: Some(id),
+        });
+    }
+
+    /// Holds the bench. If it is held, the first cause remains.
+    fn begin_hold(&mut self, hold: Hold) {
+        self.hold.get_or_insert(hold);
+        self.mark_waiting();
+    }
+
+    /// Releases the bench.
+    ///
+    /// # Errors
+    /// When `secret` is not that of the lease, or the lease has expired.
+    pub fn resume(&mut self, secret: &str, now: Now) -> Result<Option<Hold>, ScheduleError> {
+        self.require_lease(secret, now)?;
+        let released = self.hold.take();
+        self.mark_waiting();
+        Ok(released)
+    }
+
+    fn waiting_phase(&self) -> Phase {
+        match self.hold {
+            Some(_) => Phase::Held,
+            None => Phase::Queued,
+        }
+    }
+
+    fn mark_waiting(&mut self) {
+        let phase = self.waiting_phase();
+        let waiting = self.open.iter_mut().filter(|entry| !entry.is_current());
+        for entry in waiting {
+            entry.phase = phase;
+        }
+    }
+
+    /// The process of a command has ended. Its exit code is noted also after the end of its turn.
+    pub fn end_process(&mut self, id: u64, exit_code: Option<i32>) {
+        let mut all = self.open.iter_mut().chain(&mut self.finished);
+        if let Some(entry) = all.find(|entry| entry.id == id) {
+            entry.has_process = false;
+            entry.exit_code = exit_code;
+        }
+    }
+
     /// Ends a command. The lease of a run ends with it.
     pub fn finish(&mut self, id: u64, outcome: RunOutcome, message: Option<String>, now: Now) {
         let Some(at) = self.open.iter().position(|entry| entry.id == id) else {
@@ -346,6 +456,7 @@ impl Schedule {
             .entry((entry.request.command, outcome))
             .or_default()) += 1;
         entry.phase = Phase::Finished;
+        entry.turn_ends = None;
         entry.ended_unix_s = Some(now.unix_s);
         entry.outcome = Some(outcome);
         entry.message = entry.message.or(message);
@@ -353,33 +464,48 @@ impl Schedule {
         self.finished.truncate(MAX_FINISHED);
     }
 
-    /// Stops a command: one that waits is removed, the one that has its turn ends.
+    /// Stops a command: one that waits is removed; for the one that has its turn the bench is stopped and held. `by` says who stops.
     ///
     /// # Errors
     /// When there is no such command.
-    pub fn stop(&mut self, id: u64, kind: StopKind, now: Now) -> Result<(), ScheduleError> {
-        let is_finished = self.entry(id)?.phase == Phase::Finished;
-        if is_finished {
-            return Ok(());
-        }
-        let entry = self.open_entry(id)?;
-        if entry.is_current() {
-            stop_entry(entry, kind);
-        } else {
-            self.finish(
-                id,
-                RunOutcome::Stopped,
-                Some("it was cancelled before its turn".into()),
-                now,
-            );
+    pub fn stop(
+        &mut self,
+        id: u64,
+        kind: StopKind,
+        by: &str,
+        now: Now,
+    ) -> Result<(), ScheduleError> {
+        match self.entry(id)? {
+            entry if entry.phase == Phase::Finished => {}
+            entry if entry.is_current() => drop(self.stop_bench(kind, by, now)),
+            _ => {
+                let why = "it was cancelled before its turn".into();
+                self.finish(id, RunOutcome::Stopped, Some(why), now);
+            }
         }
         Ok(())
     }
 
-    /// Stops whatever has its turn; returns its number.
-    pub fn stop_current(&mut self, kind: StopKind) -> Option<u64> {
+    /// Stops whatever has its turn, and holds the bench; returns the number of the command. `by` says who stops.
+    pub fn stop_bench(&mut self, kind: StopKind, by: &str, now: Now) -> Option<u64> {
+        let run = self.stop_current(kind, now);
+        match &mut self.hold {
+            Some(held) => held.add_stop(kind),
+            None => self.begin_hold(Hold {
+                cause: HoldCause::Stop,
+                by: by.into(),
+                since_unix_s: now.unix_s,
+                how: Some(kind),
+                run,
+            }),
+        }
+        run
+    }
+
+    /// Stops whatever has its turn, at the end of the daemon; returns its number.
+    pub fn stop_current(&mut self, kind: StopKind, now: Now) -> Option<u64> {
         let current = self.open.front_mut().filter(|entry| entry.is_current())?;
-        stop_entry(current, kind);
+        stop_entry(current, kind, now);
         Some(current.id)
     }
 
@@ -395,7 +521,7 @@ impl Schedule {
         }
         entry.is_orphan = true;
         if entry.request.ends_with_client() {
-            stop_entry(entry, StopKind::Settle);
+            stop_entry(entry, StopKind::Settle, now);
         }
     }
 
@@ -407,7 +533,7 @@ impl Schedule {
             let why = "the daemon was shut down before its turn".into();
             self.finish(id, RunOutcome::Stopped, Some(why), now);
         }
-        self.stop_current(StopKind::Settle);
+        self.stop_current(StopKind::Settle, now);
     }
 
     fn require_service(&self) -> Result<(), ScheduleError> {
@@ -431,6 +557,19 @@ pub struct NewEntry {
     pub lease: Option<Secret>,
 }
 
+/// How a run ended.
+#[derive(Debug)]
+pub struct EndedRun {
+    /// Its end.
+    pub outcome: RunOutcome,
+    /// File name of its recording.
+    pub recording: Option<String>,
+    /// The error, if it failed.
+    pub message: Option<String>,
+    /// The interlock that tripped, in words.
+    pub tripped_by: Option<String>,
+}
+
 /// Whether a command was queued under a lease.
 fn is_under(entry: &RunEntry, secret: &Secret) -> bool {
     entry
@@ -447,8 +586,11 @@ fn may_begin(entry: &RunEntry, lease: &Lease) -> bool {
     }
 }
 
-/// Raises the stop flags of a run: once to settle it, twice to cut the current.
-fn stop_entry(entry: &mut RunEntry, kind: StopKind) {
+/// Raises the stop flags of a run: once to settle it, twice to cut the current. Without a run, the turn ends soon.
+fn stop_entry(entry: &mut RunEntry, kind: StopKind, now: Now) {
+    if entry.phase != Phase::Running {
+        entry.turn_ends.get_or_insert(now.instant + GRACE);
+    }
     let was_stopped = std::mem::replace(&mut entry.is_stopped, true);
     match (kind, was_stopped) {
         // A second request to settle does not cut the current.
@@ -462,5 +604,7 @@ fn stop_entry(entry: &mut RunEntry, kind: StopKind) {
     }
 }
 
+#[cfg(test)]
+mod hold_tests;
 #[cfg(test)]
 mod tests;

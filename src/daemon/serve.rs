@@ -257,7 +257,7 @@ async fn shut_down(daemon: &Daemon, signals: &mut StopSignals) {
             tokio::select! {
                 changed = changes.changed() => if changed.is_err() { return },
                 () = signals.received() => {
-                    daemon.change(|schedule, _| schedule.stop_current(StopKind::Cut));
+                    daemon.change(|schedule, now| schedule.stop_current(StopKind::Cut, now));
                 }
             }
         }

@@ -2,27 +2,35 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use axum::extract::ws::{Message, WebSocket};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::{MissedTickBehavior, interval};
 
 use super::catalogue::{Catalogue, RecordingInfo};
+use super::hold::Hold;
 use super::live::hub::LiveRun;
 use super::owner::OwnerOrder;
 use super::peer::Peer;
-use super::run_entry::{Carrier, Phase, RunOutcome};
-use super::schedule::{NewEntry, Schedule, ScheduleError};
+use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome};
+use super::schedule::{EndedRun, NewEntry, Schedule, ScheduleError, StopKind};
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
 use super::shared::Daemon;
 use crate::experiment::{
-    Ending, ExperimentError, RemoteError, Run, RunOrder, RunReport, RunSummary, close,
+    Ending, ExperimentError, MotorError, RemoteError, Run, RunError, RunOrder, RunReport,
+    RunSummary, close,
 };
+use crate::rt::record::Origin;
+use crate::rt::supervision::ArmLease;
 use crate::util::progress::Progress;
 
 /// Period of the progress reports.
 const PROGRESS: Duration = Duration::from_millis(100);
+/// A command that did not report for this time gets no progress reports, which would fill the buffer of its connection.
+const SILENCE: Duration = Duration::from_secs(1);
+/// Longest time in which a command takes a message.
+const SEND: Duration = Duration::from_secs(1);
 
 /// Serves a command until its connection closes. `peer` is the user of the connection.
 pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket, peer: Peer) {
@@ -134,7 +142,8 @@ impl Connection {
             self.0 = None;
             return;
         };
-        if socket.send(Message::Text(text.into())).await.is_err() {
+        let sent = tokio::time::timeout(SEND, socket.send(Message::Text(text.into())));
+        if !matches!(sent.await, Ok(Ok(()))) {
             self.0 = None;
         }
     }
@@ -169,7 +178,7 @@ impl Session {
                     self.connection.send(&refused(text)).await;
                     return false;
                 }
-                Phase::Queued | Phase::WaitingForLease => {}
+                Phase::Queued | Phase::Held | Phase::WaitingForLease => {}
             }
             // A command that is next begins at once.
             let is_next = phase == Phase::Queued && text.is_empty();
@@ -181,7 +190,11 @@ impl Session {
             }
             tokio::select! {
                 changed = changes.changed() => if changed.is_err() { return false },
-                _ = self.connection.receive() => if !self.connection.is_open() { return false },
+                message = self.connection.receive() => match message {
+                    Some(FromCommand::Stop(kind)) => self.stop(kind),
+                    Some(_) => {}
+                    None => return false,
+                },
             }
         }
     }
@@ -208,16 +221,19 @@ impl Session {
                 }
                 FromCommand::Finish(results) => self.finish(results).await,
                 FromCommand::Stop(kind) => self.stop(kind),
+                FromCommand::Alive => {}
                 FromCommand::Open(_) => return,
             }
         }
     }
 
-    fn stop(&self, kind: super::schedule::StopKind) {
-        // The command has not ended while its connection is open.
-        let _ = self
-            .daemon
-            .change(|schedule, now| schedule.stop(self.id, kind, now));
+    /// The operator stops the command at its terminal.
+    fn stop(&self, kind: StopKind) {
+        // A command that is not known any more has ended.
+        let _ = self.daemon.change(|schedule, now| {
+            let by = stopped_by(schedule.entry(self.id)?);
+            schedule.stop(self.id, kind, &by, now)
+        });
     }
 
     async fn run(&mut self, mut order: RunOrder) {
@@ -244,30 +260,36 @@ impl Session {
             number: u32::try_from(self.id).unwrap_or(u32::MAX),
             kind: order.kind,
         };
+        let lease = Arc::<ArmLease>::default();
+        let trips = self.daemon.owner.trips();
         let begun = self.daemon.change(|schedule, _| {
-            let entry = schedule.open_entry(self.id)?;
-            entry.phase = Phase::Running;
-            entry.progress = Some(progress.clone());
-            Ok::<_, ScheduleError>((entry.stop.clone(), entry.description()))
+            schedule.begin_run(self.id, |entry| {
+                self.daemon.set_plan(plan);
+                self.daemon.live.set_run(live_run);
+                entry.progress = Some(progress.clone());
+                order.description = order.description.or(entry.description());
+                let ends_with_client = entry.request.ends_with_client();
+                self.daemon.owner.run(OwnerOrder {
+                    command: self.id,
+                    order,
+                    stop: entry.stop.clone(),
+                    lease: ends_with_client.then(|| Arc::clone(&lease)),
+                    progress: progress.clone(),
+                    warnings,
+                    reply,
+                });
+            })
         });
-        let (stop, description) = match begun {
-            Ok(begun) => begun,
-            Err(error) => return self.connection.send(&refused(error.to_string())).await,
-        };
-        order.description = order.description.or(description);
-        self.daemon.set_plan(plan);
-        self.daemon.live.set_run(live_run);
-        self.daemon.owner.run(OwnerOrder {
-            command: self.id,
-            order,
-            stop,
-            progress: progress.clone(),
-            warnings,
-            reply,
-        });
-        let result = self.follow(replied, warned, &progress).await;
+        if let Err(error) = begun {
+            if self.outcome != RunOutcome::Tripped {
+                self.outcome = RunOutcome::Stopped;
+            }
+            return self.connection.send(&refused(error.to_string())).await;
+        }
+        let result = self.follow(replied, warned, &progress, &lease).await;
         self.daemon.set_plan(None);
-        self.report(result).await;
+        let now = self.daemon.owner.trips();
+        self.report(result, (now != trips).then_some(now.1)).await;
     }
 
     /// Follows a run to its end, also when the connection closes.
@@ -276,7 +298,9 @@ impl Session {
         mut reply: oneshot::Receiver<Result<Run, ExperimentError>>,
         mut warnings: mpsc::UnboundedReceiver<String>,
         progress: &Progress,
+        lease: &ArmLease,
     ) -> Result<Run, ExperimentError> {
+        let mut reported = Instant::now();
         let mut ticks = interval(PROGRESS);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         loop {
@@ -291,12 +315,16 @@ impl Session {
                 Some(text) = warnings.recv() => {
                     self.connection.send(&FromDaemon::Warning(text)).await;
                 }
-                _ = ticks.tick() => {
+                _ = ticks.tick(), if reported.elapsed() < SILENCE => {
                     let now = progress.snapshot();
                     let message = FromDaemon::Progress { done: now.done, total: now.total };
                     self.connection.send(&message).await;
                 }
                 message = self.connection.receive(), if is_connected => match message {
+                    Some(FromCommand::Alive) => {
+                        lease.renew();
+                        reported = Instant::now();
+                    }
                     Some(FromCommand::Stop(kind)) => self.stop(kind),
                     Some(_) => {}
                     None => self.daemon.change(|schedule, now| schedule.lose_client(self.id, now)),
@@ -305,46 +333,57 @@ impl Session {
         }
     }
 
-    /// Reports how a run ended.
-    async fn report(&mut self, result: Result<Run, ExperimentError>) {
+    /// Notes how a run ended, and reports it. `trip` is the reason of an interlock.
+    async fn report(&mut self, result: Result<Run, ExperimentError>, trip: Option<&'static str>) {
+        self.note_end(&result, trip);
         let reported = match result {
             Ok(run) => blocking(move || reported(run)).await,
             Err(error) => Err(error),
         };
         let message = match reported {
             Ok((run, report)) => {
-                self.outcome = outcome(&run);
-                self.note_recording(&run);
                 self.open_run = Some(run);
                 FromDaemon::Ended(Box::new(report))
             }
             Err(error) => {
                 self.outcome = RunOutcome::Failed;
-                let message = error.to_string();
-                self.note(|entry| entry.message = Some(message));
+                self.note_failure(&error);
                 FromDaemon::Refused(RemoteError::from(&error))
             }
         };
         self.connection.send(&message).await;
     }
 
-    fn note_recording(&self, run: &Run) {
-        let name = run
-            .path
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned());
-        let outcome = self.outcome;
-        self.note(|entry| {
-            entry.recording = name;
-            entry.phase = Phase::Analysing;
-            entry.outcome = Some(outcome);
+    /// Notes the end of a run in the queue, before anything else: a trip holds the bench.
+    fn note_end(&mut self, result: &Result<Run, ExperimentError>, trip: Option<&'static str>) {
+        let run = result.as_ref().ok();
+        self.outcome = outcome(result);
+        let file = run.and_then(|run| run.path.file_name());
+        let ended = EndedRun {
+            outcome: self.outcome,
+            recording: file.map(|name| name.to_string_lossy().into_owned()),
+            message: result.as_ref().err().map(ToString::to_string),
+            tripped_by: trip.map(|reason| format!("the interlock {reason}")),
+        };
+        let is_hung = run.is_some_and(|run| run.ended.stopped_by == Some(Origin::Lease));
+        self.daemon.change(|schedule, now| {
+            schedule.end_run(self.id, ended, now);
+            if is_hung {
+                schedule.lose_client(self.id, now);
+            }
         });
     }
 
-    fn note(&self, note: impl FnOnce(&mut super::run_entry::RunEntry)) {
-        // An entry that has ended needs no notes.
-        self.daemon
-            .change(|schedule, _| schedule.open_entry(self.id).map(note).ok());
+    /// Notes that the recording of a run cannot be completed.
+    fn note_failure(&self, error: &ExperimentError) {
+        let message = error.to_string();
+        self.daemon.change(|schedule, _| {
+            // An entry that has ended needs no notes.
+            if let Ok(entry) = schedule.open_entry(self.id) {
+                entry.outcome = Some(RunOutcome::Failed);
+                entry.message = Some(message);
+            }
+        });
     }
 
     /// Adds the results of the command to the recording.
@@ -415,7 +454,6 @@ impl Session {
         if is_attached {
             self.daemon
                 .change(|schedule, now| schedule.finish(id, outcome, None, now));
-            self.daemon.owner.end_command();
         }
     }
 }
@@ -459,8 +497,9 @@ fn turn(schedule: &Schedule, id: u64) -> (Phase, String) {
             let holder = schedule
                 .lease()
                 .map_or("another operator", |lease| &lease.operator);
-            format!("waiting until {holder} releases the arm lease of the bench")
+            in_use(&format!("waiting until {holder} releases the arm lease"))
         }
+        Phase::Held => schedule.hold().map(Hold::notice).unwrap_or_default(),
         Phase::Queued | Phase::Starting | Phase::Running | Phase::Analysing => {
             let before = schedule.open().take_while(|other| other.id != id);
             let ahead: Vec<u64> = before.map(|other| other.id).collect();
@@ -480,12 +519,25 @@ fn verdict(results: &str) -> Option<String> {
 fn waiting_text(ahead: &[u64]) -> String {
     match ahead {
         [] => String::new(),
-        [one] => format!("waiting for the end of run {one}"),
-        [first, ..] => format!(
+        [one] => in_use(&format!("waiting for the end of run {one}")),
+        [first, ..] => in_use(&format!(
             "waiting for the end of run {first} and of {} more",
             ahead.len() - 1
-        ),
+        )),
     }
+}
+
+fn in_use(why: &str) -> String {
+    format!("the bench is in use: {why}")
+}
+
+/// Who stops a command at its terminal.
+fn stopped_by(entry: &RunEntry) -> String {
+    let command = entry.request.command.name();
+    format!(
+        "Ctrl-C or a signal to bench {command} by {}",
+        entry.operator
+    )
 }
 
 fn reported(mut run: Run) -> Result<(Run, RunReport), ExperimentError> {
@@ -493,11 +545,18 @@ fn reported(mut run: Run) -> Result<(Run, RunReport), ExperimentError> {
     Ok((run, report))
 }
 
-fn outcome(run: &Run) -> RunOutcome {
-    match Ending::from(&run.ended) {
-        Ending::Completed => RunOutcome::Completed,
-        Ending::Tripped(..) => RunOutcome::Tripped,
-        Ending::Stopped | Ending::CutOff => RunOutcome::Stopped,
+fn outcome(result: &Result<Run, ExperimentError>) -> RunOutcome {
+    match result {
+        Ok(run) => match Ending::from(&run.ended) {
+            Ending::Completed => RunOutcome::Completed,
+            Ending::Tripped(..) => RunOutcome::Tripped,
+            Ending::Stopped | Ending::CutOff => RunOutcome::Stopped,
+        },
+        Err(
+            ExperimentError::Run(RunError::StoppedBefore)
+            | ExperimentError::Motor(MotorError::Stopped),
+        ) => RunOutcome::Stopped,
+        Err(_) => RunOutcome::Failed,
     }
 }
 

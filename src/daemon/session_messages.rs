@@ -2,9 +2,11 @@
 //! runs its plans one after the other, and ends when the connection closes.
 //!
 //! ```text
-//!  command: Open -----------------> Run -----------------------------> Finish ----> (Run ... or close)
+//!  command: Open -----------------> Run ------Alive*-Stop*-----------> Finish ----> (Run ... or close)
 //!  daemon:        Waiting* Granted       Progress* Warning* Ended               Finished
 //! ```
+//!
+//! `Alive` renews the arm lease of the run. A command that is suspended or hangs sends none, and its closed loop ends.
 
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +27,8 @@ pub enum FromCommand {
     Open(OpenCommand),
     /// Orders a run.
     Run(Box<RunOrder>),
+    /// The command waits for the end of its run.
+    Alive,
     /// Stops the run.
     Stop(StopKind),
     /// Adds the results as JSON to the recording of the last run and closes it.

@@ -107,6 +107,9 @@ impl LiveRig {
         folder: &Path,
         watch: &mut dyn FnMut(u64, u64),
     ) -> Result<Run, RunError> {
+        if self.hooks.stop.was_raised() {
+            return Err(RunError::StoppedBefore);
+        }
         let prepared = self.prepare(plan, folder)?;
         prepared.supervise(self, watch)
     }
@@ -121,7 +124,8 @@ impl LiveRig {
         require_space(folder, recording_bytes, free_bytes(folder))?;
         let (connections, mut outside) = connect(RING_SLOTS);
         queue_start(&mut outside.requests, program);
-        let (stop_flags, lease) = (self.hooks.stop.clone(), Arc::<ArmLease>::default());
+        let stop_flags = self.hooks.stop.clone();
+        let lease = self.hooks.lease.clone().unwrap_or_default();
         let run = servo_run(plan, connections)?
             .with_correction(plan.correction())
             .with_ramps(ramp_ticks)
@@ -206,6 +210,11 @@ impl PreparedRun<'_> {
         let total_ticks = self.total_ticks;
         let report = || watch(progress.run_ticks.load(Ordering::Relaxed), total_ticks);
         let ended = supervisor.run_to_end(&mut rig.live, self.run, &self.stop_flags, report)?;
+        if let Ok(outcome) = &ended
+            && let Some((trip, _)) = outcome.trip
+        {
+            rig.hooks.trips.add(trip.reason());
+        }
         let health = recorder.health();
         let recorder = recorder.join().map_err(|error| {
             // A run in virtual time may have ended before the supervisor sees the failure.

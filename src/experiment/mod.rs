@@ -117,7 +117,7 @@ pub use response_estimate::ClosedResponses;
 pub use run::{RemoteRecording, Run, StopCause};
 pub use run_error::RunError;
 pub use run_figures::{RunFigures, run_figures};
-pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks};
+pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks, TripCount};
 pub use run_order::{RigOwner, RunOrder, RunReport};
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};

@@ -120,6 +120,7 @@ impl RememberedMotor<'_> {
                 | RunError::Create(_)
                 | RunError::Folder { .. }
                 | RunError::Space { .. }
+                | RunError::StoppedBefore
                 | RunError::System { .. },
             ) => plan.motor.thermal_a2,
             Err(

@@ -37,6 +37,9 @@ pub enum RunError {
         /// Upper limit of the size of the recording in bytes.
         needed_bytes: u64,
     },
+    /// Somebody stopped the run before its first tick.
+    #[error("stopped before the run began; start it again; nothing was moved")]
+    StoppedBefore,
     /// The recording failed.
     #[error("{0}; the run was stopped with zero current")]
     Recording(#[from] RecordingError),

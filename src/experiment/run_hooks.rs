@@ -9,7 +9,7 @@ use rtrb::{Consumer, RingBuffer};
 use super::run::StopCause;
 use crate::recording::LiveCopy;
 use crate::rt::record::LoopMessage;
-use crate::rt::supervision::StopFlags;
+use crate::rt::supervision::{ArmLease, StopFlags};
 use crate::rt::tuning::Tune;
 
 /// Slots of the ring of a live view: 1.6 s at 5 kHz.
@@ -100,6 +100,23 @@ impl RecordingDefect {
     }
 }
 
+/// Number of runs that an interlock ended, with the last reason. Clones share it.
+#[derive(Clone, Debug, Default)]
+pub struct TripCount(Arc<Mutex<(u64, &'static str)>>);
+
+impl TripCount {
+    /// The number, and the reason of the last trip.
+    pub fn get(&self) -> (u64, &'static str) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Counts a trip.
+    pub(super) fn add(&self, reason: &'static str) {
+        let mut count = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *count = (count.0.saturating_add(1), reason);
+    }
+}
+
 /// Handles on the run of a rig. Clones belong to the same rig.
 #[derive(Clone, Debug)]
 pub struct RunHooks {
@@ -110,6 +127,10 @@ pub struct RunHooks {
     feeds: Option<FeedSender>,
     /// Why the run in progress, or the last one, cannot be recorded.
     pub recording_defect: RecordingDefect,
+    /// Counts the runs that an interlock ended.
+    pub trips: TripCount,
+    /// The arm lease of the run, if its client renews it; `None` if its supervisor does.
+    pub(super) lease: Option<Arc<ArmLease>>,
     /// Whether the stop signals of this process end the run.
     pub(super) has_signals: bool,
 }
@@ -123,6 +144,8 @@ impl Default for RunHooks {
             sent_tunes: Arc::new(Mutex::new(sent)),
             feeds: None,
             recording_defect: RecordingDefect::default(),
+            trips: TripCount::default(),
+            lease: None,
             has_signals: true,
         }
     }
@@ -138,10 +161,11 @@ impl RunHooks {
         }
     }
 
-    /// The same rig, with stop flags of the next run.
-    pub fn with_stop(&self, stop: StopFlags) -> RunHooks {
+    /// The same rig, with stop flags of the next run, and its arm lease if its client renews it.
+    pub fn with_stop(&self, stop: StopFlags, lease: Option<Arc<ArmLease>>) -> RunHooks {
         RunHooks {
             stop,
+            lease,
             ..self.clone()
         }
     }

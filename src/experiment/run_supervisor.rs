@@ -20,7 +20,7 @@ use crate::rt::supervision::{ArmLease, StopFlags};
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
 
-/// Watches the loop from outside: progress and the state of the recorder. It renews the arm lease.
+/// Watches the loop from outside: progress and the state of the recorder. It renews the arm lease, unless a client does.
 pub(super) struct Supervisor<'a> {
     pub(super) requests: RequestSender,
     pub(super) lease: Arc<ArmLease>,
@@ -55,7 +55,9 @@ impl Supervisor<'_> {
             return Ok(Err(LoopPanicked)); // only a panic leaves an earlier run in the loop
         }
         loop {
-            self.lease.renew();
+            if self.hooks.lease.is_none() {
+                self.lease.renew();
+            }
             watch();
             self.watch_recording();
             self.pass_on_tunes();
@@ -123,7 +125,7 @@ fn outcome(run: &ServoRun) -> RunOutcome {
     let outcome = run.outcome();
     if outcome.stopped_by == Some(Origin::Lease) {
         tracing::warn!(
-            "the loop ended the run by itself, because the command line did not respond for the time of loop.arm_lease_s; find out what blocked it, for example a paused terminal"
+            "the loop ended the run by itself, because the command that ordered it did not respond for the time of loop.arm_lease_s; find out what blocked it, for example a paused terminal or a suspended process"
         );
     }
     outcome

@@ -8,29 +8,42 @@ use super::request::Request;
 
 /// One flag for each signal that stops a run. A flag holds one signal until the next tick takes it.
 #[derive(Clone, Debug, Default)]
-pub struct StopFlags([Arc<AtomicBool>; 4]);
+pub struct StopFlags {
+    flags: [Arc<AtomicBool>; 4],
+    /// Whether [`StopFlags::raise`] was called, also if a tick has taken the flag.
+    was_raised: Arc<AtomicBool>,
+}
 
 impl StopFlags {
     /// The flags, for the handlers of different signals.
     pub fn flags(&self) -> &[Arc<AtomicBool>] {
-        &self.0
+        &self.flags
+    }
+
+    /// Whether the runs with these flags were stopped by [`StopFlags::raise`].
+    pub fn was_raised(&self) -> bool {
+        self.was_raised.load(Ordering::Relaxed)
     }
 
     /// Whether a flag is set that no tick has taken yet.
     pub fn is_raised(&self) -> bool {
-        self.0.iter().any(|flag| flag.load(Ordering::Relaxed))
+        self.flags.iter().any(|flag| flag.load(Ordering::Relaxed))
     }
 
     /// Sets the first flag that is not set.
     pub fn raise(&self) {
-        let mut flags = self.0.iter();
+        self.was_raised.store(true, Ordering::Relaxed);
+        let mut flags = self.flags.iter();
         let _ = flags.find(|flag| !flag.swap(true, Ordering::Relaxed));
     }
 
     /// Number of flags that were set since the last call.
     fn take(&self) -> usize {
         // A load is cheaper than an exchange, and almost always enough.
-        let set = self.0.iter().filter(|flag| flag.load(Ordering::Relaxed));
+        let set = self
+            .flags
+            .iter()
+            .filter(|flag| flag.load(Ordering::Relaxed));
         set.filter(|flag| flag.swap(false, Ordering::Relaxed))
             .count()
     }

@@ -12,6 +12,12 @@ pub fn seconds(time: SystemTime) -> String {
     humantime::format_rfc3339_seconds(displayable(time)).to_string()
 }
 
+/// The same for seconds since 1970.
+pub fn seconds_since_1970(unix_s: f64) -> String {
+    let since = Duration::try_from_secs_f64(unix_s.min(LAST_S as f64));
+    seconds(SystemTime::UNIX_EPOCH + since.unwrap_or_default())
+}
+
 /// RFC 3339 with milliseconds, in the same range as [`seconds`].
 pub fn milliseconds(time: SystemTime) -> String {
     humantime::format_rfc3339_millis(displayable(time)).to_string()
@@ -40,6 +46,14 @@ mod tests {
         let second = Duration::from_secs(1);
         assert_eq!(seconds(epoch - second), "1970-01-01T00:00:00Z");
         assert_eq!(unix_ns(epoch - second), 0);
+        for (unix_s, text) in [
+            (2.9, "1970-01-01T00:00:02Z"),
+            (-1.0, "1970-01-01T00:00:00Z"),
+            (f64::NAN, "9999-12-31T23:59:59Z"),
+            (1e300, "9999-12-31T23:59:59Z"),
+        ] {
+            assert_eq!(seconds_since_1970(unix_s), text);
+        }
         assert_eq!(unix_ns(epoch + 2 * second), 2_000_000_000);
         assert_eq!(milliseconds(epoch - second), "1970-01-01T00:00:00.000Z");
         let last = Duration::from_secs(LAST_S);

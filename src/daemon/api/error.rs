@@ -118,7 +118,9 @@ impl From<ScheduleError> for ApiError {
                 ApiError::new(StatusCode::TOO_MANY_REQUESTS, ErrorKind::Usage, message)
             }
             ScheduleError::Unknown(_) => ApiError::not_found(message),
-            ScheduleError::ShuttingDown => ApiError::conflict(message),
+            ScheduleError::OnHold(_) | ScheduleError::Stopped | ScheduleError::ShuttingDown => {
+                ApiError::conflict(message)
+            }
         }
     }
 }

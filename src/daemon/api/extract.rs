@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::time::Duration;
 
 use aide::OperationInput;
@@ -19,6 +20,7 @@ use serde::de::DeserializeOwned;
 
 use super::error::ApiError;
 use crate::daemon::schedule::StopKind;
+use crate::daemon::shared::{Daemon, now};
 use crate::experiment::ErrorKind;
 
 /// Longest time in which a client sends its body.
@@ -139,6 +141,32 @@ impl OperationInput for StopBody {
     }
 }
 
+/// Who makes a request, in words: the operator of the lease that it contains, or from where it comes.
+pub struct Client(pub String);
+
+impl FromRequestParts<Arc<Daemon>> for Client {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(
+        parts: &mut Parts,
+        daemon: &Arc<Daemon>,
+    ) -> Result<Self, Infallible> {
+        let LeaseHeader(lease) = LeaseHeader::of(parts);
+        let operator = daemon.read(|schedule| {
+            let lease = schedule.require_lease(&lease, now()).ok();
+            lease.map(|lease| lease.operator.clone())
+        });
+        let address = parts.extensions.get::<ConnectInfo<SocketAddr>>();
+        Ok(Client(match (operator, address) {
+            (Some(operator), _) => operator,
+            (None, Some(ConnectInfo(address))) => format!("a client at {}", address.ip()),
+            (None, None) => "a client of this machine".into(),
+        }))
+    }
+}
+
+impl OperationInput for Client {}
+
 /// Parts of the path.
 pub struct InPath<T>(pub T);
 
@@ -186,21 +214,29 @@ impl<T: JsonSchema> OperationInput for InQuery<T> {
 }
 
 /// The address of the client; `None` on this machine.
-pub struct Client(pub Option<IpAddr>);
+pub struct ClientAddress(pub Option<IpAddr>);
 
-impl<S: Send + Sync> FromRequestParts<S> for Client {
+impl<S: Send + Sync> FromRequestParts<S> for ClientAddress {
     type Rejection = Infallible;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, Infallible> {
         let client = parts.extensions.get::<ConnectInfo<SocketAddr>>();
-        Ok(Client(client.map(|client| client.0.ip())))
+        Ok(ClientAddress(client.map(|client| client.0.ip())))
     }
 }
 
-impl OperationInput for Client {}
+impl OperationInput for ClientAddress {}
 
 /// The header `Bench-Lease`; empty if it is absent.
 pub struct LeaseHeader(pub String);
+
+impl LeaseHeader {
+    fn of(parts: &Parts) -> LeaseHeader {
+        let value = parts.headers.get(LEASE_HEADER);
+        let text = value.and_then(|value| value.to_str().ok());
+        LeaseHeader(text.unwrap_or_default().into())
+    }
+}
 
 /// Name of the header with the lease.
 pub const LEASE_HEADER: &str = "Bench-Lease";
@@ -209,9 +245,7 @@ impl<S: Send + Sync> FromRequestParts<S> for LeaseHeader {
     type Rejection = ApiError;
 
     async fn from_request_parts(parts: &mut Parts, _state: &S) -> Result<Self, ApiError> {
-        let value = parts.headers.get(LEASE_HEADER);
-        let text = value.and_then(|value| value.to_str().ok());
-        Ok(LeaseHeader(text.unwrap_or_default().into()))
+        Ok(LeaseHeader::of(parts))
     }
 }
 

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::download::OpenFile;
 use super::error::ApiError;
-use super::extract::{Body, Client, InPath, InQuery};
+use super::extract::{Body, ClientAddress, InPath, InQuery};
 use super::texts::check_texts;
 use crate::daemon::catalogue::{Catalogue, ListedRecording, RecordingInfo};
 use crate::daemon::computations::Purpose;
@@ -88,7 +88,7 @@ pub struct ReportQuery {
 /// A page with the frequency responses and steps of one or several recordings, as `bench report`.
 pub async fn report(
     State(daemon): State<Arc<Daemon>>,
-    Client(client): Client,
+    ClientAddress(client): ClientAddress,
     InQuery(query): InQuery<ReportQuery>,
 ) -> Result<Response, ApiError> {
     let files: Vec<String> = query.files.split(',').map(String::from).collect();

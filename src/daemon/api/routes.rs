@@ -241,7 +241,13 @@ fn api() -> ApiRouter<Arc<Daemon>> {
         )
         .api_route(
             "/api/v1/runs/{id}/stop",
-            post_with(runs::stop, change("stopRun", "Stop or cancel a command")),
+            post_with(
+                runs::stop,
+                change(
+                    "stopRun",
+                    "Stop the command that has its turn, and hold the bench; cancel one that waits",
+                ),
+            ),
         )
         .api_route(
             "/api/v1/runs/{id}/output",
@@ -256,14 +262,30 @@ fn api() -> ApiRouter<Arc<Daemon>> {
             "/api/v1/stop",
             post_with(
                 runs::stop_all,
-                named("stop", "Stop whatever runs; needs neither lease nor token"),
+                named(
+                    "stop",
+                    "Stop whatever runs, and hold the bench until the holder of the lease resumes; needs neither lease nor token",
+                ),
+            ),
+        )
+        .api_route(
+            "/api/v1/resume",
+            post_with(
+                runs::resume,
+                change(
+                    "resume",
+                    "Release the bench after a stop or a trip, and acknowledge the trip; needs the lease",
+                ),
             ),
         )
         .api_route(
             "/api/v1/clear",
             post_with(
                 runs::clear,
-                change("clear", "Acknowledge a trip; needs the lease"),
+                change(
+                    "clear",
+                    "Acknowledge a trip; the bench stays held; needs the lease",
+                ),
             ),
         )
         .api_route(

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arguments::check_arguments;
 use super::error::ApiError;
-use super::extract::{Body, InPath, LeaseHeader, StopBody};
+use super::extract::{Body, Client, InPath, LeaseHeader, StopBody};
 use super::lease::random;
 use super::reply::{Accepted, Reply};
 use super::texts::check_texts;
@@ -23,7 +23,7 @@ use super::views::RunView;
 use crate::daemon::computations::Purpose;
 use crate::daemon::output::{OutputPiece, RunOutput};
 use crate::daemon::run_entry::{Carrier, Command, Phase, RunRequest};
-use crate::daemon::schedule::{NewEntry, StopKind};
+use crate::daemon::schedule::{NewEntry, ScheduleError, StopKind};
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::{Daemon, now};
 use crate::daemon::worker;
@@ -110,16 +110,17 @@ async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<
 pub async fn stop(
     State(daemon): State<Arc<Daemon>>,
     InPath(RunId { id }): InPath<RunId>,
+    Client(by): Client,
     body: StopBody,
 ) -> Result<Json<RunView>, ApiError> {
     let stop = |how| {
         daemon.change(|schedule, now| {
-            schedule.stop(id, how, now)?;
+            schedule.stop(id, how, &by, now)?;
             schedule.entry(id).map(RunView::from)
         })
     };
     let (view, how) = body.carry_out(stop).await;
-    tracing::warn!(run = id, ?how, "the run was stopped by a client");
+    tracing::warn!(run = id, ?how, by, "the run was stopped");
     Ok(Json(view?))
 }
 
@@ -132,15 +133,35 @@ pub struct Stopped {
     how: StopKind,
 }
 
-/// Stops whatever runs. Needs neither lease nor token.
-pub async fn stop_all(State(daemon): State<Arc<Daemon>>, body: StopBody) -> Json<Stopped> {
-    let stop = |how| daemon.change(|schedule, _| schedule.stop_current(how));
+/// Stops whatever runs, and holds the bench. Needs neither lease nor token.
+pub async fn stop_all(
+    State(daemon): State<Arc<Daemon>>,
+    Client(by): Client,
+    body: StopBody,
+) -> Json<Stopped> {
+    let stop = |how| daemon.change(|schedule, now| schedule.stop_bench(how, &by, now));
     let (run, how) = body.carry_out(stop).await;
-    tracing::warn!(run, ?how, "a client stopped the bench");
+    tracing::warn!(run, ?how, by, "the bench was stopped");
     Json(Stopped { run, how })
 }
 
-/// Acknowledges a trip.
+/// Releases the bench after a stop or a trip, and acknowledges the trip.
+pub async fn resume(
+    State(daemon): State<Arc<Daemon>>,
+    LeaseHeader(lease): LeaseHeader,
+) -> Result<NoContent, ApiError> {
+    let released = daemon.change(|schedule, now| {
+        let released = schedule.resume(&lease, now)?;
+        daemon.live.acknowledge_trip();
+        Ok::<_, ScheduleError>(released)
+    })?;
+    if let Some(hold) = released {
+        tracing::warn!("the bench was resumed; it was {hold}");
+    }
+    Ok(NoContent)
+}
+
+/// Acknowledges a trip; the bench stays held.
 pub async fn clear(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
@@ -283,7 +304,9 @@ impl Follower {
     fn has_ended(&self) -> bool {
         self.daemon.read(|schedule| {
             let entry = schedule.entry(self.id);
-            entry.map_or(true, |entry| entry.phase == Phase::Finished)
+            entry.map_or(true, |entry| {
+                entry.phase == Phase::Finished && !entry.has_process
+            })
         })
     }
 

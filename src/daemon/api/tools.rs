@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::arguments::check_arguments;
 use super::error::ApiError;
-use super::extract::{Body, Client};
+use super::extract::{Body, ClientAddress};
 use crate::config::{self, Config, Source, load, profiles};
 use crate::daemon::computations::Purpose;
 use crate::daemon::shared::{Daemon, DaemonConfig};
@@ -20,7 +20,7 @@ use crate::rig::devices;
 /// Findings of `bench doctor`.
 pub async fn doctor(
     State(daemon): State<Arc<Daemon>>,
-    Client(client): Client,
+    ClientAddress(client): ClientAddress,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     computed(&daemon, Purpose::View(client), &["doctor"]).await
 }
@@ -28,7 +28,7 @@ pub async fn doctor(
 /// Modes, residues and zeros of the model, as `bench model modes`.
 pub async fn model(
     State(daemon): State<Arc<Daemon>>,
-    Client(client): Client,
+    ClientAddress(client): ClientAddress,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     computed(&daemon, Purpose::View(client), &["model", "modes"]).await
 }

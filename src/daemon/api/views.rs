@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::daemon::hold::Hold;
 use crate::daemon::lease::Lease;
 use crate::daemon::live::hub::{LoopView, Share, TripView};
 use crate::daemon::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcome};
@@ -21,8 +22,10 @@ pub struct StateView {
     pub servo: LoopView,
     /// Quantities as a share of their interlock; it trips at 1.
     pub shares: Vec<Share>,
-    /// The last trip, until it is acknowledged or a run begins.
+    /// The last trip, until it is acknowledged.
     pub trip: Option<TripView>,
+    /// Why nothing begins after a stop or a trip, until the holder of the lease resumes; `null` while the bench is released.
+    pub held: Option<Hold>,
     /// Who holds the arm lease.
     pub lease: Option<LeaseView>,
     /// The command that has its turn.
@@ -100,6 +103,8 @@ pub struct RunView {
     pub outcome: Option<RunOutcome>,
     /// Exit code of its process.
     pub exit_code: Option<i32>,
+    /// Whether its process still works; it may do so for some time after a stop has ended its turn.
+    pub has_process: bool,
     /// The error.
     pub message: Option<String>,
     /// File name of its last recording.
@@ -154,6 +159,7 @@ impl From<&RunEntry> for RunView {
             progress: progress.map(|progress| progress.snapshot().into()),
             outcome: entry.outcome,
             exit_code: entry.exit_code,
+            has_process: entry.has_process,
             message: entry.message.clone(),
             recording: entry.recording.clone(),
             is_orphan: entry.is_orphan,
@@ -178,10 +184,11 @@ fn lease_view(lease: &Lease, now: Now) -> LeaseView {
 
 /// The state at this moment.
 pub fn state(daemon: &Daemon) -> StateView {
-    let (lease, run, queue) = daemon.read(|schedule| {
+    let (lease, held, run, queue) = daemon.read(|schedule| {
         let lease = schedule.lease().map(|lease| lease_view(lease, now()));
         let run = schedule.current().map(RunView::from);
-        (lease, run, schedule.queue().map(RunView::from).collect())
+        let queue = schedule.queue().map(RunView::from).collect();
+        (lease, schedule.hold().cloned(), run, queue)
     });
     let live = daemon.live.snapshot();
     let rig = daemon.owner.status();
@@ -201,6 +208,7 @@ pub fn state(daemon: &Daemon) -> StateView {
         servo,
         shares: live.shares,
         trip: live.trip,
+        held,
         lease,
         run,
         queue,

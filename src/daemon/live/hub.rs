@@ -268,9 +268,6 @@ impl Follower {
             FeedSource::Run => *lock(&self.shared.run),
             FeedSource::Idle => None,
         };
-        if feed.source == FeedSource::Run {
-            self.shared.snapshot().trip = None;
-        }
         let feed = OpenFeed {
             encoder: LiveEncoder::new(feed.period_s, unix_ns(SystemTime::now())),
             feed,

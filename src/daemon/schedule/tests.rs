@@ -21,7 +21,12 @@ enum Step {
     /// The n-th open command ends.
     Finish(usize),
     Stop(usize, bool),
-    StopCurrent(bool),
+    StopBench(bool),
+    /// The session of the command that has its turn orders a run.
+    BeginRun,
+    /// Its run ends, perhaps by an interlock.
+    EndRun(bool),
+    Resume(u8),
     LoseClient(usize),
     Wait(u64),
     ShutDown,
@@ -53,7 +58,10 @@ fn step() -> impl Strategy<Value = Step> {
         8 => Just(Step::Advance),
         4 => (0..3_usize).prop_map(Step::Finish),
         1 => (0..4_usize, any::<bool>()).prop_map(|(which, cut)| Step::Stop(which, cut)),
-        1 => any::<bool>().prop_map(Step::StopCurrent),
+        1 => any::<bool>().prop_map(Step::StopBench),
+        6 => Just(Step::BeginRun),
+        4 => (0..4_u8).prop_map(|n| Step::EndRun(n == 0)),
+        4 => (0..3_u8).prop_map(Step::Resume),
         2 => (0..4_usize).prop_map(Step::LoseClient),
         4 => (0..12_000_u64).prop_map(Step::Wait),
         1 => Just(Step::ShutDown),
@@ -157,10 +165,19 @@ impl Bench {
             }
             Step::Stop(which, cut) => {
                 if let Some(id) = self.open_id(*which) {
-                    drop(self.schedule.stop(id, kind(*cut), now));
+                    drop(self.schedule.stop(id, kind(*cut), "somebody", now));
                 }
             }
-            Step::StopCurrent(cut) => drop(self.schedule.stop_current(kind(*cut))),
+            Step::StopBench(cut) => {
+                self.schedule.stop_bench(kind(*cut), "somebody", now);
+            }
+            Step::BeginRun => {
+                if let Some(id) = self.open_id(0) {
+                    drop(self.schedule.begin_run(id, |_| ()));
+                }
+            }
+            Step::EndRun(trips) => self.end_run(*trips),
+            Step::Resume(who) => drop(self.schedule.resume(&self.known(*who), now)),
             Step::LoseClient(which) => {
                 if let Some(id) = self.open_id(*which) {
                     self.schedule.lose_client(id, now);
@@ -172,6 +189,25 @@ impl Bench {
             }
             Step::ShutDown => self.schedule.shut_down(now),
         }
+    }
+
+    /// Ends the run in progress.
+    fn end_run(&mut self, trips: bool) {
+        let current = self.schedule.current();
+        let Some(running) = current.filter(|entry| entry.phase == Phase::Running) else {
+            return;
+        };
+        let id = running.id;
+        let ended = EndedRun {
+            outcome: match trips {
+                true => RunOutcome::Tripped,
+                false => RunOutcome::Completed,
+            },
+            recording: None,
+            message: None,
+            tripped_by: trips.then(|| "the interlock travel".into()),
+        };
+        self.schedule.end_run(id, ended, self.now);
     }
 
     /// The rules of the module.
@@ -376,7 +412,7 @@ fn settling_twice_does_not_cut_and_a_cut_raises_both_flags() {
         bench.take(&Step::Attach(0, Command::Control));
         bench.take(&Step::Advance);
         for stop in stops {
-            bench.schedule.stop_current(*stop);
+            bench.schedule.stop_bench(*stop, "somebody", bench.now);
         }
         let entry = bench.schedule.current().expect("a run");
         let flags = entry.stop.flags().iter();
