@@ -40,6 +40,7 @@ pub enum Action {
     Start,
     Tune,
     Clear,
+    Resume,
     Plan,
     Stop,
     Read(usize),
@@ -105,6 +106,7 @@ fn action() -> impl Strategy<Value = Action> {
         4 => Just(Action::Start),
         2 => Just(Action::Tune),
         1 => Just(Action::Clear),
+        2 => Just(Action::Resume),
         1 => Just(Action::Plan),
         2 => Just(Action::Stop),
         3 => (0..READS.len()).prop_map(Action::Read),
@@ -151,6 +153,7 @@ impl Action {
             Action::Start => ("POST", "runs", Some(command())),
             Action::Tune => ("POST", "tune", Some(json!({ "reference": 0.5 }))),
             Action::Clear => ("POST", "clear", None),
+            Action::Resume => ("POST", "resume", None),
             Action::Plan => ("POST", "plan", Some(json!({ "command": "chirp" }))),
             Action::Stop => ("POST", "stop", Some(json!({ "how": "settle" }))),
             Action::Read(which) => return ("GET", READS[which].into(), None),
@@ -165,8 +168,11 @@ impl Action {
     }
 
     pub fn needs_lease(self) -> bool {
-        use Action::{Clear, ReleaseLease, RenewLease, Start, Tune};
-        matches!(self, RenewLease | ReleaseLease | Start | Tune | Clear)
+        use Action::{Clear, ReleaseLease, RenewLease, Resume, Start, Tune};
+        matches!(
+            self,
+            RenewLease | ReleaseLease | Start | Tune | Clear | Resume
+        )
     }
 }
 

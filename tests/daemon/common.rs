@@ -176,6 +176,12 @@ impl Daemon {
         self.get(&format!("/api/v1/runs/{id}"))
     }
 
+    /// Releases the bench after a stop or a trip.
+    pub fn resume(&self, lease: &str) {
+        let answer = self.ask("POST", "/api/v1/resume", lease, None);
+        assert_eq!(answer.status, 204, "{answer:?}");
+    }
+
     /// Waits until the state of the daemon fulfils a condition; `renew` keeps a lease meanwhile.
     pub fn wait(&self, what: &str, renew: &str, is_reached: impl Fn(&Value) -> bool) -> Value {
         let begun = Instant::now();
@@ -196,7 +202,8 @@ impl Daemon {
         let begun = Instant::now();
         loop {
             let run = self.run(id);
-            if run["phase"] == "finished" {
+            // After a stop the process may complete its results after its turn.
+            if run["phase"] == "finished" && run["has_process"] == false {
                 return run;
             }
             assert!(begun.elapsed() < TIME_LIMIT, "{run}");

@@ -48,16 +48,18 @@ fn run_ends_if_its_recording_cannot_be_written() {
     ] {
         assert!(message.contains(part), "{part}: {message}");
     }
-    let state = daemon.state();
-    assert!(says_so(&state) && metric(&daemon), "{state}");
-    assert_eq!(state["loop"]["state"], "disarmed");
+    let state = daemon.wait("disarmed, with the defect", "", |state| {
+        says_so(state) && state["loop"]["state"] == "disarmed"
+    });
+    assert!(metric(&daemon), "{state}");
     let ticks = recorded_ticks(&daemon);
     assert!((1_000..55_000).contains(&ticks), "{ticks}");
     // The next run has room for its recording.
     let id = daemon.start_run(&lease, "control", &["--slow", "--duration", "1s"]);
     let run = daemon.wait_for_end(id, &lease);
     assert_eq!(run["outcome"], "completed", "{run}");
-    assert!(!says_so(&daemon.state()) && !metric(&daemon));
+    daemon.wait("no defect", "", |state| !says_so(state));
+    assert!(!metric(&daemon));
 }
 
 #[test]
@@ -73,8 +75,8 @@ fn run_goes_on_unrecorded_if_the_configuration_says_so() {
             && message.contains("the run went on to its end without a recording"),
         "{message}"
     );
-    let state = daemon.state();
-    assert!(says_so(&state) && metric(&daemon), "{state}");
+    let state = daemon.wait("the defect is shown", "", says_so);
+    assert!(metric(&daemon), "{state}");
     let ticks = recorded_ticks(&daemon);
     assert!((1_000..55_000).contains(&ticks), "{ticks}");
     // 60 s at 1 kHz: the loop made all ticks.

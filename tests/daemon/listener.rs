@@ -284,6 +284,7 @@ fn stop_is_not_refused_for_its_body() {
         );
     }
     let lease = daemon.take_lease("anna");
+    daemon.resume(&lease);
     let id = daemon.start_run(
         &lease,
         "control",

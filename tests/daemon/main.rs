@@ -7,6 +7,8 @@ mod descriptions;
 mod foxglove;
 mod full_disk;
 mod hostile;
+mod held_sequences;
+mod hold;
 mod interface;
 mod listener;
 mod ownership;

@@ -127,10 +127,9 @@ fn lost_lease_stops_control_and_not_a_chirp() {
         events.iter().any(|event| event.contains("came to its end")),
         "{run} {events:?}"
     );
-    assert!(
-        daemon.state()["lease"].is_null(),
-        "the lease ends with the run"
-    );
+    daemon.wait("the lease ends with the run", "", |state| {
+        state["lease"].is_null()
+    });
 }
 
 #[test]
@@ -193,6 +192,9 @@ fn queue_holds_several_commands_and_cancels_them() {
         "only that command is stopped"
     );
     assert_eq!(stop(first), 200);
+    assert_eq!(daemon.wait_for_end(first, &lease)["outcome"], "stopped");
+    assert_eq!(daemon.run(second)["phase"], "held");
+    daemon.resume(&lease);
     assert_eq!(daemon.wait_for_end(second, &lease)["outcome"], "completed");
     assert_eq!(stop(999), 404);
 }

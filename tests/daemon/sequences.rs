@@ -302,6 +302,7 @@ fn expired_and_released_leases_start_tune_and_renew_nothing() {
             ("POST", "/api/v1/runs", Some(command())),
             ("POST", "/api/v1/tune", Some(json!({ "gain": 0.9 }))),
             ("POST", "/api/v1/clear", None),
+            ("POST", "/api/v1/resume", None),
             ("PUT", "/api/v1/lease", None),
             ("DELETE", "/api/v1/lease", None),
         ] {
