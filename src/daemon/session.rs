@@ -336,11 +336,16 @@ impl Session {
     /// Notes how a run ended, and reports it. `trip` is the reason of an interlock.
     async fn report(&mut self, result: Result<Run, ExperimentError>, trip: Option<&'static str>) {
         self.note_end(&result, trip);
-        let reported = match result {
-            Ok(run) => blocking(move || reported(run)).await,
-            Err(error) => Err(error),
+        let message = match result {
+            Ok(run) => self.completed(run).await,
+            Err(error) => FromDaemon::Refused(RemoteError::from(&error)),
         };
-        let message = match reported {
+        self.connection.send(&message).await;
+    }
+
+    /// Completes the ticks of a recording, which stays open for results.
+    async fn completed(&mut self, run: Run) -> FromDaemon {
+        match blocking(move || reported(run)).await {
             Ok((run, report)) => {
                 self.open_run = Some(run);
                 FromDaemon::Ended(Box::new(report))
@@ -350,8 +355,7 @@ impl Session {
                 self.note_failure(&error);
                 FromDaemon::Refused(RemoteError::from(&error))
             }
-        };
-        self.connection.send(&message).await;
+        }
     }
 
     /// Notes the end of a run in the queue, before anything else: a trip holds the bench.

@@ -223,7 +223,7 @@ fn stop_frees_the_bench_of_a_suspended_command_before_and_after_its_run() {
     let chirp = [
         "chirp",
         "--duration",
-        "2s",
+        "6s",
         "--start",
         "20Hz",
         "--stop",
