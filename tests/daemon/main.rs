@@ -6,9 +6,9 @@ mod descriptions;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod full_disk;
-mod hostile;
 mod held_sequences;
 mod hold;
+mod hostile;
 mod interface;
 mod listener;
 mod ownership;
