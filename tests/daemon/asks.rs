@@ -132,7 +132,7 @@ pub fn steps() -> impl Strategy<Value = Vec<Step>> {
     })
 }
 
-/// A closed loop that the test may start.
+/// A closed loop that the test may start. The sequence before has stopped the bench.
 fn run_under_lease() -> Vec<Step> {
     let valid = |action| Ask {
         action,
@@ -140,7 +140,8 @@ fn run_under_lease() -> Vec<Step> {
         sent: Sent::Own,
         form: Form::Valid,
     };
-    let asks = [Action::TakeLease, Action::Start].map(|action| vec![valid(action)]);
+    let actions = [Action::TakeLease, Action::Resume, Action::Start];
+    let asks = actions.map(|action| vec![valid(action)]);
     [&asks[..], &[Vec::new()], &[vec![valid(Action::Tune)]]].concat()
 }
 

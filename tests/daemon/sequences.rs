@@ -161,7 +161,7 @@ fn wait_for_run(daemon: &Daemon) {
             .as_array()
             .is_some_and(|queue| !queue.is_empty());
         match state["run"]["phase"].as_str() {
-            None => !waits,
+            None => !waits || !state["held"].is_null(),
             Some("starting") => false,
             Some("running") => state["loop"]["state"] == "running",
             Some(_) => true,
