@@ -28,33 +28,39 @@ ADDRESSES = [f"127.0.0.{last}" for last in range(1, 5)]
 MAX_GROWTH_MB = 10.0
 MAX_MEDIAN_S, MAX_STOP_S = 0.05, 0.5
 LOOP = ["--slow", "--pace", "realtime", "--duration", "60s"]
-SETTINGS = ["--set", "loop.rate_hz=1000", "--set", "interlock.overruns_per_s=1000000"]
+SETTINGS = ["--set", "loop.rate_hz=1000", "--set", "chirp.stop_hz=200", "--set", "interlock.overruns_per_s=1000000"]
 
 
 class Daemon:
     def __init__(self, bench, folder):
         self.socket = os.path.join(folder, "bench.sock")
         command = [bench, "serve", "--listen", "127.0.0.1:0", "--socket", self.socket, "--out", os.path.join(folder, "recordings")]
-        log = open(os.path.join(folder, "log"), "w")
-        self.process = subprocess.Popen(command + SETTINGS, stdout=subprocess.PIPE, stderr=log, text=True)
+        log = os.path.join(folder, "log")
+        self.process = subprocess.Popen(command + SETTINGS, stdout=subprocess.PIPE, stderr=open(log, "w"), text=True)
         for line in self.process.stdout:
             found = re.search(r"http://127\.0\.0\.1:(\d+)", line)
             if found:
                 self.port = int(found.group(1))
                 break
+        else:
+            sys.exit(f"the daemon did not start: {open(log).read()}")
         threading.Thread(target=self.process.stdout.read, daemon=True).start()
 
     def ask(self, method, path, body=None, lease=None):
         """Over the socket of this machine, which the attackers do not reach."""
-        connection = http.client.HTTPConnection("localhost", timeout=30)
-        connection.sock = socket.socket(socket.AF_UNIX)
-        connection.sock.settimeout(30)
-        connection.sock.connect(self.socket)
+        stream = socket.socket(socket.AF_UNIX)
+        stream.settimeout(30)
+        stream.connect(self.socket)
         headers = {"Content-Type": "application/json", **({"Bench-Lease": lease} if lease else {})}
-        connection.request(method, "/api/v1" + path, None if body is None else json.dumps(body), headers)
-        answer = connection.getresponse()
+        # In one part: a daemon that refuses the head may close the connection before the body is sent.
+        text = "" if body is None else json.dumps(body)
+        head = [f"{method} /api/v1{path} HTTP/1.1", "Host: localhost", f"Content-Length: {len(text)}"]
+        head += [f"{name}: {value}" for name, value in headers.items()]
+        stream.sendall("\r\n".join([*head, "", text]).encode())
+        answer = http.client.HTTPResponse(stream)
+        answer.begin()
         text = answer.read()
-        connection.close()
+        stream.close()
         return answer.status, json.loads(text) if text else None
 
     def memory_mb(self):
@@ -101,7 +107,7 @@ class Events(threading.Thread):
             if head[0] & 15 != 1:
                 continue
             message = json.loads(payload)
-            if message["type"] == "event" and message["kind"] == "state" and "settling" in message["text"]:
+            if message["type"] == "event" and message["kind"] == "state" and message["text"].startswith("running -> "):
                 self.time = time.monotonic()
                 self.stopped.set()
 
@@ -208,6 +214,7 @@ def send_stop(daemon, address):
 def stop_time_s(daemon, events, lease, address):
     """From sending a stop to the end of `running`."""
     run = start_loop(daemon, lease)
+    time.sleep(0.3)  # until the stage moves
     events.stopped.clear()
     begun, stream = send_stop(daemon, address)
     if not events.stopped.wait(15):
