@@ -9,6 +9,8 @@ use crate::util::finding::Finding;
 
 /// Longest excitation in ticks, more than an hour at 5 kHz. It is analysed as one record, with about 80 bytes per tick.
 const MAX_TICKS: f64 = 2e7;
+/// Largest deviation of the clock of a free-running probe: ten times that of a crystal of 100 ppm.
+const CLOCK_TOLERANCE: f64 = 1e-3;
 
 /// The errors in the relations between settings that serve the purpose.
 pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
@@ -75,14 +77,15 @@ fn force(motor: &MotorSettings, errors: &mut Errors) {
 fn staleness(config: &Config, errors: &mut Errors) {
     let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
     let probe = &config.probe;
-    let oldest_s = probe.age_at_arrival_s() + probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
+    let longest_s = |rate_hz: f64| (1.0 + CLOCK_TOLERANCE) / rate_hz;
+    let oldest_s = probe.age_at_arrival_s() + probe.rate_hz.map_or(0.0, longest_s);
     let path = "interlock.probe_stale_s";
     errors.require(stale_s >= period_s, path, || {
-        format!("is {stale_s} s, shorter than a tick of {period_s} s; raise it")
+        format!("is {stale_s} s, shorter than a tick of {period_s} s (1/loop.rate_hz); raise it")
     });
     errors.require(stale_s > oldest_s, path, || {
         format!(
-            "is {stale_s} s, but in normal operation a reading is up to {oldest_s} s old (probe.latency_s + transport_s + 1/rate_hz); set a larger value"
+            "is {stale_s} s, but in normal operation a reading is up to {oldest_s} s old (probe.latency_s + probe.transport_s + 1/probe.rate_hz, with a clock that is slow by 0.1 %); set a larger value"
         )
     });
 }

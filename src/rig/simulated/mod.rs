@@ -63,6 +63,7 @@ impl SimulatedRig {
     pub fn new(config: &Config) -> Result<Self, PlantError> {
         let latency = config.amplifier.latency_s * config.servo.rate_hz;
         let delay = f64::from(config.servo.computing_delay_periods) + latency;
+        let is_synchronous = latency == 0.0 && probe::is_immediate(&config.probe);
         let stage = Stage::new(config, config.servo.period_s())?;
         Ok(SimulatedRig {
             trajectory: Trajectory::new(stage, delay),
@@ -72,8 +73,8 @@ impl SimulatedRig {
             current_limit_a: config.amplifier.current_limit_a,
             max_change_a: config.amplifier.slew_limit_a_per_s * config.servo.period_s(),
             current_step_a: config.amplifier.device.current_step_a(),
-            probe: Probe::new(&config.probe, &config.sim, &config.servo),
-            is_synchronous: latency == 0.0 && probe::is_immediate(&config.probe),
+            probe: Probe::new(&config.probe, &config.sim, &config.servo, is_synchronous),
+            is_synchronous,
             tick: None,
         })
     }

@@ -59,8 +59,14 @@ pub(super) struct Probe {
 }
 
 impl Probe {
-    /// The configured probe, with one measurement of the stage at rest.
-    pub(super) fn new(settings: &ProbeSettings, sim: &SimSettings, servo: &LoopSettings) -> Self {
+    /// The configured probe. If the rig is not `synchronous`, its first measurement is that of the stage at rest, so that the first
+    /// tick has a reading; a synchronous rig measures in each tick.
+    pub(super) fn new(
+        settings: &ProbeSettings,
+        sim: &SimSettings,
+        servo: &LoopSettings,
+        synchronous: bool,
+    ) -> Self {
         let rate_hz = servo.rate_hz;
         let period = settings
             .rate_hz
@@ -77,7 +83,7 @@ impl Probe {
             newest: (-age, Reading::default()),
             tick_s: servo.period_s(),
         };
-        if !is_immediate(settings) {
+        if !synchronous {
             probe.newest.1 = probe.measure(0.0);
             probe.due += period;
         }
