@@ -8,11 +8,11 @@ use super::error::CliError;
 use super::help::with_setting;
 use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
-use super::output::{print_result, print_text};
+use super::output::{print_result, print_text, warn};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
-use crate::config::{Config, OptionSetting, Purpose};
+use crate::config::{Config, OptionSetting, Purpose, warnings};
 use crate::excitation::Extremes;
 use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{PlanLimits, RunSummary, Runner};
@@ -101,6 +101,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let plan = calibration::check(&config)?;
     check_target(args.write.as_deref())?;
     if args.plan {
+        warn(&warnings(&config));
         let report = PlanReport::new(&plan, &config, !args.no_delay);
         let text = plan_text(&plan, &config, !args.no_delay);
         print_result(args.bench.json, &report, |_| text)?;

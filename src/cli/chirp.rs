@@ -18,7 +18,7 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, run_text};
 use super::table::{labelled, wrap};
 use super::until_decided::{SequenceCommand, SequentialOptions};
-use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep};
+use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
 use crate::excitation::Extremes;
 use crate::experiment::sequential::first_shot_config;
 use crate::experiment::{
@@ -140,6 +140,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     let expected = predicted_extremes(&config)?;
     if args.plan {
+        warn(&warnings(&config));
         warn(&check_calibration(&config, args.run.stage(&config))?);
         let mut plan = ExcitationPlan::new(&config, expected);
         plan.motor = args.run.motor_summary(&Plan::chirp(config))?;

@@ -11,7 +11,7 @@ use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{close, exit};
-use crate::config::Purpose;
+use crate::config::{Purpose, warnings};
 use crate::control::{ClosedLoop, Margins, listed_poles};
 use crate::excitation::Extremes;
 use crate::experiment::certificate::{Evidence, require_evidence};
@@ -61,6 +61,9 @@ struct PlanReport {
     expected: Option<Extremes>,
     limits: PlanLimits,
     motor: Option<MotorSummary>,
+    /// Range and mounting of the probe; `None` for the simulated probe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    probe: Option<String>,
     predicted: Predicted,
     /// Shaping, prefilter and feedforward.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -81,10 +84,12 @@ fn print_plan(
         expected: plan.loop_extremes()?,
         limits: PlanLimits::of(config),
         motor: args.run.motor_summary(plan)?,
+        probe: config.probe.device.scale_text(),
         predicted,
         command: plan.command_summary().cloned(),
         evidence,
     };
+    warn(&warnings(config));
     warn(&report.evidence.defects);
     print_result(args.bench.json, &report, |report| {
         let command = report.command.as_ref().map(control_output::command_text);
@@ -94,7 +99,8 @@ fn print_plan(
             &report.limits,
             report.motor.as_ref(),
         );
-        text + &control_output::evidence_text(&report.evidence)
+        text + &plan_output::probe_text(report.probe.as_deref())
+            + &control_output::evidence_text(&report.evidence)
             + &control_output::conditions_table(&report.evidence.conditions)
     })?;
     Ok(Outcome::Done)

@@ -14,7 +14,8 @@ pub(super) fn text(plan: &ExcitationPlan) -> String {
     let motor = plan.motor.as_ref().map_or(String::new(), motor_text);
     let extremes = extremes_text(&plan.expected, &plan.limits);
     let excitation = &plan.excitation;
-    format!("{excitation}; no motion\n{extremes}{slew}{motor}{amplitude}")
+    let probe = probe_text(plan.probe.as_deref());
+    format!("{excitation}; no motion\n{extremes}{slew}{probe}{motor}{amplitude}")
 }
 
 /// The plan of a closed loop. Without extremes the loop of the model is unstable.
@@ -33,6 +34,11 @@ pub(super) fn control_text(
     };
     let motor = motor.map_or(String::new(), motor_text);
     format!("{reference}; no motion\n{extremes}{motor}")
+}
+
+/// The scale of the probe.
+pub(super) fn probe_text(scale: Option<&str>) -> String {
+    scale.map_or(String::new(), |scale| labelled("probe", scale))
 }
 
 fn extremes_text(expected: &Extremes, limits: &PlanLimits) -> String {

@@ -74,10 +74,20 @@ pub struct CalibrationSettings {
     pub when_expired: OnInvalidCalibration,
     /// What happens if it was made with other devices.
     pub when_other_devices: OnInvalidCalibration,
-    /// Name of the person who confirms gains outside 0.75 to 1.25 (of a reversed probe -1.25 to -0.75). Without it, such a
-    /// calibration is refused.
+    /// Name of the person who confirms gains outside 0.75 to 1.25 (of a reversed probe -1.25 to -0.75), those of a calibration and
+    /// of `probe.device.mounting`. Without it, such gains are refused.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub accepted_by: Option<String>,
+}
+
+/// Largest deviation of a gain from 1 (or -1 for a reversed probe) that needs no confirmation.
+const GAIN_TOLERANCE: f64 = 0.25;
+/// Smallest magnitude of a gain of the probe, with or without a confirmation.
+pub const MIN_PROBE_GAIN: f64 = 0.001;
+
+/// Whether a gain is within 0.75 to 1.25, so that it needs no confirmation.
+pub fn is_near_one(gain: f64) -> bool {
+    (gain - 1.0).abs() <= GAIN_TOLERANCE
 }
 
 impl CalibrationSettings {

@@ -3,7 +3,8 @@
 use super::command_checks::command_checks;
 use super::purpose::Purpose;
 use super::{
-    CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, relations,
+    CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, monitor_checks,
+    mounting_checks, relations,
 };
 use crate::util::finding::Finding;
 
@@ -23,6 +24,8 @@ pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     staleness(config, &mut errors);
     reason_without_monitor(config, &mut errors);
     if purpose != Purpose::Recorded {
+        errors.0.extend(monitor_checks::monitor(config, purpose));
+        errors.0.extend(mounting_checks::mounting(config));
         confirming_name(&config.calibration, &mut errors);
     }
     let for_control = purpose.includes(Purpose::Control);

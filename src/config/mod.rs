@@ -27,6 +27,8 @@ mod identify;
 mod interlock;
 mod layer;
 mod load;
+mod monitor_checks;
+mod mounting_checks;
 mod overrides;
 mod place;
 pub mod profiles;
@@ -38,6 +40,7 @@ mod servo;
 mod settings;
 mod signal_path;
 mod sim;
+mod warnings;
 
 pub use crate::excitation::{
     AmplitudePoint, ChirpSettings, ExcitationKind, Lines, MultisineSettings, PrbsSettings,
@@ -62,6 +65,7 @@ pub use rig::*;
 pub use servo::*;
 pub use settings::*;
 pub use sim::*;
+pub use warnings::warnings;
 
 pub use crate::model::plant::{
     DampingPoint, DampingSettings, LumpedSettings, ModalSettings, ModeSettings, NodeSettings,

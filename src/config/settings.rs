@@ -81,10 +81,16 @@ impl Config {
         )
     }
 
+    /// The travel at which the interlocks trip, in metres of the stage: they judge the position in the metres of the probe as well.
+    pub fn permitted_travel_m(&self) -> f64 {
+        let gain = self.probe.device.mounting_gain().abs();
+        self.interlock.soft_limit_m * gain.min(1.0)
+    }
+
     /// The limits of an excitation.
     pub fn excitation_limits(&self) -> Limits {
         Limits {
-            travel_m: self.interlock.soft_limit_m,
+            travel_m: self.permitted_travel_m(),
             peak_current_a: self.motor.peak_current_a(),
             amplifier_current_a: self.amplifier.current_limit_a,
             continuous_current_a: self.motor.continuous_current_a(),

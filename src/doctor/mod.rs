@@ -72,6 +72,7 @@ pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
 
 fn examine_configuration(config: &Config, checks: &RunChecks, report: &mut Report) {
     report.extend([runs::kinds(config)]);
+    report.extend(runs::attention(config));
     report.extend(runs::findings(checks, config.control.min_modulus_margin));
     report.figures.control = checks.control.as_ref().ok().cloned();
 }

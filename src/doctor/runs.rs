@@ -1,7 +1,7 @@
 //! The checks of the commands: whether `bench chirp` and `bench control` accept the configuration.
 
 use super::finding::{Finding, Subject};
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::control::Margins;
 use crate::excitation::Excitation;
 use crate::experiment::certificate::require_evidence;
@@ -74,6 +74,14 @@ pub fn kinds(config: &Config) -> Finding {
             config.title
         )),
     }
+}
+
+/// The settings that need attention.
+pub fn attention(config: &Config) -> Vec<Finding> {
+    let warnings = config::warnings(config).into_iter();
+    let remedy = "run only while the reason holds; the warning is shown in every run";
+    let finding = |warning| Subject::Configuration.warning(warning, remedy);
+    warnings.map(finding).collect()
 }
 
 /// Evaluates the checks; `min_modulus_margin` is the configured limit.

@@ -17,6 +17,9 @@ pub struct ExcitationPlan {
     pub limits: PlanLimits,
     /// The motor on devices, whose heat the run starts with; `None` on the simulated stage, whose motor is cold.
     pub motor: Option<MotorSummary>,
+    /// Range and mounting of the probe, which are the scale of all positions; `None` for the simulated probe.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub probe: Option<String>,
     /// Amplitude over frequency; empty for an excitation with one amplitude.
     pub amplitude: Vec<AmplitudePoint>,
 }
@@ -47,6 +50,7 @@ impl ExcitationPlan {
             expected,
             limits: PlanLimits::of(config),
             motor: None,
+            probe: config.probe.device.scale_text(),
             amplitude,
         }
     }

@@ -8,7 +8,7 @@ use std::sync::mpsc::Sender;
 use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
-use super::motion_model::{residuals, warn_if_off};
+use super::motion_model::residuals;
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::run::{Run, RunFile, StopCause};
@@ -16,7 +16,7 @@ use super::run_error::RunError;
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
-use crate::config::{Config, LoopSettings, OnRecordingFailure};
+use crate::config::{self, Config, LoopSettings, OnRecordingFailure};
 use crate::recording::{self, DiskWatch, Recorder, free_bytes};
 use crate::rt::device_defect::DeviceDefect;
 use crate::rt::interlock::Interlocks;
@@ -116,7 +116,9 @@ impl LiveRig {
 
     /// Everything that a run needs, before its first tick.
     fn prepare<'a>(&self, plan: &'a Plan, folder: &Path) -> Result<PreparedRun<'a>, RunError> {
-        warn_if_off(plan);
+        for warning in config::warnings(&plan.config) {
+            tracing::warn!("{warning}");
+        }
         let program = plan.program()?;
         let total_ticks = program.ticks();
         let ramp_ticks = plan.ramp_ticks()?;
@@ -273,12 +275,13 @@ pub(super) fn servo_run(plan: &Plan, connections: Connections) -> Result<ServoRu
 }
 
 fn interlocks(config: &Config) -> Interlocks {
-    Interlocks::new(
+    let interlocks = Interlocks::new(
         &config.interlock,
         &config.amplifier,
         &config.motor,
         &config.servo,
-    )
+    );
+    interlocks.with_mounting_gain(config.probe.device.mounting_gain())
 }
 
 /// The arm lease of a run. In virtual pace, ticks do not measure the time of the supervisor.

@@ -7,9 +7,6 @@ use crate::control::ControllerText;
 use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::rt::residual::{LoopPrediction, ResidualBound, Residuals};
 
-/// Share of the largest modelled position without a setting (see [`rt::residual`](crate::rt::residual)).
-const DEFAULT_SHARE: f64 = 0.5;
-
 /// The monitor of a run, by the model of the configuration; `None` if the settings switch it off, and for the static steps of a
 /// calibration.
 pub fn residuals(plan: &Plan) -> Result<Option<Residuals>, PlanError> {
@@ -25,22 +22,13 @@ pub fn residuals(plan: &Plan) -> Result<Option<Residuals>, PlanError> {
     let model = LoopPlant::with_mean_age(&plan.config, &modes);
     let bound = ResidualBound {
         absolute_m: ratio * settings.soft_limit_m,
-        share: settings.model_error_share.unwrap_or(DEFAULT_SHARE),
+        share: settings.share_of_model_error(),
     };
     let residuals = Residuals::new(model, &modes, bound);
     Ok(Some(match &plan.controller {
         Some(controller) => residuals.closed_by(prediction(plan, controller)?),
         None => residuals,
     }))
-}
-
-/// Warns if the settings switch the monitor off.
-pub(super) fn warn_if_off(plan: &Plan) {
-    if let Some(reason) = &plan.config.interlock.model_error_off {
-        tracing::warn!(
-            "the position is not compared with the model ({reason}); remove interlock.model_error_off as soon as the model is known"
-        );
-    }
 }
 
 /// The prediction of a closed loop: by its model if the model is linear and stable.

@@ -5,7 +5,7 @@ use std::time::SystemTime;
 use super::error::ExperimentError;
 use super::loop_check::Stage;
 use super::plan_error::PlanError;
-use crate::config::Config;
+use crate::config::{self, Config};
 use crate::control::ControllerText;
 use crate::excitation::ReferenceContext;
 use crate::rig::calibration::{CalibrationError, KnownDevices, load_calibration};
@@ -14,7 +14,9 @@ use crate::rig::devices::{SIMULATED, probe};
 /// Refuses a configuration whose controller, reference or calibration cannot be used. Returns what needs attention.
 pub fn check_named_files(config: &Config) -> Result<Vec<String>, ExperimentError> {
     check_control_files(config)?;
-    Ok(check_calibration(config, Stage::of(config))?)
+    let mut attention = config::warnings(config);
+    attention.extend(check_calibration(config, Stage::of(config))?);
+    Ok(attention)
 }
 
 fn check_control_files(config: &Config) -> Result<(), PlanError> {

@@ -33,6 +33,8 @@ pub struct Interlocks {
 #[derive(Clone, Copy, Debug)]
 struct Limits {
     soft_limit_m: f64,
+    /// Metres of the stage per metre of the probe, which the driver has applied.
+    mounting_gain: f64,
     peak_current_a: f64,
     amplifier_limit_a: f64,
     accepted_error_a: f64,
@@ -77,6 +79,7 @@ impl Interlocks {
         Interlocks {
             limits: Limits {
                 soft_limit_m: settings.soft_limit_m,
+                mounting_gain: 1.0,
                 peak_current_a: motor.peak_current_a(),
                 amplifier_limit_a: amplifier.current_limit_a,
                 accepted_error_a: settings.current_error_a,
@@ -101,6 +104,13 @@ impl Interlocks {
     /// The interlocks with a motor that is warm from earlier runs: `thermal_a2` is its thermal state in A^2.
     pub fn with_thermal_state(mut self, thermal_a2: f64) -> Self {
         self.thermal_a2 = thermal_a2;
+        self
+    }
+
+    /// The interlocks of a probe whose driver multiplies its readings by `gain`: the travel is judged in the metres of the probe
+    /// as well.
+    pub fn with_mounting_gain(mut self, gain: f64) -> Self {
+        self.limits.mounting_gain = gain;
         self
     }
 
@@ -145,7 +155,14 @@ impl Interlocks {
         }
         self.check_age(reading, now)?;
         self.check_travel(reading.position_m)?;
+        self.check_travel(self.travel_at_probe_m(reading))?;
         self.check_stuck(now)
+    }
+
+    /// Distance from the rest position in the metres of the probe, before the gain of its mounting. The driver gives
+    /// position = gain * raw + offset, and the raw value at the rest position is -offset/gain.
+    fn travel_at_probe_m(&self, reading: &Reading) -> f64 {
+        reading.position_m / self.limits.mounting_gain
     }
 
     /// Checks a position against the soft limit. Runs in the tick: must not allocate or block.

@@ -31,12 +31,11 @@
 
 use super::arming::Trip;
 use super::program::Decision;
+use crate::config::CLOSED_SHARE_FACTOR;
 use crate::control::{ControlLaw, LawInput};
 use crate::model::plant::{LoopPlant, LoopPlantState, Mode};
 use crate::util::numeric::is_within;
 
-/// Factor of the share in a closed loop.
-const CLOSED_FACTOR: f64 = 0.4;
 /// Factor of the share where the reference replaces the prediction, because the law is not linear.
 const NOT_LINEAR_FACTOR: f64 = 2.0;
 /// Corner frequency of the low-pass over the frequency of the first mode.
@@ -220,8 +219,8 @@ impl Closed {
     /// Checks the measured position, and the one that the applied current gives by the model of the plant.
     fn check(&mut self, moved_m: f64, plant_m: f64, bound: ResidualBound) -> Result<(), Trip> {
         let (modelled_m, bound) = match self.prediction {
-            LoopPrediction::Model(_) => (self.plant.position_m, bound.scaled(CLOSED_FACTOR)),
-            LoopPrediction::Unstable => (self.reference_m, bound.scaled(CLOSED_FACTOR)),
+            LoopPrediction::Model(_) => (self.plant.position_m, bound.scaled(CLOSED_SHARE_FACTOR)),
+            LoopPrediction::Unstable => (self.reference_m, bound.scaled(CLOSED_SHARE_FACTOR)),
             LoopPrediction::NotLinear => (self.reference_m, bound.scaled(NOT_LINEAR_FACTOR)),
         };
         let limit_m = bound.limit_m(&self.plant.peak);

@@ -1,5 +1,7 @@
 //! Rejected settings: every command names the place, the value, the limit and the remedy.
 use crate::COMMANDS;
+use bench::config::{Source, load, whole};
+
 use crate::program::Bench;
 
 /// Asserts that every command rejects the file with all of the words, and creates no file.
@@ -353,5 +355,180 @@ fn rejects_unknown_configuration_and_lists_names() {
             .run(&format!("{command} --config ."))
             .is_refused(&["cannot read .", "directory"]);
         assert_eq!(bench.files(), [""; 0]);
+    }
+}
+
+/// Checks the profile `lab` with these settings.
+fn check_lab(sets: &[&str]) -> crate::program::Answer {
+    let sets = sets.iter().flat_map(|set| ["--set", *set]);
+    Bench::new().run_with(
+        ["config", "check", "--config", "lab"]
+            .into_iter()
+            .chain(sets),
+    )
+}
+
+/// The gain of the mounting is applied below the interlocks: it has the limits of a calibration.
+#[test]
+fn rejects_unconfirmed_gain_of_the_mounting_outside_the_limits_of_a_calibration() {
+    for gain in [
+        "0.02", "0.7499", "1.2501", "-0.7499", "-1.2501", "50", "-1000",
+    ] {
+        let set = format!("probe.device.mounting.gain={gain}");
+        let words = [
+            "`probe.device.mounting.gain`",
+            gain,
+            "0.75 to 1.25",
+            "calibration.accepted_by",
+        ];
+        check_lab(&[&set]).is_refused(&words);
+        check_lab(&[&set, "calibration.accepted_by= "])
+            .is_refused(&["`calibration.accepted_by` is blank"]);
+    }
+    for gain in ["0", "0.0009", "-0.0009"] {
+        let set = format!("probe.device.mounting.gain={gain}");
+        check_lab(&[&set, "calibration.accepted_by=A. Smith"])
+            .is_refused(&["`probe.device.mounting.gain`", "-0.001 and 0.001"]);
+    }
+}
+
+#[test]
+fn confirmed_gain_of_the_mounting_is_accepted_with_a_warning_that_names_the_person() {
+    let named = "calibration.accepted_by=A. Smith";
+    let check = check_lab(&[
+        "probe.device.mounting.gain=1.3",
+        "probe.device.mounting.offset_m=-0.0013",
+        named,
+    ]);
+    assert_eq!(check.code, 0, "{}", check.err);
+    assert!(
+        check.err.contains("mounting.gain = 1.3") && check.err.contains("confirmed by A. Smith"),
+        "{}",
+        check.err
+    );
+    for (gain, offset) in [("1.25", "-0.00125"), ("0.95", "-0.00095"), ("-1", "0.001")] {
+        let sets = [
+            format!("probe.device.mounting.gain={gain}"),
+            format!("probe.device.mounting.offset_m={offset}"),
+        ];
+        let check = check_lab(&[&sets[0], &sets[1]]);
+        assert_eq!((check.code, check.err.as_str()), (0, ""), "{gain}");
+    }
+}
+
+/// A range that is smaller than the permitted travel, a centre that is far from position 0: the travel could not be measured.
+#[test]
+fn rejects_scale_of_a_probe_that_does_not_cover_the_permitted_travel() {
+    for (sets, ends) in [
+        (
+            &["probe.device.sensor_range_m=0.0002"][..],
+            "-1.000000 to -0.800000 mm",
+        ),
+        (
+            &[
+                "probe.device.sensor_range_m=0.0002",
+                "probe.device.mounting.offset_m=-0.0001",
+            ],
+            "-0.100000 to 0.100000 mm",
+        ),
+        (
+            &["probe.device.mounting.offset_m=0"],
+            "0.000000 to 2.000000 mm",
+        ),
+        (
+            &["probe.device.mounting.gain=-1"],
+            "-3.000000 to -1.000000 mm",
+        ),
+        (
+            &[
+                "interlock.soft_limit_m=0.00095",
+                "probe.device.mounting.offset_m=-0.0009",
+            ],
+            "-0.900000 to 1.100000 mm",
+        ),
+    ] {
+        check_lab(sets).is_refused(&[
+            "`probe.device.mounting`",
+            ends,
+            "permitted travel",
+            "interlock.soft_limit_m",
+        ]);
+    }
+}
+
+/// Recordings of earlier versions may have such a gain.
+#[test]
+fn recorded_gain_of_the_mounting_is_read() {
+    let lab = Source {
+        config: Some("lab".into()),
+        ..Source::default()
+    };
+    let text = toml::to_string(&load(&lab).expect("valid")).expect("TOML");
+    let recorded = text.replace("gain = 1.0", "gain = 0.02");
+    assert_ne!(text, recorded);
+    whole("recorded.toml", &recorded).expect("readable");
+}
+
+/// The monitor of the residuals must trip within a quarter of the travel limit L. With a permitted residual of a L + b |y_p|, a
+/// position that stays at rest trips at a/(1 - b), and an oscillation about a modelled motion of L/4 at (a + 0.4 b/4)/0.8.
+#[test]
+fn rejects_ineffective_monitor_of_the_residuals_without_a_reason() {
+    for (ratio, share, setting) in [
+        ("1", "2", "model_error_share"),
+        ("0.02", "1", "model_error_share"),
+        ("0.02", "0.93", "model_error_share"),
+        ("1e-6", "2", "model_error_share"),
+        ("1", "0.05", "model_error_ratio"),
+        ("0.126", "0.5", "model_error_ratio"),
+        ("0.1951", "0.05", "model_error_ratio"),
+        ("0.063", "0.75", "model_error_ratio"),
+    ] {
+        let ratio = format!("interlock.model_error_ratio={ratio}");
+        let share = format!("interlock.model_error_share={share}");
+        let path = format!("`interlock.{setting}`");
+        check_lab(&[&ratio, &share]).is_refused(&[
+            &path,
+            "ineffective",
+            "25 %",
+            "interlock.model_error_off",
+        ]);
+        let reason = "interlock.model_error_off=first chirp";
+        let check = check_lab(&[&ratio, &share, reason]);
+        assert_eq!(check.code, 0, "{}", check.err);
+        assert!(
+            check
+                .err
+                .contains("not compared with the model (first chirp)"),
+            "{}",
+            check.err
+        );
+    }
+    for (ratio, share) in [
+        ("0.125", "0.5"),
+        ("0.1949", "0.05"),
+        ("0.0625", "0.75"),
+        ("0.02", "0.91"),
+    ] {
+        let ratio = format!("interlock.model_error_ratio={ratio}");
+        let share = format!("interlock.model_error_share={share}");
+        assert_eq!(check_lab(&[&ratio, &share]).code, 0, "{ratio} {share}");
+    }
+}
+
+#[test]
+fn warns_of_limits_of_current_that_never_trip() {
+    for (set, words) in [
+        (
+            "interlock.current_error_a=2",
+            "current_error_a = 2 A never trips",
+        ),
+        (
+            "interlock.probe_stuck_current_a=4",
+            "probe_stuck_current_a = 4 A never trips",
+        ),
+    ] {
+        let check = check_lab(&[set]);
+        assert_eq!(check.code, 0, "{}", check.err);
+        assert!(check.err.contains(words), "{}", check.err);
     }
 }

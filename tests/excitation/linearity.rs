@@ -243,7 +243,7 @@ fn trip_ends_session_without_linearity_verdict() {
     // The model predicts a travel of 477 um; the soft limit is 500 um, and peaks of the noise exceed 80 um. At 0.2 of the amplitude the
     // readings stay below 200 um.
     let trips = "--shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
-                 --set sim.probe_noise_rms_m=2e-5 --set interlock.model_error_ratio=1 --scales 0.1,0.2,1,1.01 --json";
+                 --set sim.probe_noise_rms_m=2e-5 --set interlock.model_error_off=noise --scales 0.1,0.2,1,1.01 --json";
     let answer = bench.run(&format!("linearity {HERE} {trips}"));
     assert_eq!(answer.code, 1, "{}", answer.err);
     let report = answer.json();

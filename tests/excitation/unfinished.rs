@@ -7,7 +7,7 @@ use crate::program::Bench;
 /// the run trips.
 const TRIPS: &str = "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operating-point 8% --excitation multisine \
                      --set multisine.period_s=8 --shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
-                     --set sim.probe_noise_rms_m=2.3e-5 --set interlock.model_error_ratio=1 --json";
+                     --set sim.probe_noise_rms_m=2.3e-5 --set interlock.model_error_off=noise --json";
 
 fn text(value: &Value) -> &str {
     value

@@ -116,7 +116,7 @@ fn page_of_a_tripped_excitation_begins_with_the_trip_and_its_remedy() {
     let run = bench.run(
         "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --operating-point 8% --excitation multisine \
          --set multisine.period_s=8 --shape model --set shape.travel_m=0.0006 --set interlock.soft_limit_m=0.0005 \
-         --set sim.probe_noise_rms_m=2.3e-5 --set interlock.model_error_ratio=1 --json",
+         --set sim.probe_noise_rms_m=2.3e-5 --set interlock.model_error_off=noise --json",
     );
     assert_eq!(run.code, 1, "{}", run.err);
     let run = run.json();

@@ -8,6 +8,7 @@ mod feedforward;
 mod late_ticks;
 mod live_rig;
 mod matrix;
+mod mounting;
 mod replay;
 mod reproducible;
 mod requests_and_faults;

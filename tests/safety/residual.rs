@@ -309,3 +309,59 @@ fn reference_counts_from_the_rest_position_where_it_replaces_the_model() {
     let trip = later.find_map(Result::err);
     assert!(matches!(trip, Some(Trip::ModelError { .. })), "{trip:?}");
 }
+
+/// Settings that are accepted without a reason, each with the smallest effect that is.
+const WEAKEST: [[&str; 2]; 4] = [
+    [
+        "interlock.model_error_ratio=0.125",
+        "interlock.model_error_share=0.5",
+    ],
+    [
+        "interlock.model_error_ratio=0.1949",
+        "interlock.model_error_share=0.05",
+    ],
+    [
+        "interlock.model_error_ratio=0.0625",
+        "interlock.model_error_share=0.75",
+    ],
+    [
+        "interlock.model_error_ratio=0.02",
+        "interlock.model_error_share=0.91",
+    ],
+];
+
+/// The reference fault: the fast controller at D = -10 %. Without the monitor it reaches 679 um and 9.87 A. An accepted monitor trips
+/// at a deviation of a quarter of the travel limit, 225 um, from a motion of up to twice the step of 50 um (325 um); then the
+/// current is below half of its peak without the monitor.
+#[test]
+fn weakest_accepted_monitor_trips_on_the_growing_oscillation() {
+    for sets in WEAKEST {
+        let sets = [&sets[..], &["sim.asymmetry_offset=-0.2"]].concat();
+        let (trip, extremes) = run_wired(&loop_plan("fast", "50um", &sets), Wiring::Correct);
+        assert!(
+            matches!(trip, Some(Trip::ModelError { .. })),
+            "{sets:?}: {trip:?}"
+        );
+        assert!(
+            extremes.position_m < 325e-6 && extremes.current_a < 0.5 * 9.87,
+            "{sets:?}: {extremes:?}"
+        );
+    }
+}
+
+/// A position that stays at rest trips at a modelled motion of at most a quarter of the travel limit, 225 um; the low-pass of the plant,
+/// with two time constants of 1/92 s, lets it go on for 22 ms, and the true position oscillates by up to its static part.
+#[test]
+fn weakest_accepted_monitor_trips_on_a_detached_probe() {
+    for sets in WEAKEST {
+        for controller in ["slow", "fast"] {
+            let plan = loop_plan(controller, "50um", &sets);
+            let (trip, extremes) = run_wired(&plan, Wiring::DetachedProbe);
+            assert!(
+                matches!(trip, Some(Trip::ModelError { .. })),
+                "{sets:?}: {trip:?}"
+            );
+            assert!(extremes.position_m < 2.0 * 225e-6, "{sets:?}: {extremes:?}");
+        }
+    }
+}

@@ -160,6 +160,10 @@ impl Protocol for Settings {
         Ok(Box::new(Capancdt::new(self.clone())?))
     }
 
+    fn range_m(&self) -> Option<[f64; 2]> {
+        Some([0.0, self.range_m])
+    }
+
     fn polling(&self) -> Polling {
         self.polling
     }

@@ -10,7 +10,7 @@ use super::error::SerialError;
 #[serde(deny_unknown_fields)]
 pub struct Mounting {
     /// Metres of the stage per metre of the probe; negative if the probe measures against the direction of positive
-    /// force.
+    /// force. `bench` refuses a magnitude outside 0.75 to 1.25, unless `calibration.accepted_by` confirms it with a name.
     #[schemars(range(min = -1000.0, max = 1000.0))]
     pub gain: f64,
     /// Position of the stage at the zero of the probe, in metres.

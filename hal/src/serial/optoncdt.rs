@@ -122,6 +122,10 @@ impl Protocol for Settings {
         Ok(Box::new(Optoncdt::new(self.clone())?))
     }
 
+    fn range_m(&self) -> Option<[f64; 2]> {
+        Some([0.0, self.range_m])
+    }
+
     fn characters_per_reading(&self) -> Option<u32> {
         Some(3 * u32::from(self.cycle.values))
     }

@@ -71,6 +71,12 @@ pub trait Protocol: Debug + Send + Sync {
     /// Checks the settings and returns a decoder that has not received anything yet.
     fn decoder(&self) -> Result<Box<dyn Decoder>, SerialError>;
 
+    /// First and last position in metres that the probe can measure, before the mounting; `None` if it is unknown. A configuration
+    /// is refused if the permitted travel of the stage is not within it, so that a wrong scale of the protocol is found.
+    fn range_m(&self) -> Option<[f64; 2]> {
+        None
+    }
+
     /// Timing of the requests. Used only if [`Decoder::request`] returns a request.
     fn polling(&self) -> Polling {
         Polling::default()

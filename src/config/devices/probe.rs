@@ -77,6 +77,38 @@ pub struct SerialParts {
     pub protocol: Arc<dyn Protocol>,
 }
 
+impl ProbeDevice {
+    /// Metres of the stage per metre of the probe, by the mounting; 1 for the simulated probe.
+    pub fn mounting_gain(&self) -> f64 {
+        self.serial().map_or(1.0, |serial| serial.mounting.gain)
+    }
+
+    /// The scales between probe and position as text, for plans and certificates; `None` for the simulated probe.
+    pub fn scale_text(&self) -> Option<String> {
+        let serial = self.serial()?;
+        let Mounting { gain, offset_m } = serial.mounting;
+        let range = match serial.protocol.range_m() {
+            Some([first_m, last_m]) => format!("{} to {} mm", 1e3 * first_m, 1e3 * last_m),
+            None => "unknown".into(),
+        };
+        Some(format!(
+            "{}, range {range}, mounting gain {gain}, offset {} mm",
+            self.kind(),
+            1e3 * offset_m
+        ))
+    }
+}
+
+impl SerialParts {
+    /// Lowest and highest position of the stage in metres that the probe can measure as mounted; `None` if its range is unknown.
+    pub fn stage_range_m(&self) -> Option<[f64; 2]> {
+        let Mounting { gain, offset_m } = self.mounting;
+        let [first_m, last_m] = self.protocol.range_m()?;
+        let ends_m = [gain * first_m + offset_m, gain * last_m + offset_m];
+        Some([ends_m[0].min(ends_m[1]), ends_m[0].max(ends_m[1])])
+    }
+}
+
 impl<P: Protocol + Clone + 'static> SerialDevice<P> {
     fn parts(&self) -> SerialParts {
         SerialParts {

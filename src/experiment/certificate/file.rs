@@ -54,6 +54,10 @@ pub struct CertifiedDevices {
     pub amplifier: String,
     /// The probe.
     pub probe: String,
+    /// Range and mounting of the probe, which are the scale of all positions; `None` for the simulated probe, and in certificates
+    /// of older versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub probe_scale: Option<String>,
 }
 
 /// Rate and delay of a loop.

@@ -51,6 +51,7 @@ pub fn certify(
         devices: CertifiedDevices {
             amplifier: metadata(recording, "amplifier"),
             probe: metadata(recording, "probe"),
+            probe_scale: config.probe.device.scale_text(),
         },
         servo: certified_loop(analysis, config),
         load: CertifiedLoad::of(config),

@@ -6,7 +6,10 @@ use std::time::{Duration, SystemTime};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{self, CalibrationSettings, Config, ConfigError, OnInvalidCalibration};
+use crate::config::{
+    self, CalibrationSettings, Config, ConfigError, MIN_PROBE_GAIN, OnInvalidCalibration,
+    is_near_one,
+};
 
 /// The result of `bench calibrate`, with the date and the devices.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -301,11 +304,6 @@ fn other_device(calibration: &Calibration, devices: KnownDevices) -> Option<Stri
     })
 }
 
-/// Largest deviation of a gain from 1 (or -1 for a reversed probe) that needs no confirmation.
-const GAIN_TOLERANCE: f64 = 0.25;
-/// Smallest magnitude of the probe's gain, with or without a confirmation.
-const MIN_PROBE_GAIN: f64 = 0.001;
-
 impl Calibration {
     /// Refuses gains outside 1 +- 0.25 that nobody confirmed with a name, and an offset of the current beyond `current_error_a`,
     /// the limit within which the measured current must follow the commands. The gain of a reversed probe is near -1.
@@ -351,8 +349,4 @@ impl Calibration {
         let head = "# Written by `bench calibrate`. To use it, name it in a configuration: [calibration] file = \"this file\".\n";
         std::fs::File::create_new(path)?.write_all(format!("{head}{text}").as_bytes())
     }
-}
-
-fn is_near_one(gain: f64) -> bool {
-    (gain - 1.0).abs() <= GAIN_TOLERANCE
 }

@@ -37,6 +37,10 @@ impl Protocol for Settings {
         Ok(Box::new(Ascii::new(self.clone())?))
     }
 
+    fn range_m(&self) -> Option<[f64; 2]> {
+        Some([self.lower_m, self.upper_m])
+    }
+
     fn polling(&self) -> Polling {
         self.polling
     }

@@ -40,8 +40,9 @@ pub struct Settings {
     /// Request for a line; `None` if the probe sends without requests.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub request: Option<String>,
-    /// Metres per unit of the number: 1e-3 for millimetres.
-    #[schemars(range(min = -1.0, max = 1.0))]
+    /// Metres per unit of the number, from the data sheet: 1e-3 for millimetres. A correction belongs into a calibration, a reversed
+    /// direction into `mounting.gain`.
+    #[schemars(range(min = 1e-12, max = 1.0))]
     pub unit_m: f64,
     /// Position at the number 0, in metres.
     #[serde(rename = "zero_m", default)]
