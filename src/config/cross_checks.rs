@@ -21,7 +21,7 @@ pub(super) fn cross_checks(config: &Config, purpose: Purpose) -> Vec<Finding> {
     }
     travel(config, &mut errors);
     force(&config.motor, &mut errors);
-    staleness(config, &mut errors);
+    staleness(config, purpose, &mut errors);
     reason_without_monitor(config, &mut errors);
     if purpose != Purpose::Recorded {
         errors.0.extend(monitor_checks::monitor(config, purpose));
@@ -77,11 +77,16 @@ fn force(motor: &MotorSettings, errors: &mut Errors) {
     });
 }
 
-fn staleness(config: &Config, errors: &mut Errors) {
+fn staleness(config: &Config, purpose: Purpose, errors: &mut Errors) {
     let (stale_s, period_s) = (config.interlock.probe_stale_s, config.servo.period_s());
     let probe = &config.probe;
-    let longest_s = |rate_hz: f64| (1.0 + CLOCK_TOLERANCE) / rate_hz;
-    let oldest_s = probe.age_at_arrival_s() + probe.rate_hz.map_or(0.0, longest_s);
+    // Earlier versions accepted a limit without the tolerance.
+    let tolerance = match purpose {
+        Purpose::Recorded => 0.0,
+        _ => CLOCK_TOLERANCE,
+    };
+    let period_of_probe_s = probe.rate_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz);
+    let oldest_s = probe.age_at_arrival_s() + (1.0 + tolerance) * period_of_probe_s;
     let path = "interlock.probe_stale_s";
     errors.require(stale_s >= period_s, path, || {
         format!("is {stale_s} s, shorter than a tick of {period_s} s (1/loop.rate_hz); raise it")

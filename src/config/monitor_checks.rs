@@ -2,17 +2,14 @@
 
 use super::purpose::Purpose;
 use super::{Config, Detection, InterlockSettings, MAX_DETECTED_RATIO};
-use crate::model::plant::{self, ModalModel};
+use crate::model::plant::{self, ModalModel, Mode};
 use crate::util::finding::Finding;
 
-/// Two equal first-order sections with the corner frequency w reach 90 % of a step after 3.89/w: (1 + x) exp(-x) = 0.1.
-const RISE: f64 = 3.89;
-/// Corner of the low-pass of the plant's residual over the frequency of the first mode.
-const CORNER_RATIO: f64 = 0.5;
-/// Longest rise of the low-pass in seconds.
-const MAX_RISE_S: f64 = 10.0;
+/// Smallest frequency of the first mode over that of the mode with the largest static compliance. The low-pass of the plant's
+/// residual has half the frequency of the first mode: it reaches 90 % of a step after 3.89/(w/2), 1.24 periods of that mode.
+const MIN_FIRST_RATIO: f64 = 0.1;
 
-/// The errors in the settings of the monitor, and in a model with which it detects nothing within [`MAX_RISE_S`].
+/// The error in the settings of the monitor, or in a model with which it is too slow to detect a fault.
 pub(super) fn monitor(config: &Config, purpose: Purpose) -> Option<Finding> {
     let interlock = &config.interlock;
     let Some(detection) = interlock.detection() else {
@@ -59,19 +56,25 @@ fn responsible(share: f64) -> &'static str {
     }
 }
 
-/// A mode far below all others, for example one with a negligible residue, makes the low-pass of the monitor slow.
+/// A first mode far below the one that the stage moves in, for example with a negligible residue, makes the low-pass slow.
 fn slow(config: &Config) -> Option<Finding> {
-    let model = ModalModel::of(&plant::build(&config.plant).ok()?).ok()?;
-    let first_rad_s = model
-        .modes
+    let modes = ModalModel::of(&plant::build(&config.plant).ok()?)
+        .ok()?
+        .modes;
+    let first_rad_s = modes.iter().map(|mode| mode.omega_rad_s).reduce(f64::min)?;
+    let softest = modes
         .iter()
-        .map(|mode| mode.omega_rad_s)
-        .reduce(f64::min)?;
-    let rise_s = RISE / (CORNER_RATIO * first_rad_s);
+        .max_by(|a, b| compliance(a).total_cmp(&compliance(b)))?;
+    let softest_rad_s = softest.omega_rad_s;
     // The residual of a free body is not evaluated.
-    let is_slow = first_rad_s > 0.0 && rise_s > MAX_RISE_S;
+    let is_slow = first_rad_s > 0.0 && first_rad_s < MIN_FIRST_RATIO * softest_rad_s;
     let what = format!(
-        "has a mode at {first_rad_s:.3e} rad/s, with which the comparison of position and model takes {rise_s:.0} s to detect a fault, above the limit of {MAX_RISE_S} s; remove this mode from the model, or switch the comparison off with a reason, interlock.model_error_off = \"REASON\""
+        "has its first mode at {first_rad_s:.3e} rad/s, below a tenth of the {softest_rad_s:.3e} rad/s of the mode with the largest compliance, so that the comparison of position and model would detect a fault only after more than ten periods of this mode; remove the first mode from the model, or switch the comparison off with a reason, interlock.model_error_off = \"REASON\""
     );
     is_slow.then(|| Finding::new("plant", what))
+}
+
+/// Magnitude of the static response of a mode to a force, without a common factor.
+fn compliance(mode: &Mode) -> f64 {
+    (mode.force_gain * mode.sensor_gain).abs() / (mode.omega_rad_s * mode.omega_rad_s)
 }

@@ -532,3 +532,31 @@ fn warns_of_limits_of_current_that_never_trip() {
         assert!(check.err.contains(words), "{}", check.err);
     }
 }
+
+/// A dummy mode of 0.06 rad/s with a negligible residue would make the low-pass of the monitor slower than the run.
+#[test]
+fn rejects_run_whose_model_makes_the_monitor_slow() {
+    let modal = |dummy_rad_s: f64| {
+        format!(
+            "[plant]\nmodel = \"modal\"\n[plant.modes]\n\
+             dummy = {{ omega_rad_s = {dummy_rad_s}, residue_per_kg = 1e-9, damping_ratio = 0.01 }}\n\
+             first = {{ omega_rad_s = 180.0, residue_per_kg = 1.0, damping_ratio = 0.01 }}\n"
+        )
+    };
+    let bench = Bench::new();
+    bench.write("slow.toml", modal(0.06));
+    bench.write("fast.toml", modal(20.0));
+    let check = |arguments: &str| bench.run(&format!("config check --config {arguments}"));
+    check("slow.toml").is_refused(&[
+        "`plant`",
+        "6.000e-2 rad/s",
+        "1.800e2 rad/s",
+        "interlock.model_error_off",
+    ]);
+    assert_eq!(
+        check("slow.toml --set interlock.model_error_off=known").code,
+        0
+    );
+    let fast = check("fast.toml");
+    assert_eq!(fast.code, 0, "{}", fast.err);
+}

@@ -9,60 +9,98 @@ use bench::rt::thread::Pace;
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use nalgebra::Complex;
 
-/// A sweep of 0.6 s with little current, below half of every rate of a probe that is tried.
-const SHORT: [&str; 9] = [
-    "excitation.kind=chirp",
-    "chirp.start_hz=5",
-    "chirp.stop_hz=50",
-    "chirp.duration_s=0.6",
-    "chirp.fade_in_s=0.1",
-    "chirp.fade_out_s=0.1",
-    "chirp.quiet_before_s=0.05",
-    "chirp.quiet_after_s=0.05",
-    "chirp.amplitude=[{ frequency_hz = 5.0, current_a = 0.004 }]",
-];
-
 const SIMULATED: [&str; 2] = [
     "amplifier.device={ kind = \"simulated\" }",
     "probe.device={ kind = \"simulated\" }",
 ];
 
+/// The unit of the values of a setting.
+#[derive(Clone, Copy, Debug)]
+enum Unit {
+    /// Ticks of the profile.
+    Period,
+    /// The rate of the profile.
+    Rate,
+    One,
+}
+
 /// Values of every setting of time or rate between a command and its reading.
-const VALUES: [(&str, &[&str]); 6] = [
+const VALUES: [(&str, Unit, &[f64]); 6] = [
     (
         "amplifier.latency_s",
-        &["0", "1e-6", "0.0003", "0.002", "0.01", "1"],
+        Unit::Period,
+        &[0.0, 0.005, 1.5, 10.0, 50.0],
     ),
-    ("loop.computing_delay_periods", &["0", "1", "8"]),
-    ("loop.rate_hz", &["800", "3333.3", "10000"]),
-    ("probe.latency_s", &["0", "1e-6", "0.0003", "0.002", "1"]),
-    ("probe.rate_hz", &["0.1", "130", "4999", "20000"]),
-    ("probe.transport_s", &["0", "0.0004", "0.002", "1"]),
+    ("loop.computing_delay_periods", Unit::One, &[0.0, 1.0, 8.0]),
+    ("loop.rate_hz", Unit::Rate, &[0.16, 0.666_66, 2.0]),
+    (
+        "probe.latency_s",
+        Unit::Period,
+        &[0.0, 0.005, 1.5, 10.0, 2000.0],
+    ),
+    ("probe.rate_hz", Unit::Rate, &[0.001, 0.026, 0.9998, 4.0]),
+    ("probe.transport_s", Unit::Period, &[0.0, 0.7, 2.0, 2000.0]),
 ];
 
 /// Several of them together.
-const TOGETHER: [&[&str]; 4] = [
+const TOGETHER: [&[(&str, Unit, f64)]; 4] = [
     &[
-        "amplifier.latency_s=0.0004",
-        "loop.computing_delay_periods=0",
+        ("amplifier.latency_s", Unit::Period, 2.0),
+        ("loop.computing_delay_periods", Unit::One, 0.0),
     ],
     &[
-        "amplifier.latency_s=0.0004",
-        "probe.latency_s=0.0003",
-        "probe.transport_s=0.0002",
+        ("amplifier.latency_s", Unit::Period, 2.0),
+        ("probe.latency_s", Unit::Period, 1.3),
+        ("probe.transport_s", Unit::Period, 1.0),
     ],
     &[
-        "amplifier.latency_s=0.0011",
-        "probe.rate_hz=2500",
-        "probe.transport_s=0.0001",
+        ("amplifier.latency_s", Unit::Period, 5.5),
+        ("probe.rate_hz", Unit::Rate, 0.5),
+        ("probe.transport_s", Unit::Period, 0.5),
     ],
     &[
-        "amplifier.latency_s=0.05",
-        "loop.computing_delay_periods=8",
-        "loop.healthy_s=0.1",
-        "loop.stop_ramp_s=0",
+        ("amplifier.latency_s", Unit::Period, 9.0),
+        ("loop.computing_delay_periods", Unit::One, 8.0),
+        ("loop.stop_ramp_s", Unit::One, 0.0),
     ],
 ];
+
+/// A value of a setting as text, for a profile with this rate.
+fn set(rate_hz: f64, (key, unit, value): (&str, Unit, f64)) -> String {
+    let value = match unit {
+        Unit::Period => value / rate_hz,
+        Unit::Rate => value * rate_hz,
+        Unit::One => value,
+    };
+    format!("{key}={value}")
+}
+
+/// Length of a sweep in seconds, and its least ticks in a slow profile, whose stage is computed in thousands of steps per tick.
+const SWEEP_S: f64 = 0.6;
+const LEAST_TICKS: f64 = 200.0;
+
+/// A sweep with little current, far below half of every rate that is tried.
+fn short_sweep(rate_hz: f64) -> Vec<String> {
+    let start_hz = 0.002 * rate_hz;
+    let duration_s = SWEEP_S.max(LEAST_TICKS / rate_hz);
+    vec![
+        "excitation.kind=chirp".into(),
+        format!("chirp.start_hz={start_hz}"),
+        format!("chirp.stop_hz={}", 0.01 * rate_hz),
+        format!("chirp.duration_s={duration_s}"),
+        format!("chirp.fade_in_s={}", duration_s / 6.0),
+        format!("chirp.fade_out_s={}", duration_s / 6.0),
+        format!("chirp.quiet_before_s={}", duration_s / 12.0),
+        format!("chirp.quiet_after_s={}", duration_s / 12.0),
+        format!("chirp.amplitude=[{{ frequency_hz = {start_hz}, current_a = 0.004 }}]"),
+    ]
+}
+
+/// The rate of a profile in hertz.
+fn rate_hz(profile: &str) -> f64 {
+    let config = loaded(profile, &[]).expect("a profile");
+    config.servo.rate_hz
+}
 
 fn loaded(profile: &str, sets: &[&str]) -> Result<Config, ConfigError> {
     load(&Source {
@@ -88,59 +126,71 @@ fn completes(plan: &Plan, what: &str) {
     assert_eq!(trip, None, "{what}");
 }
 
-/// A chirp with these settings completes, or the configuration is refused with the name of `setting`.
-fn completes_or_is_refused(profile: &str, sets: &[&str], setting: &str) {
-    let all = [&SIMULATED[..], &SHORT[..], sets].concat();
-    match loaded(profile, &all) {
-        Ok(config) => completes(&Plan::chirp(config), &format!("{profile}: {sets:?}")),
+/// A short sweep with these settings and values completes, or the configuration is refused with the name of `setting`.
+fn completes_or_is_refused(profile: &str, values: &[(&str, Unit, f64)], setting: &str) -> bool {
+    let rate_hz = rate_hz(profile);
+    let mut sets: Vec<String> = SIMULATED.map(String::from).into();
+    sets.extend(short_sweep(rate_hz));
+    sets.extend(values.iter().map(|value| set(rate_hz, *value)));
+    let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+    match loaded(profile, &sets) {
+        Ok(config) => completes(&Plan::chirp(config), &format!("{profile}: {values:?}")),
         Err(error) => {
             let text = error.to_string();
-            assert!(text.contains(setting), "{profile}, {sets:?}: {text}");
+            assert!(text.contains(setting), "{profile}, {values:?}: {text}");
+            return false;
         }
     }
+    true
 }
 
 #[test]
 fn chirp_completes_or_is_refused_by_name_with_every_delay_and_rate() {
     for profile in profiles::PROFILES {
-        for (setting, values) in VALUES {
-            for value in values {
-                let set = format!("{setting}={value}");
-                completes_or_is_refused(profile.name, &[&set], setting);
-            }
+        for (setting, unit, values) in VALUES {
+            let completed = values.iter().filter(|value| {
+                completes_or_is_refused(profile.name, &[(setting, unit, **value)], setting)
+            });
+            let least = if setting.starts_with("probe.rate") {
+                1
+            } else {
+                2
+            };
+            assert!(completed.count() >= least, "{}: {setting}", profile.name);
         }
-        for sets in TOGETHER {
-            completes_or_is_refused(profile.name, sets, "interlock.probe_stale_s");
+        for values in TOGETHER {
+            completes_or_is_refused(profile.name, values, "interlock.probe_stale_s");
         }
     }
 }
 
-/// With a limit of the age that permits them, the longest delays are accepted and complete.
+/// With a limit of the age that permits them, the longest delays are accepted and complete. Readings from before the first tick are those of
+/// the stage at rest.
 #[test]
 fn chirp_completes_with_delays_of_a_second() {
-    for set in [
-        "amplifier.latency_s=1",
-        "probe.latency_s=1",
-        "probe.transport_s=1",
+    for setting in [
+        "amplifier.latency_s",
+        "probe.latency_s",
+        "probe.transport_s",
     ] {
-        let sets = [
-            &SIMULATED[..],
-            &SHORT[..],
-            &["interlock.probe_stale_s=10", set],
-        ]
-        .concat();
-        let config = loaded("stage", &sets).expect("accepted");
-        completes(&Plan::chirp(config), set);
+        let values = [
+            (setting, Unit::One, 1.0),
+            ("interlock.probe_stale_s", Unit::One, 10.0),
+        ];
+        assert!(completes_or_is_refused("stage", &values, ""), "{setting}");
     }
 }
 
 /// The limit of the age counts the largest age in normal operation, a clock of the probe that is slow by 0.1 % included.
 #[test]
 fn limit_of_the_age_within_the_tolerance_of_the_clock_of_the_probe_is_refused() {
-    for stale_s in ["0.0020001", "0.002001", "0.0021"] {
-        let stale = format!("interlock.probe_stale_s={stale_s}");
-        let sets = ["probe.rate_hz=500", stale.as_str()];
-        completes_or_is_refused("stage", &sets, "interlock.probe_stale_s");
+    for (stale_s, is_accepted) in [(0.002_000_1, false), (0.002_001, false), (0.002_1, true)] {
+        let values = [
+            ("probe.rate_hz", Unit::One, 500.0),
+            ("interlock.probe_stale_s", Unit::One, stale_s),
+        ];
+        let completed = completes_or_is_refused("stage", &values, "interlock.probe_stale_s");
+        assert_eq!(completed, is_accepted, "{stale_s} s");
     }
 }
 
@@ -194,7 +244,7 @@ fn settings_of_delays() -> BTreeSet<String> {
 
 #[test]
 fn every_delay_and_rate_of_the_schema_is_tried() {
-    let tried: BTreeSet<String> = VALUES.iter().map(|(key, _)| key.to_string()).collect();
+    let tried: BTreeSet<String> = VALUES.iter().map(|(key, ..)| key.to_string()).collect();
     assert_eq!(settings_of_delays(), tried);
 }
 
@@ -212,6 +262,7 @@ fn quiet(sets: &[&str]) -> Config {
         "sim.probe_noise_rms_m=0",
         "sim.probe_quantisation_m=0",
         "interlock.probe_stale_s=1",
+        "chirp.stop_hz=200",
     ];
     loaded("stage", &[&quiet[..], sets].concat()).expect("accepted")
 }
@@ -292,11 +343,12 @@ fn measured_delay_is_the_sum_of_the_settings() {
     }
 }
 
-/// A probe with its own clock adds half its period on average: its readings have all ages up to a period. Over the 500 ticks in
-/// which the stage moves they have them only approximately: within 5 % of the period.
+/// A probe with its own clock adds half its period on average: its readings have all ages up to a period. With 5000/650 = 100/13 and
+/// 5000/1900 = 50/19 ticks per period, the ages have 13 and 19 evenly spread values while the stage moves, whose mean is within half a step of
+/// half the period: 1/26 and 1/38, below 5 % of the period.
 #[test]
 fn probe_with_its_own_clock_adds_half_its_period() {
-    for (rate, rate_hz) in [("probe.rate_hz=650", 650.0), ("probe.rate_hz=2000", 2000.0)] {
+    for (rate, rate_hz) in [("probe.rate_hz=650", 650.0), ("probe.rate_hz=1900", 1900.0)] {
         let sets = [
             "loop.computing_delay_periods=0",
             "amplifier.latency_s=0.0004",

@@ -91,8 +91,9 @@ impl SimulatedRig {
         }
         for step in 0..self.trajectory.fine_steps() {
             let interval = self.trajectory.advance_interval_finely(tick, step);
-            self.probe
-                .measure_until(interval.to, |time| interval.position_m(time));
+            // Measurements before the first tick are those of the stage at rest.
+            let position_m = |time: f64| interval.position_m(time.max(interval.from));
+            self.probe.measure_until(interval.to, position_m);
         }
     }
 
