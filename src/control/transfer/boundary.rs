@@ -71,8 +71,8 @@ fn nearest(given: &Roots, root: Complex<f64>) -> Complex<f64> {
 fn crossed(what: &'static str, given: &Roots, to: Complex<f64>, domain: Domain) -> TransferError {
     TransferError::Crossed {
         what,
-        from: RootPlace::of(nearest(given, to), domain),
-        to: RootPlace::of(to, domain),
+        from: Box::new(RootPlace::of(nearest(given, to), domain)),
+        to: Box::new(RootPlace::of(to, domain)),
     }
 }
 

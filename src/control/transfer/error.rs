@@ -125,9 +125,9 @@ pub enum TransferError {
         /// Zero or pole.
         what: &'static str,
         /// As given.
-        from: RootPlace,
+        from: Box<RootPlace>,
         /// In the sections.
-        to: RootPlace,
+        to: Box<RootPlace>,
     },
     /// Another servo rate.
     #[error(

@@ -77,7 +77,7 @@ impl Sub for Wide {
     type Output = Wide;
 
     fn sub(self, other: Wide) -> Wide {
-        self + other.negative()
+        self.add(other.negative())
     }
 }
 
