@@ -393,7 +393,7 @@ fn mode(omega_rad_s: f64, residue_per_kg: f64, damping_ratio: f64) -> Mode {
 fn mode_above_half_the_rate_limits_the_modulus_margin_at_its_alias() {
     let modes = vec![
         mode(125.663_706_143_591_72, 5.0, 0.2),
-        mode(3895.574_890_451_343_4, -896.3, 2e-4),
+        mode(3_895.574_890_451_343_4, -896.3, 2e-4),
     ];
     let path = SignalPath {
         period_s: 1e-3,

@@ -144,11 +144,11 @@ test("every control does its work", async () => {
   await click("start");
   await page.waitForFunction(() => /chirp.*queued.*about 3\d s/.test(document.getElementById("queue").textContent), null, PATIENCE);
 
-  // Stop: the sine settles, the chirp has its turn and its response grows. A bench that is held goes on first.
+  // Stop: the sine settles, the chirp has its turn and its response grows. The stop holds the bench until Resume.
   await click("stop");
   await planSays(page, "Run 1 ");
-  if ((await daemon.get("/state")).held) await click("resume");
-  used.add("resume"); // tests/page/held.test.mjs
+  await page.waitForSelector("#resume:not([disabled])", PATIENCE);
+  await click("resume");
   await page.waitForFunction(() => /Run 2, chirp/.test(document.getElementById("progress-text").textContent), null, PATIENCE);
   await page.waitForSelector("#response-panel:not([hidden])", PATIENCE);
   await use("response", async (response) => {
