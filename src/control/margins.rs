@@ -102,6 +102,10 @@ pub(super) struct Known<'a> {
     pub continuous: bool,
 }
 
+/// |L| below which its sign is that of rounding, as at half the rate if L has a zero there: no gain in use reaches -1 from there
+/// (180 dB).
+const NO_RESPONSE: f64 = 1e-9;
+
 /// Margins of `response`. Each crossing and the peak of |S| are found on the grid and then refined on the function itself.
 pub(super) fn margins(response: &dyn Fn(f64) -> Complex<f64>, known: &Known<'_>) -> Margins {
     let places = landmarks(response, known.grid_rad_s, known.ends_rad_s);
@@ -159,9 +163,11 @@ fn phase_crossings(
 ) -> Vec<PhaseCrossing> {
     let places = places.phase_crossings_rad_s.iter();
     places
-        .map(|&rad_s| PhaseCrossing {
+        .map(|&rad_s| (rad_s, response(rad_s).norm()))
+        .filter(|(_, gain)| *gain > NO_RESPONSE)
+        .map(|(rad_s, gain)| PhaseCrossing {
             rad_s,
-            gain_margin_db: -20.0 * libm::log10(response(rad_s).norm()),
+            gain_margin_db: -20.0 * libm::log10(gain),
         })
         .collect()
 }

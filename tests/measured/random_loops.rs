@@ -273,7 +273,22 @@ impl Dense {
         let minima: Vec<f64> = minima
             .map(|i| golden(&distance, grid[i - 1], grid[i + 1]))
             .collect();
+        // |L| that only just passes 1 does so at its maxima and minima.
+        let magnitude = |w: f64| random.gain(w).norm();
+        let sizes: Vec<f64> = grid.iter().map(|w| magnitude(*w)).collect();
+        let inner = 1..grid.len() - 1;
+        let extremes = inner.filter_map(|i| {
+            let (before, here, after) = (sizes[i - 1], sizes[i], sizes[i + 1]);
+            let (from, to) = (grid[i - 1], grid[i + 1]);
+            match (here >= before.max(after), here <= before.min(after)) {
+                (true, _) => Some(golden(&|w| -magnitude(w), from, to)),
+                (_, true) => Some(golden(&magnitude, from, to)),
+                (false, false) => None,
+            }
+        });
+        let extremes: Vec<f64> = extremes.collect();
         grid.extend(minima);
+        grid.extend(extremes);
         grid.sort_by(f64::total_cmp);
         let gains: Vec<C> = grid.iter().map(|w| random.gain(*w)).collect();
         let at_nyquist = real_end(random.gain(nyquist * (1.0 - 1e-12)));
@@ -290,6 +305,7 @@ impl Dense {
         let margins_db: Vec<f64> = reals
             .filter(|re| *re < 0.0)
             .map(|re| -20.0 * (-re).log10())
+            .filter(|db| *db < MAX_GAIN_DB)
             .collect();
         let unit = (0..grid.len() - 1)
             .filter(|&i| (gains[i].norm() > 1.0) != (gains[i + 1].norm() > 1.0))
@@ -309,6 +325,9 @@ impl Dense {
         }
     }
 }
+
+/// Above this gain margin the sign of L is that of rounding.
+const MAX_GAIN_DB: f64 = 180.0;
 
 fn real_end(l: C) -> f64 {
     l.re
