@@ -12,7 +12,7 @@ pub const TICKET_VARIABLE: &str = "BENCH_TICKET";
 /// The socket of a daemon that the system started.
 const SYSTEM_SOCKET: &str = "/run/bench/bench.sock";
 
-/// The socket of this user's daemon: `BENCH_SOCKET`, or [`default_socket`].
+/// The socket of this user's daemon: `BENCH_SOCKET`, or the default socket of the user.
 pub fn own_socket() -> PathBuf {
     match std::env::var_os(SOCKET_VARIABLE) {
         Some(path) => path.into(),
