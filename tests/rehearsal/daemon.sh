@@ -64,6 +64,9 @@ follow() {
   api DELETE /lease --header "Bench-Lease: $lease" >/dev/null # it may have expired
 }
 
+# resume: a trip holds the bench until somebody resumes.
+resume() { ./bench resume >"$1.resume.out" 2>"$1.resume.err"; }
+
 well() {
   act well
   serve well
@@ -90,6 +93,7 @@ cable() {
   state cable
   ip link set vcan0 up
   await '"amplifier":"'
+  resume after_cable
   closed after_cable
   end cable
   leave cable
@@ -119,6 +123,7 @@ silence() {
   follow silence
   state silence
   await '"position_m":[-0-9]'
+  resume after_silence
   closed after_silence
   end silence
   leave silence
@@ -136,6 +141,7 @@ power() {
   state power
   act power_back
   await '"amplifier":"'
+  resume after_power
   closed after_power
   kill -KILL "$device"
   await 'there is no such port'
@@ -155,6 +161,7 @@ fault() {
   follow fault
   await '--clear-fault'
   state fault
+  resume uncleared
   closed uncleared
   closed after_fault --clear-fault
   end fault
