@@ -92,6 +92,8 @@ impl Computations {
 
 #[cfg(test)]
 mod tests {
+    use futures_util::FutureExt;
+
     use super::*;
 
     #[tokio::test]
@@ -105,9 +107,10 @@ mod tests {
                 tokio::spawn(async move { computations.turn(view(1)).await.map(drop) })
             })
             .collect();
-        while computations.turn(view(1)).await.map(drop) != Err(Busy::Viewers) {
-            tokio::task::yield_now().await;
-        }
+        // Each of them takes a place and waits.
+        tokio::task::yield_now().await;
+        let refused = computations.turn(view(1)).now_or_never();
+        assert_eq!(refused.map(|turn| turn.map(drop)), Some(Err(Busy::Viewers)));
         let _plans = [Purpose::Plan; MAX_PLANS].map(|plan| computations.turn(plan));
         for plan in _plans {
             plan.await.unwrap();
