@@ -51,7 +51,8 @@ fn terminal(daemon: &Daemon, user: &str, arguments: &[&str]) -> Child {
 
 fn resume(daemon: &Daemon, arguments: &[&str]) -> (Option<i32>, Value) {
     let arguments = [&["resume", "--json"], arguments].concat();
-    let output = daemon.bench(daemon.path(), &arguments).output();
+    let mut command = daemon.bench(daemon.path(), &arguments);
+    let output = command.env("BENCH_TOKEN", daemon.token()).output();
     let output = output.expect("a process");
     let json = serde_json::from_slice(&output.stdout).expect("JSON");
     (output.status.code(), json)
