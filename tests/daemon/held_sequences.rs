@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, signal};
 
-/// Sequences in a test run; `BENCH_API_SEQUENCES` for more.
+/// Sequences in a test run, some 10 s each; `BENCH_HELD_SEQUENCES` for more.
 const SEQUENCES: u64 = 4;
 const STEPS: usize = 14;
 const OPERATORS: [&str; 2] = ["anna", "ben"];
@@ -185,7 +185,7 @@ impl Bench {
 
 #[test]
 fn no_current_flows_between_a_stop_or_trip_and_a_resume_of_two_operators() {
-    let wanted = std::env::var("BENCH_API_SEQUENCES").ok();
+    let wanted = std::env::var("BENCH_HELD_SEQUENCES").ok();
     let sequences = wanted.and_then(|text| text.parse().ok());
     let (mut turns, mut holds) = (0, 0);
     for seed in 0..sequences.unwrap_or(SEQUENCES) {
