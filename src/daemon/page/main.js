@@ -23,6 +23,8 @@ const EVENTS = 200;
 const OLD_MS = 1000;
 /** Time between two looks at the age of the last message. */
 const AGE_MS = 100;
+/** Time between two looks at a process that analyses its recording. */
+const PROCESS_MS = 500;
 
 const samples = new Samples();
 const scope = new Scope(byId("scope"), byId("scope-readout"), samples);
@@ -205,11 +207,20 @@ function showTiming() {
   drawTiming(byId("timing"), state.loop.lateness_histogram);
 }
 
+/** Waits until the process of a stopped command, whose turn has ended, has analysed the recording. */
+async function processEnded(run) {
+  while (run.has_process) {
+    await new Promise((resolve) => setTimeout(resolve, PROCESS_MS));
+    run = await ask("GET", `/runs/${run.id}`);
+  }
+}
+
 async function runEnded(id) {
   await attempt(async () => {
     const run = await ask("GET", `/runs/${id}`);
     const message = run.message ? `: ${run.message}` : "";
     showPlanText([`Run ${id} ${run.outcome}${message}`], run.outcome === "failed");
+    await processEnded(run);
     await showRecordings(recordingActions);
     const { recordings } = await ask("GET", "/recordings");
     const made = recordings.find((recording) => recording.file === run.recording);
