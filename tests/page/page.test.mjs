@@ -247,6 +247,11 @@ test("the keyboard alone starts and stops a loop", async () => {
   await page.keyboard.type("anna");
   await page.keyboard.press("Enter");
   await page.waitForFunction(() => document.getElementById("lease-text").textContent === "arm lease: anna (this page)", null, PATIENCE);
+  if ((await daemon.get("/state")).held) { // by a test before this one
+    await focusOn("resume");
+    await page.keyboard.press("Enter");
+    await page.waitForSelector("#held", { state: "hidden", ...PATIENCE });
+  }
   await focusOn("plan");
   await page.keyboard.press("Enter");
   await planSays(page, "Travel");
