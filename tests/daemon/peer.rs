@@ -64,7 +64,13 @@ fn session(stream: UnixStream) -> Sent {
     let open = received(&mut socket).expect("a message");
     let granted = Message::text("\"granted\"");
     socket.send(granted).expect("a connection");
-    let run = received(&mut socket).expect("an order");
+    // Before its order the command only says that it is alive.
+    let run = loop {
+        let message = received(&mut socket).expect("an order");
+        if message.get("run").is_some() {
+            break message;
+        }
+    };
     Sent { open, run }
 }
 
