@@ -155,7 +155,9 @@ impl Bench {
             );
             assert!(!rests || servo["current_a"] == 0.0, "{state}");
         }
-        self.was_at_rest |= rests && self.is_held;
+        // The live view of the loop may be older than the stop: a run in progress may still look like the rest before it.
+        let is_over = state["run"].is_null();
+        self.was_at_rest |= rests && is_over && self.is_held;
         self.turns += usize::from(servo["state"] == "running");
     }
 
