@@ -93,6 +93,7 @@ fn drive_times(times: &CanopenTimeouts) -> DriveTimes {
         command_timeout: seconds(times.command_lost_s),
         sdo_timeout: seconds(times.sdo_s),
         state_timeout: seconds(times.state_s),
+        ..DriveTimes::default()
     }
 }
 

@@ -153,8 +153,9 @@ impl CanopenDrive {
     /// Code of the fault, 0 if there is none. If the service thread hangs, the stored state is outdated, which is a fault as well.
     /// Called in the tick: must not allocate or block.
     fn fault(&self) -> u32 {
+        let (now_ns, timeout) = (self.host.now_ns(), self.settings.times.pass_timeout);
         match self.shared.fault() {
-            0 if self.shared.last_pass.is_overdue(self.host.now_ns()) => faults::SERVICE_HUNG,
+            0 if self.shared.last_pass.is_overdue(now_ns, timeout) => faults::SERVICE_HUNG,
             code => code,
         }
     }

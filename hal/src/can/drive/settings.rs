@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::budget::{Exchange, Traffic};
 use super::super::cia402::{CYCLIC_TORQUE, PROFILE_TORQUE};
+use super::super::last_pass::PASS_TIMEOUT;
 use super::super::scale::Reference;
 use super::errors::OpenError;
 
@@ -117,6 +118,8 @@ pub struct DriveTimes {
     pub sdo_timeout: Duration,
     /// Time limit of a change of state: enable, disable, reset.
     pub state_timeout: Duration,
+    /// If the thread of the driver has not run for this time, the state that it wrote is outdated: a fault.
+    pub pass_timeout: Duration,
 }
 
 impl Default for DriveSettings {
@@ -151,6 +154,7 @@ impl Default for DriveTimes {
             command_timeout: Duration::from_millis(20),
             sdo_timeout: Duration::from_millis(500),
             state_timeout: Duration::from_secs(2),
+            pass_timeout: PASS_TIMEOUT,
         }
     }
 }

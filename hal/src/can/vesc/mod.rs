@@ -28,6 +28,7 @@ use self::faults::{NOT_ARMED, NOT_SENT, SILENT, THREAD_HUNG, error, text};
 use self::shared::Shared;
 use self::watch::{UseState, Watch};
 use super::bus::{CanBus, Claim, Host, TaskHandle};
+use super::last_pass::PASS_TIMEOUT;
 use crate::{AmplifierStatus, CurrentAmplifier, DeviceError, FaultText};
 
 /// Longest time that closing the driver waits until the current is confirmed to be zero: five periods of STATUS.
@@ -110,8 +111,9 @@ impl Vesc {
     /// Code of the fault, 0 if there is none. If the thread of the driver hangs, the stored state is outdated, which is a fault as
     /// well. Called in the tick: must not allocate or block.
     fn fault(&self) -> u32 {
+        let now_ns = self.host.now_ns();
         match self.shared.fault.load(Ordering::Acquire) {
-            0 if self.shared.last_pass.is_overdue(self.host.now_ns()) => THREAD_HUNG,
+            0 if self.shared.last_pass.is_overdue(now_ns, PASS_TIMEOUT) => THREAD_HUNG,
             code => code,
         }
     }

@@ -34,6 +34,7 @@ pub fn settings() -> DriveSettings {
             command_timeout: ms(400),
             sdo_timeout: ms(3000),
             state_timeout: ms(5000),
+            pass_timeout: ms(400),
             ..DriveTimes::default()
         },
         ..DriveSettings::default()

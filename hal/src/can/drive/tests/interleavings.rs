@@ -3,6 +3,7 @@ use std::sync::Arc;
 
 use loom::thread;
 
+use super::super::super::last_pass::PASS_TIMEOUT;
 use super::super::faults::{DRIVE_FAULT, EMERGENCY, STATUS_LOST};
 use super::super::shared::{Intent, Shared};
 
@@ -117,7 +118,7 @@ fn a_recent_pass_follows_the_state_that_it_wrote() {
                 shared.last_pass.set(1_000_000_000);
             })
         };
-        if !shared.last_pass.is_overdue(1_000_000_000) {
+        if !shared.last_pass.is_overdue(1_000_000_000, PASS_TIMEOUT) {
             assert_eq!(shared.fault(), STATUS_LOST);
         }
         service.join().unwrap();
