@@ -24,13 +24,20 @@ export class Lease {
     await ask("DELETE", "/lease", undefined, secret);
   }
 
+  /** A request that needs the lease. A lease that has expired is forgotten. */
+  async ask(method, path, body, signal) {
+    const secret = this.secret;
+    try {
+      return await ask(method, path, body, secret, signal);
+    } catch (error) {
+      if (error.status === 403 && this.secret === secret) this.secret = null;
+      throw error;
+    }
+  }
+
   async renew() {
     if (!this.isHeld) return;
-    try {
-      // A renewal that is not answered does not occupy a connection after the next one.
-      await ask("PUT", "/lease", undefined, this.secret, AbortSignal.timeout(RENEWAL_MS));
-    } catch (error) {
-      if (error.status === 403) this.secret = null; // it has expired
-    }
+    // A renewal that is not answered does not occupy a connection after the next one.
+    await this.ask("PUT", "/lease", undefined, AbortSignal.timeout(RENEWAL_MS)).catch(() => {});
   }
 }

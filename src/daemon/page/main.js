@@ -156,7 +156,7 @@ function showAlert() {
     paragraph(`Remedy: ${trip.remedy}`);
     const button = document.createElement("button");
     button.textContent = "Acknowledge";
-    button.onclick = () => withLease(() => ask("POST", "/clear", undefined, lease.secret), showAlertError);
+    button.onclick = () => withLease(() => lease.ask("POST", "/clear"), showAlertError);
     alert.append(button);
   }
 }
@@ -267,7 +267,7 @@ async function withLease(action, showError) {
 /** Lets a held bench go on. */
 async function resume() {
   setText("resume-error", "");
-  await attempt(() => ask("POST", "/resume", undefined, lease.secret), (message) => setText("resume-error", message));
+  await attempt(() => lease.ask("POST", "/resume"), (message) => setText("resume-error", message));
   await refresh();
 }
 
@@ -314,7 +314,7 @@ async function start(event) {
   // A simulated run is shown in real time.
   const args = isSimulated ? [...wanted.args, "--pace", "realtime"] : wanted.args;
   return withLease(async () => {
-    const run = await ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value }, lease.secret);
+    const run = await lease.ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value });
     showPlanText([run.phase === "held" ? "queued; the bench is held, the run starts after Resume" : "queued"], false);
   });
 }
@@ -323,7 +323,7 @@ async function tune() {
   const number = (id) => Number(byId(id).value);
   setText("tune-text", "");
   try {
-    await ask("POST", "/tune", { reference: number("tune-reference"), gain: number("tune-gain") }, lease.secret);
+    await lease.ask("POST", "/tune", { reference: number("tune-reference"), gain: number("tune-gain") });
     setText("tune-text", "changing along a ramp of 0.5 s");
   } catch (error) {
     setText("tune-text", error.message);
