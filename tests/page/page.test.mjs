@@ -31,8 +31,7 @@ after(async () => {
 // A test that fails leaves no page, no lease and no run to the next one.
 afterEach(async () => {
   for (const context of chrome.contexts()) await context.close();
-  const stop = { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ how: "cut" }) };
-  await fetch(`http://127.0.0.1:${daemon.port}/api/v1/stop`, stop).catch(() => {});
+  await daemon.cut().catch(() => {}); // a test may have ended the daemon
 });
 
 const stateIs = (page, wanted) => page.waitForFunction((wanted) => document.getElementById("state").textContent === wanted, wanted, PATIENCE);
@@ -117,6 +116,7 @@ test("every control does its work", async () => {
   // The spectrum of the error, with zoom and cursor.
   await page.waitForSelector("#spectrum:not(.is-empty)", PATIENCE);
   await use("spectrum", async (spectrum) => {
+    await page.mouse.move(0, 0); // a page that scrolls below the pointer moves the cursor
     await spectrum.focus();
     for (const key of ["+", "ArrowRight", "-", "ArrowLeft"]) await page.keyboard.press(key);
     await page.waitForFunction(() => /Hz: .*sqrt/.test(document.getElementById("spectrum-readout").textContent), null, PATIENCE);
@@ -152,6 +152,7 @@ test("every control does its work", async () => {
   await page.waitForFunction(() => /Run 2, chirp/.test(document.getElementById("progress-text").textContent), null, PATIENCE);
   await page.waitForSelector("#response-panel:not([hidden])", PATIENCE);
   await use("response", async (response) => {
+    await page.mouse.move(0, 0); // a page that scrolls below the pointer moves the cursor
     await response.focus();
     for (const key of ["+", "ArrowRight", "-", "ArrowLeft"]) await page.keyboard.press(key);
     await page.waitForFunction(() => /um\/A.*deg/.test(document.getElementById("response-readout").textContent), null, PATIENCE);

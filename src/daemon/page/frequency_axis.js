@@ -12,6 +12,7 @@ export class FrequencyAxis {
     this.setLimits(1, 1000);
     this.zoomed = null; // decades; null: the whole axis
     this.cursor = null; // decades
+    this.isPointed = false; // whether the pointer has moved the cursor
     this.listen();
   }
 
@@ -55,6 +56,7 @@ export class FrequencyAxis {
   }
 
   moveCursor(share) {
+    this.isPointed = false;
     const [from, to] = this.range;
     this.cursor = Math.min(to, Math.max(from, (this.cursor ?? (from + to) / 2) + share * (to - from)));
     this.draw();
@@ -71,10 +73,12 @@ export class FrequencyAxis {
         return;
       }
       this.cursor = this.at(event);
+      this.isPointed = true;
       this.draw();
     });
     canvas.addEventListener("pointerup", () => { this.drag = null; });
-    canvas.addEventListener("pointerleave", () => { this.cursor = null; this.draw(); });
+    // A cursor that the keyboard has moved stays.
+    canvas.addEventListener("pointerleave", () => { if (this.isPointed) { this.cursor = null; this.draw(); } });
     canvas.addEventListener("dblclick", () => { this.zoomed = null; this.draw(); });
     canvas.addEventListener("keydown", (event) => {
       const actions = {
