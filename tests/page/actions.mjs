@@ -5,7 +5,21 @@ import { PATIENCE_MS } from "./daemon.mjs";
 export const PATIENCE = { timeout: PATIENCE_MS };
 
 export const textIs = (page, id, pattern) => page.waitForFunction(([id, pattern]) => new RegExp(pattern).test(document.getElementById(id).textContent), [id, pattern], PATIENCE);
-export const stateIs = (page, wanted) => textIs(page, "state", `^${wanted}$`);
+
+/** What a page says of the bench, to find the cause of a failure. */
+function reportOf(page) {
+  const texts = () => Object.fromEntries(["state", "age", "lease-text", "progress-text", "held", "resume-error", "alert", "plan-text", "queue"]
+    .map((id) => [id, document.getElementById(id).innerText]));
+  return page.evaluate(texts);
+}
+
+export async function stateIs(page, wanted) {
+  try {
+    await textIs(page, "state", `^${wanted}$`);
+  } catch (cause) {
+    throw new Error(`the page does not show the state ${wanted}: ${JSON.stringify(await reportOf(page))}`, { cause });
+  }
+}
 
 /** Takes the arm lease for a page, if it does not have it. */
 export async function takeLease(page) {
@@ -16,17 +30,15 @@ export async function takeLease(page) {
   await textIs(page, "lease-text", "anna .this page");
 }
 
-/** Closes a loop that holds the position until it is stopped. A bench that is held goes on first. */
+/** Closes a loop that holds the position until it is stopped. The bench must not be held. */
 export async function startLoop(page) {
-  await stateIs(page, "(disarmed|tripped)");
-  await page.waitForSelector("#progress-box.is-empty", { ...PATIENCE, state: "attached" }); // the run before is analysed
+  await stateIs(page, "disarmed");
   await takeLease(page);
-  if (await page.isVisible("#resume")) await page.click("#resume");
   await page.selectOption("#reference", "hold");
   await page.fill("#duration", "3000s");
   await page.selectOption("#on-disconnect", "continue"); // a page on a busy machine may lose its lease
   await page.click("#plan");
-  await page.waitForSelector("#start:not([disabled])", PATIENCE); // the end of the run before may overwrite the plan
+  await page.waitForSelector("#start:not([disabled])", PATIENCE);
   await page.click("#start");
   await stateIs(page, "running");
 }

@@ -37,7 +37,8 @@ export class Daemon {
       this.process.once("exit", () => failed(new Error(`the daemon has ended: ${text}`)));
     });
     // The token is printed on a terminal only.
-    this.url = `${address}#token=${readFileSync(join(this.folder, "bench.token"), "utf8")}`;
+    this.token = readFileSync(join(this.folder, "bench.token"), "utf8").trim();
+    this.url = `${address}#token=${this.token}`;
     this.port = new URL(this.url).port;
   }
 
@@ -46,8 +47,41 @@ export class Daemon {
     await this.ended;
   }
 
-  async get(path) {
-    return (await fetch(`http://127.0.0.1:${this.port}/api/v1${path}`)).json();
+  /** A request with the token, and with an arm lease if one is given; its answer, null if it has no body. */
+  async ask(method, path, body, lease) {
+    const headers = { "Authorization": `Bearer ${this.token}`, "Content-Type": "application/json" };
+    if (lease) headers["Bench-Lease"] = lease;
+    const answer = await fetch(`http://127.0.0.1:${this.port}/api/v1${path}`, { method, headers, body: body && JSON.stringify(body) });
+    const text = await answer.text();
+    if (!answer.ok) throw new Error(`${method} ${path}: ${answer.status} ${text}`);
+    return text === "" ? null : JSON.parse(text);
+  }
+
+  get(path) { return this.ask("GET", path); }
+
+  async cut() { await this.ask("POST", "/stop", { how: "cut" }); }
+
+  /** Waits until a condition of the state is true. */
+  async until(condition) {
+    const endMs = performance.now() + PATIENCE_MS;
+    while (true) {
+      const state = await this.get("/state");
+      if (condition(state)) return;
+      if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE_MS} ms: ${condition}; ${JSON.stringify(state)}`);
+      await new Promise((done) => setTimeout(done, 50));
+    }
+  }
+
+  /** Resumes, and closes a loop that holds the position until it is stopped. The lease is free afterwards. */
+  async startLoop() {
+    // The lease of a page that was closed expires.
+    await this.until((state) => state.run === null && state.queue.length === 0 && state.lease === null);
+    const { lease } = await this.ask("POST", "/lease", { operator: "test" });
+    await this.ask("POST", "/resume", undefined, lease);
+    const args = ["--fast", "--reference", "hold", "--duration", "3000s", "--pace", "realtime"];
+    await this.ask("POST", "/runs", { command: "control", args, on_disconnect: "continue" }, lease);
+    await this.until((state) => state.loop.state === "running");
+    await this.ask("DELETE", "/lease", undefined, lease);
   }
 
   remove() {

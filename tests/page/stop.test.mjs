@@ -2,31 +2,28 @@
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, describe, test } from "node:test";
-import { PATIENCE, clickStop, startLoop, stateIs, stopsOf, until } from "./actions.mjs";
+import { PATIENCE, clickStop, startLoop, stateIs, stopsOf, takeLease, until } from "./actions.mjs";
 import { Daemon, browser, openPage } from "./daemon.mjs";
 import { Link } from "./link.mjs";
 
 const DESK = { width: 1400, height: 900 }, TABLET = { width: 900, height: 700 }, PHONE = { width: 390, height: 844 };
 
 const daemon = new Daemon();
-let chrome, operator;
+let chrome;
 
 const loopState = async () => (await daemon.get("/state")).loop.state;
 
 before(async () => {
   await daemon.start();
   chrome = await browser();
-  // The page with the arm lease starts the loops. The pages under test only stop them.
-  // Its window is small: drawing the scope in software takes most of a core.
-  operator = await openPage(chrome, daemon.url, { width: 500, height: 400 });
 });
 
-beforeEach(() => startLoop(operator));
+// The pages under test only stop the loop.
+beforeEach(() => daemon.startLoop());
 
 afterEach(async () => {
-  for (const context of chrome.contexts()) if (context !== operator.context()) await context.close();
-  const stop = { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ how: "cut" }) };
-  await fetch(`http://127.0.0.1:${daemon.port}/api/v1/stop`, stop);
+  for (const context of chrome.contexts()) await context.close();
+  await daemon.cut();
 });
 
 after(async () => {
@@ -81,10 +78,15 @@ describe("the space bar stops while the focus is", () => {
   });
 
   test("on the gain field of the page with the lease", async () => {
-    await operator.focus("#tune-gain");
-    await operator.keyboard.press(" ");
-    await stateIs(operator, "disarmed");
-    assert.equal(await operator.inputValue("#tune-gain"), "1");
+    await daemon.cut();
+    const page = await openPage(chrome, daemon.url, DESK);
+    await takeLease(page);
+    await page.click("#resume");
+    await startLoop(page);
+    await page.focus("#tune-gain");
+    await page.keyboard.press(" ");
+    await stateIs(page, "disarmed");
+    assert.equal(await page.inputValue("#tune-gain"), "1");
   });
 
   test("in the frame of a report", async () => {
