@@ -9,15 +9,18 @@
 //!    until the holder of the lease resumes.
 //! 6. A stopped command whose run has ended, or has not begun, keeps its turn for [`GRACE`] only, whatever its process does.
 
+mod stops;
+
 use std::collections::{BTreeMap, VecDeque};
 use std::time::{Duration, Instant};
 
+use super::hold::Hold;
 pub use super::hold::StopKind;
-use super::hold::{Hold, HoldCause};
 use super::lease::{Keeper, LEASE, Lease};
 use super::run_entry::{Carrier, Command, Phase, RunEntry, RunOutcome, RunRequest};
 use super::secret::Secret;
 use crate::rt::supervision::StopFlags;
+use stops::stop_entry;
 
 /// Commands that may wait at the same time.
 pub const MAX_QUEUED: usize = 100;
@@ -241,19 +244,6 @@ impl Schedule {
         }
     }
 
-    /// Ends the turn of a stopped command at its time.
-    fn end_turn(&mut self, now: Now) {
-        let is_over = |entry: &&RunEntry| entry.turn_ends.is_some_and(|ends| now.instant >= ends);
-        let Some(entry) = self.current().filter(is_over) else {
-            return;
-        };
-        let outcome = match entry.outcome {
-            Some(RunOutcome::Tripped) => RunOutcome::Tripped,
-            _ => RunOutcome::Stopped,
-        };
-        self.finish(entry.id, outcome, None, now);
-    }
-
     /// The client of the lease is disconnected.
     fn lose_lease(&mut self, now: Now) {
         let Some(lease) = self.lease.take() else {
@@ -384,49 +374,6 @@ impl Schedule {
         }
     }
 
-    /// An interlock ended the run of a command.
-    fn trip(&mut self, id: u64, by: String, now: Now) {
-        self.begin_hold(Hold {
-            cause: HoldCause::Trip,
-            by,
-            since_unix_s: now.unix_s,
-            how: None,
-            run: Some(id),
-        });
-    }
-
-    /// Holds the bench. If it is held, the first cause remains.
-    fn begin_hold(&mut self, hold: Hold) {
-        self.hold.get_or_insert(hold);
-        self.mark_waiting();
-    }
-
-    /// Releases the bench.
-    ///
-    /// # Errors
-    /// When `secret` is not that of the lease, or the lease has expired.
-    pub fn resume(&mut self, secret: &str, now: Now) -> Result<Option<Hold>, ScheduleError> {
-        self.require_lease(secret, now)?;
-        let released = self.hold.take();
-        self.mark_waiting();
-        Ok(released)
-    }
-
-    fn waiting_phase(&self) -> Phase {
-        match self.hold {
-            Some(_) => Phase::Held,
-            None => Phase::Queued,
-        }
-    }
-
-    fn mark_waiting(&mut self) {
-        let phase = self.waiting_phase();
-        let waiting = self.open.iter_mut().filter(|entry| !entry.is_current());
-        for entry in waiting {
-            entry.phase = phase;
-        }
-    }
-
     /// The process of a command has ended. Its exit code is noted also after the end of its turn.
     pub fn end_process(&mut self, id: u64, exit_code: Option<i32>) {
         let mut all = self.open.iter_mut().chain(&mut self.finished);
@@ -462,51 +409,6 @@ impl Schedule {
         entry.message = entry.message.or(message);
         self.finished.push_front(entry);
         self.finished.truncate(MAX_FINISHED);
-    }
-
-    /// Stops a command: one that waits is removed; for the one that has its turn the bench is stopped and held. `by` says who stops.
-    ///
-    /// # Errors
-    /// When there is no such command.
-    pub fn stop(
-        &mut self,
-        id: u64,
-        kind: StopKind,
-        by: &str,
-        now: Now,
-    ) -> Result<(), ScheduleError> {
-        match self.entry(id)? {
-            entry if entry.phase == Phase::Finished => {}
-            entry if entry.is_current() => drop(self.stop_bench(kind, by, now)),
-            _ => {
-                let why = "it was cancelled before its turn".into();
-                self.finish(id, RunOutcome::Stopped, Some(why), now);
-            }
-        }
-        Ok(())
-    }
-
-    /// Stops whatever has its turn, and holds the bench; returns the number of the command. `by` says who stops.
-    pub fn stop_bench(&mut self, kind: StopKind, by: &str, now: Now) -> Option<u64> {
-        let run = self.stop_current(kind, now);
-        match &mut self.hold {
-            Some(held) => held.add_stop(kind),
-            None => self.begin_hold(Hold {
-                cause: HoldCause::Stop,
-                by: by.into(),
-                since_unix_s: now.unix_s,
-                how: Some(kind),
-                run,
-            }),
-        }
-        run
-    }
-
-    /// Stops whatever has its turn, at the end of the daemon; returns its number.
-    pub fn stop_current(&mut self, kind: StopKind, now: Now) -> Option<u64> {
-        let current = self.open.front_mut().filter(|entry| entry.is_current())?;
-        stop_entry(current, kind, now);
-        Some(current.id)
     }
 
     /// The client of a command is disconnected: its run is stopped or goes on, as ordered at its start. A command that waits is
@@ -583,24 +485,6 @@ fn may_begin(entry: &RunEntry, lease: &Lease) -> bool {
     match &entry.lease {
         Some(own) => own.is(lease.secret.reveal()),
         None => entry.operator == lease.operator,
-    }
-}
-
-/// Raises the stop flags of a run: once to settle it, twice to cut the current. Without a run, the turn ends soon.
-fn stop_entry(entry: &mut RunEntry, kind: StopKind, now: Now) {
-    if entry.phase != Phase::Running {
-        entry.turn_ends.get_or_insert(now.instant + GRACE);
-    }
-    let was_stopped = std::mem::replace(&mut entry.is_stopped, true);
-    match (kind, was_stopped) {
-        // A second request to settle does not cut the current.
-        (StopKind::Settle, true) => {}
-        (StopKind::Settle, false) => entry.stop.raise(),
-        (StopKind::Cut, true) => entry.stop.raise(),
-        (StopKind::Cut, false) => {
-            entry.stop.raise();
-            entry.stop.raise();
-        }
     }
 }
 
