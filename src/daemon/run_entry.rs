@@ -5,6 +5,7 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::hold::StopKind;
 use super::secret::Secret;
 use crate::experiment::{Description, operator_name, run_name, run_note};
 use crate::rt::supervision::StopFlags;
@@ -229,6 +230,24 @@ impl RunEntry {
         match self.phase {
             Phase::Starting | Phase::Running | Phase::Analysing => true,
             Phase::Queued | Phase::Held | Phase::WaitingForLease | Phase::Finished => false,
+        }
+    }
+
+    /// Raises the stop flags of the run: once to settle it, twice to cut the current. Without a run, the turn ends at `turn_ends`.
+    pub fn stop(&mut self, kind: StopKind, turn_ends: Instant) {
+        if self.phase != Phase::Running {
+            self.turn_ends.get_or_insert(turn_ends);
+        }
+        let was_stopped = std::mem::replace(&mut self.is_stopped, true);
+        match (kind, was_stopped) {
+            // A second request to settle does not cut the current.
+            (StopKind::Settle, true) => {}
+            (StopKind::Settle, false) => self.stop.raise(),
+            (StopKind::Cut, true) => self.stop.raise(),
+            (StopKind::Cut, false) => {
+                self.stop.raise();
+                self.stop.raise();
+            }
         }
     }
 }

@@ -20,7 +20,6 @@ use super::lease::{Keeper, LEASE, Lease};
 use super::run_entry::{Carrier, Command, Phase, RunEntry, RunOutcome, RunRequest};
 use super::secret::Secret;
 use crate::rt::supervision::StopFlags;
-use stops::stop_entry;
 
 /// Commands that may wait at the same time.
 pub const MAX_QUEUED: usize = 100;
@@ -261,7 +260,7 @@ impl Schedule {
         let keeper = Keeper::Run(current.id);
         current.is_orphan = true;
         if current.request.ends_with_client() {
-            stop_entry(current, StopKind::Settle, now);
+            current.stop(StopKind::Settle, now.instant + GRACE);
         }
         self.lease = Some(Lease { keeper, ..lease });
     }
@@ -423,7 +422,7 @@ impl Schedule {
         }
         entry.is_orphan = true;
         if entry.request.ends_with_client() {
-            stop_entry(entry, StopKind::Settle, now);
+            entry.stop(StopKind::Settle, now.instant + GRACE);
         }
     }
 

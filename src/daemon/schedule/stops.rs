@@ -46,7 +46,7 @@ impl Schedule {
     /// Stops whatever has its turn, at the end of the daemon; returns its number.
     pub fn stop_current(&mut self, kind: StopKind, now: Now) -> Option<u64> {
         let current = self.open.front_mut().filter(|entry| entry.is_current())?;
-        stop_entry(current, kind, now);
+        current.stop(kind, now.instant + GRACE);
         Some(current.id)
     }
 
@@ -104,23 +104,5 @@ impl Schedule {
             _ => RunOutcome::Stopped,
         };
         self.finish(entry.id, outcome, None, now);
-    }
-}
-
-/// Raises the stop flags of a run: once to settle it, twice to cut the current. Without a run, the turn ends soon.
-pub(super) fn stop_entry(entry: &mut RunEntry, kind: StopKind, now: Now) {
-    if entry.phase != Phase::Running {
-        entry.turn_ends.get_or_insert(now.instant + GRACE);
-    }
-    let was_stopped = std::mem::replace(&mut entry.is_stopped, true);
-    match (kind, was_stopped) {
-        // A second request to settle does not cut the current.
-        (StopKind::Settle, true) => {}
-        (StopKind::Settle, false) => entry.stop.raise(),
-        (StopKind::Cut, true) => entry.stop.raise(),
-        (StopKind::Cut, false) => {
-            entry.stop.raise();
-            entry.stop.raise();
-        }
     }
 }
