@@ -52,11 +52,11 @@ impl Files {
         let done = async {
             let place = Arc::clone(&self.places).acquire_owned().await;
             let place = place.map_err(|_| FolderError::NoAnswer)?;
-            let done = tokio::task::spawn_blocking(move || {
-                let _place = place;
-                work()
-            });
-            done.await.map_err(|_| FolderError::Panicked)
+            // The place returns with the result: then the thread is free for the next call. With the place given back by the call
+            // itself, the next call begins another thread, and the locked memory grows by a stack each time.
+            let done = tokio::task::spawn_blocking(move || (work(), place));
+            let (result, _place) = done.await.map_err(|_| FolderError::Panicked)?;
+            Ok(result)
         };
         let in_time = tokio::time::timeout(self.answer_time, done).await;
         in_time.unwrap_or(Err(FolderError::NoAnswer))
