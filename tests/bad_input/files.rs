@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::program::{self, Bench, NO_DAEMON};
+use crate::bad_input::program::{self, Bench, NO_DAEMON};
 
 #[test]
 fn rejects_a_chirp_too_long_to_be_analysed() {

@@ -1,6 +1,6 @@
 //! Flags out of range, and numbers that are not finite.
 
-use crate::program::Bench;
+use crate::bad_input::program::Bench;
 
 #[test]
 fn rejects_invalid_flags_with_value_and_limit() {

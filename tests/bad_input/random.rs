@@ -6,7 +6,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use crate::program::{Answer, Bench};
+use crate::bad_input::program::{Answer, Bench};
 
 /// Whether the answer is that of `bench margins` for an unstable loop: exit code 1 and `"stable": false`.
 fn is_unstable(answer: &Answer) -> bool {

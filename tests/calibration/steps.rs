@@ -12,7 +12,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 use bench_hal::Rig;
 
-use crate::skewed_rig::{Skew, SkewedRig};
+use crate::calibration::skewed_rig::{Skew, SkewedRig};
 
 /// Static compliance of the stage in metres per ampere: Kf over the stiffness of Eq. (2-5), both bearings in parallel,
 /// 11.12 N/A / (2 x 36,000 N/m).

@@ -8,7 +8,7 @@ use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench::identify::verdict::Cnmp;
 use serde_json::Value;
 
-use crate::program::{Bench, NO_DAEMON};
+use crate::campaign::program::{Bench, NO_DAEMON};
 
 /// 4 x 3 points, each with the shortest chirp that passes over all modes.
 const GRID: &str = "campaign --operating-points 2%:8%:4 --asymmetries -5%:10%:3 --out c --threads 2 --single-chirp \

@@ -11,7 +11,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 use serde_json::Value;
 
-use crate::stage::{Chirp, chirp, config, reversed_chirp};
+use crate::certificate::stage::{Chirp, chirp, config, reversed_chirp};
 
 fn certificate(chirp: &Chirp) -> Value {
     serde_json::from_str(&chirp.text("certificate")).expect("JSON")

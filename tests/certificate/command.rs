@@ -3,7 +3,7 @@ use bench::recording::Recording;
 use bench::rt::record::EventKind;
 use bench_test_support::program::{Answer, Bench};
 
-use crate::stage::{SETTINGS, chirp};
+use crate::certificate::stage::{SETTINGS, chirp};
 
 /// Settings of devices that do not exist.
 const NO_DEVICES: &str = "--config lab --set amplifier.device.interface=no-such-can --set probe.device.line.port=/dev/ttyNONE9";

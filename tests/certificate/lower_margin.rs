@@ -3,7 +3,7 @@ use bench::control::ClosedLoop;
 use bench::control::measured::{LowerMargin, MeasuredLoop, ResponsePoint, Stability};
 use bench::experiment::closed_loop;
 
-use crate::stage::config;
+use crate::certificate::stage::config;
 
 /// The bound for exact points of the model over a band in rad/s, said to have a relative error.
 fn bound(model: &ClosedLoop, band_rad_s: (f64, f64), relative: f64) -> LowerMargin {

@@ -7,10 +7,10 @@ use bench::experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, cl
 use bench::rig::calibration::Calibration;
 use serde_json::json;
 
-use crate::altered::{
+use crate::certificate::altered::{
     column, date, defect, defects, edited, only_defect, required, simulated, with_response,
 };
-use crate::stage::{chirp, config, plan};
+use crate::certificate::stage::{chirp, config, plan};
 
 #[test]
 fn matching_certificate_is_accepted_with_a_lower_bound_of_the_margin() {

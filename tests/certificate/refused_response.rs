@@ -4,10 +4,10 @@ use bench::experiment::Plan;
 use bench::experiment::certificate::{CertificateError, Evidence};
 use serde_json::json;
 
-use crate::altered::{
+use crate::certificate::altered::{
     column, defect, defects, edited, only_defect, required, simulated, with_column, with_response,
 };
-use crate::stage::{config, plan, reversed_chirp};
+use crate::certificate::stage::{config, plan, reversed_chirp};
 
 #[test]
 fn rejects_a_response_without_the_band_around_the_crossover() {

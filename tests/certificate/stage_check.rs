@@ -10,8 +10,8 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 use bench_hal::Rig;
 
-use crate::skewed_rig::{Skew, SkewedRig};
-use crate::stage::{config, plan};
+use crate::calibration::skewed_rig::{Skew, SkewedRig};
+use crate::certificate::stage::{config, plan};
 
 /// The check on a rig, with the certificate of the modelled stage.
 fn checked(rig: Box<dyn Rig>) -> StageCheck {

@@ -3,8 +3,8 @@
 use bench::excitation::command::Taps;
 use serde_json::{Value, json};
 
-use crate::program::{Bench, near, number};
-use crate::{plan, truth};
+use crate::command::program::{Bench, near, number};
+use crate::command::{plan, truth};
 
 /// Ticks of the reference: 3 s of rest, a move, and 5 s of rest at 5 kHz.
 const TICKS: u64 = 40_000;

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::program::{Bench, number};
-use crate::{plan, truth};
+use crate::command::program::{Bench, number};
+use crate::command::{plan, truth};
 
 /// The operating point of the profile, 8 % of L, in metres.
 const POINT_M: f64 = 0.0038;

@@ -4,7 +4,7 @@ use bench::control::ClosedLoop;
 use bench::experiment::closed_loop;
 use nalgebra::Complex;
 
-use crate::{config, plan};
+use crate::command::{config, plan};
 
 /// Largest distance from the final value after a tick, over the height of the step.
 fn rest_after(positions: &[f64], tick: usize) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::program::Bench;
+use crate::command::program::Bench;
 
 /// Runs a command that is refused, and returns its message.
 fn refused(arguments: &str) -> String {

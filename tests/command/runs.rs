@@ -9,7 +9,7 @@ use bench::rt::record::flag;
 use nalgebra::Complex;
 use serde_json::Value;
 
-use crate::program::{Bench, number};
+use crate::command::program::{Bench, number};
 
 fn run(bench: &Bench, arguments: &str) -> (Value, Recording) {
     let answer = bench.json(&format!("control {arguments} --out runs"));

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::program::{Bench, number};
+use crate::compare::program::{Bench, number};
 
 fn control(bench: &Bench, arguments: &str) -> (String, Value) {
     let run = bench.json(&format!("control {arguments} --duration 1.5s --no-report"));

@@ -2,7 +2,7 @@
 
 use bench::experiment::run_comparison::{Comparison, Difference};
 
-use crate::compared::{
+use crate::compare::compared::{
     GUIDE_N_PER_M, config, differences, mean_square_ratio, modes, of_equal_stages, result,
 };
 

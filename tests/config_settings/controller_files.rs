@@ -1,5 +1,5 @@
 //! Files of controllers.
-use crate::program::Bench;
+use crate::config_settings::program::Bench;
 
 #[test]
 fn controller_files_are_checked_like_configurations() {

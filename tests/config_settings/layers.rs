@@ -3,8 +3,8 @@ use std::path::PathBuf;
 
 use serde_json::json;
 
-use crate::program::{self, Bench, number};
-use crate::{bench_config, toml_files};
+use crate::config_settings::program::{self, Bench, number};
+use crate::config_settings::{bench_config, toml_files};
 
 #[test]
 fn converts_units_of_set_values() {

@@ -1,8 +1,8 @@
 //! Rejected settings: every command names the place, the value, the limit and the remedy.
-use crate::COMMANDS;
+use crate::config_settings::COMMANDS;
 use bench::config::{Source, load, whole};
 
-use crate::program::Bench;
+use crate::config_settings::program::Bench;
 
 /// Asserts that every command rejects the file with all of the words, and creates no file.
 fn assert_file_rejected(text: &str, words: &[&str]) {
@@ -359,7 +359,7 @@ fn rejects_unknown_configuration_and_lists_names() {
 }
 
 /// Checks the profile `lab` with these settings.
-fn check_lab(sets: &[&str]) -> crate::program::Answer {
+fn check_lab(sets: &[&str]) -> crate::config_settings::program::Answer {
     let sets = sets.iter().flat_map(|set| ["--set", *set]);
     Bench::new().run_with(
         ["config", "check", "--config", "lab"]

@@ -4,8 +4,8 @@ use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
 
-use crate::program::Bench;
-use crate::{bench_config, toml_files};
+use crate::config_settings::program::Bench;
+use crate::config_settings::{bench_config, toml_files};
 
 #[test]
 fn schema_file_is_current() {

@@ -4,8 +4,8 @@ use bench_test_support::python;
 use nalgebra::Complex;
 use serde_json::{Map, Value, json};
 
-use crate::program::Bench;
-use crate::response::{assert_response, imported};
+use crate::controllers::program::Bench;
+use crate::controllers::response::{assert_response, imported};
 
 const FREQUENCIES_RAD_S: [f64; 4] = [1.0, 30.0, 400.0, 3000.0];
 

@@ -3,7 +3,7 @@
 use bench_test_support::python;
 use serde_json::{Value, json};
 
-use crate::program::Bench;
+use crate::controllers::program::Bench;
 
 /// Numbers with all 53 bits.
 fn controller() -> Value {

@@ -6,7 +6,7 @@ use bench::control::{GainUnit, ImportOptions, Imported, import};
 use bench_test_support::python;
 use nalgebra::Complex;
 
-use crate::program::Bench;
+use crate::controllers::program::Bench;
 
 /// A line of the script: the response of the numbers in a file with 60 digits.
 struct Point {

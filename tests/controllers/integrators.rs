@@ -4,7 +4,7 @@ use bench::config::{Purpose, Source, load};
 use bench::control::ClosedLoop;
 use bench::experiment::closed_loop;
 
-use crate::program::Bench;
+use crate::controllers::program::Bench;
 
 /// A stage of one well damped mode at 180 rad/s: P(0) = 3/180^2 m/N times the force constant.
 const STAGE: &str = "title = \"ramp\"\n[plant]\nmodel = \"modal\"\n[plant.modes]\na = { omega_rad_s = 180.0, residue_per_kg = 3.0, damping_ratio = 0.7 }\n[sim]\nunmodelled = []\nfloor = []\n";

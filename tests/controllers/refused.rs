@@ -1,6 +1,6 @@
 //! Transfer functions that are refused, each with its place and the remedy.
 
-use crate::program::Bench;
+use crate::controllers::program::Bench;
 
 fn refused(text: &str, words: &[&str]) {
     let bench = Bench::new();

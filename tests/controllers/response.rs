@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 use serde_json::Value;
 
-use crate::program::{Bench, number};
+use crate::controllers::program::{Bench, number};
 
 fn polynomial(falling: &Value, v: Complex<f64>) -> Complex<f64> {
     let coefficients = falling.as_array().expect("coefficients").iter();

@@ -4,7 +4,7 @@ use bench::control::{ControllerText, LawInput};
 use bench_test_support::python;
 use serde_json::{Value, json};
 
-use crate::program::{Bench, number};
+use crate::controllers::program::{Bench, number};
 
 const SAMPLES: usize = 400;
 

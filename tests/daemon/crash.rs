@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 
 use bench::recording::Recording;
 
-use crate::common::Daemon;
+use crate::daemon::common::Daemon;
 
 /// The longest time that may be lost, in seconds: the chunk of 0.1 s that is not complete, and as much again for the threads of loop and
 /// recorder.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::common::Daemon;
+use crate::daemon::common::Daemon;
 
 const RUN: [&str; 4] = ["--slow", "--duration", "1s", "--no-report"];
 

@@ -3,7 +3,7 @@
 use bench::recording::Recording;
 use serde_json::Value;
 
-use crate::common::Daemon;
+use crate::daemon::common::Daemon;
 
 /// 0.3 MB are some thousand ticks (2 or 4 times as much in a shell with larger blocks); the rate is 1 kHz.
 const LIMIT_KB: u64 = 300;

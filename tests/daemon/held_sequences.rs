@@ -8,7 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
-use crate::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, signal};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, signal};
 
 /// Sequences in a test run, some 10 s each; `BENCH_HELD_SEQUENCES` for more.
 const SEQUENCES: u64 = 4;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
-use crate::common::{Daemon, NO_OVERRUN_LIMIT, signal};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, signal};
 
 const SLOW: [&str; 5] = ["--slow", "--duration", "60s", "--pace", "realtime"];
 /// A closed loop that is unstable with this asymmetry, so that an interlock trips.

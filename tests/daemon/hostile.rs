@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, socket};
 use serde_json::json;
 
-use crate::common::{Daemon, TIME_LIMIT};
-use crate::wire::{exchange, request, status, tcp, unix};
+use crate::daemon::common::{Daemon, TIME_LIMIT};
+use crate::daemon::wire::{exchange, request, status, tcp, unix};
 
 /// Connections of one address, by docs/daemon.md.
 const MAX_OF_ADDRESS: usize = 64;

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use serde_json::{Value, json};
 
-use crate::common::Daemon;
+use crate::daemon::common::Daemon;
 
 /// Methods and paths of the description, with a value for each part of a path.
 fn requests(daemon: &Daemon) -> Vec<(String, String)> {

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use serde_json::json;
 
-use crate::common::{Daemon, TIME_LIMIT};
-use crate::hostile::tcp_from;
-use crate::wire::{exchange, request, status, tcp, unix};
+use crate::daemon::common::{Daemon, TIME_LIMIT};
+use crate::daemon::hostile::tcp_from;
+use crate::daemon::wire::{exchange, request, status, tcp, unix};
 
 /// Connections of one address, by docs/daemon.md.
 const MAX_OF_ADDRESS: usize = 64;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, bench_in};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, bench_in};
 
 /// A closed loop in real time at a rate that a busy machine keeps.
 const RUN: [&str; 9] = [
@@ -262,7 +262,7 @@ fn token_is_private_and_is_not_printed_into_a_pipe() {
     );
     assert_eq!(std::fs::read_to_string(&target).expect("a file"), "content");
     wait_for(&folder.path().join("bench.sock"));
-    crate::common::signal(&daemon, nix::sys::signal::Signal::SIGTERM);
+    crate::daemon::common::signal(&daemon, nix::sys::signal::Signal::SIGTERM);
     let output = ended_output(&mut daemon);
     assert!(output.contains("http://127.0.0.1:"), "{output}");
     assert!(!output.contains(&token), "{output}");

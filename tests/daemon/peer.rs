@@ -9,7 +9,7 @@ use nix::sys::socket::{MsgFlags, recv};
 use serde_json::Value;
 use tokio_tungstenite::tungstenite::{Message, WebSocket, accept, client};
 
-use crate::common::{Daemon, TIME_LIMIT, bench_in};
+use crate::daemon::common::{Daemon, TIME_LIMIT, bench_in};
 
 /// What `bench control` sends to its daemon: the message that asks for a turn, and the order of the run.
 struct Sent {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 
-use crate::common::{Daemon, TIME_LIMIT};
+use crate::daemon::common::{Daemon, TIME_LIMIT};
 
 const CONTROL: [&str; 8] = [
     "--slow",

@@ -2,7 +2,7 @@
 use std::path::Path;
 use std::process::Output;
 
-use crate::common::{Daemon, bench_in};
+use crate::daemon::common::{Daemon, bench_in};
 
 /// Output without what differs between any two runs: times of day in file names.
 fn comparable(text: &[u8]) -> String {

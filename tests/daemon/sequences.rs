@@ -8,9 +8,9 @@ use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use serde_json::{Value, json};
 
-use crate::asks::{Access, Action, Ask, Form, Sent, Step, command, steps};
-use crate::common::{Daemon, TIME_LIMIT};
-use crate::wire::{exchange, request, send_and_leave, status, tcp, unix};
+use crate::daemon::asks::{Access, Action, Ask, Form, Sent, Step, command, steps};
+use crate::daemon::common::{Daemon, TIME_LIMIT};
+use crate::daemon::wire::{exchange, request, send_and_leave, status, tcp, unix};
 
 /// Sequences in a test run; `BENCH_API_SEQUENCES` for more.
 const SEQUENCES: u32 = 10;

@@ -3,7 +3,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::os::unix::net::UnixStream;
 
-use crate::common::{Daemon, TIME_LIMIT};
+use crate::daemon::common::{Daemon, TIME_LIMIT};
 
 /// A TCP connection that gives up after the time limit of the tests.
 pub fn tcp(daemon: &Daemon) -> TcpStream {

@@ -17,7 +17,7 @@ use bench_hal::{CurrentAmplifier, Rig};
 use bench_test_support::faulty_rig::{Fault, FaultyRig};
 use bench_test_support::loop_rig::{Bench, StillRig, endless, stage};
 
-use crate::amplifier::{Lab, config};
+use crate::devices::amplifier::{Lab, config};
 
 /// The set-points that the drive has received since the last call, in counts, in their order.
 fn set_points(listener: &mut MemoryEndpoint) -> Vec<i16> {

@@ -17,7 +17,7 @@ use bench::rt::servo::Request;
 use bench_hal::serial::StatisticsHandle;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 
-use crate::rig::Bench;
+use crate::devices::rig::Bench;
 
 const PERIOD: Duration = Duration::from_millis(5);
 /// Number of ticks within which a fault must trip and a current must flow: several times the longest time in the settings below.

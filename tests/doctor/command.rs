@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::program::{Answer, Bench};
+use crate::doctor::program::{Answer, Bench};
 
 /// The profile `lab` without its devices, which this machine may have, and without an effective limit of missed ticks, because
 /// the timing of the machine is not tested.

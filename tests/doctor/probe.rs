@@ -9,9 +9,9 @@ use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};
 use serde_json::Value;
 
-use crate::command::{checked_report, findings_on};
-use crate::program::{Bench, number};
-use crate::rehearsal::Rehearsal;
+use crate::doctor::command::{checked_report, findings_on};
+use crate::doctor::program::{Bench, number};
+use crate::doctor::rehearsal::Rehearsal;
 
 /// The profile `lab` with time limits that a loaded machine does not reach: timing is not tested.
 const NO_TIMING_LIMIT: [&str; 3] = [

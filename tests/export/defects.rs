@@ -4,7 +4,7 @@ use bench::rt::record::TickRecord;
 use bench_test_support::program::{Answer, Bench};
 use serde_json::json;
 
-use crate::{chirp, record, tick};
+use crate::export::{chirp, record, tick};
 
 /// Exports `run.mcap` and checks the exit code 3 and the words of the message.
 fn impaired(bench: &Bench, options: &str, words: &[&str]) -> Answer {

@@ -6,7 +6,7 @@ use bench_test_support::program::Bench;
 use bench_test_support::truth;
 use serde_json::json;
 
-use crate::{chirp, recorded_chirp, short_recording};
+use crate::export::{chirp, recorded_chirp, short_recording};
 
 /// The response of `run.mcap`.
 fn response(bench: &Bench) -> Frf {

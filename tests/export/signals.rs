@@ -5,7 +5,7 @@ use bench_test_support::program::Bench;
 use bench_test_support::truth;
 use serde_json::{Value, json};
 
-use crate::{record, tick};
+use crate::export::{record, tick};
 
 /// More than a row group of the Parquet file and a block of a column, and no multiple of the four numbers of a line in UFF 58.
 const TICKS: u64 = 66_001;
@@ -108,7 +108,7 @@ fn uff58_rejects_a_recording_with_a_gap() {
 
 #[test]
 fn every_format_has_the_signals_of_a_simulated_chirp() {
-    let bench = crate::recorded_chirp();
+    let bench = crate::export::recorded_chirp();
     for (format, file) in [("csv", "run.csv"), ("mat", "run.mat"), ("uff58", "run.uff")] {
         if let Some(differences) = differences(&bench, format, file) {
             assert_eq!(differences, json!([]), "{format}");

@@ -5,7 +5,7 @@ use std::path::Path;
 use bench_test_support::program::run_program;
 use serde_json::json;
 
-use crate::{recorded_chirp, short_recording};
+use crate::export::{recorded_chirp, short_recording};
 
 #[test]
 fn rejects_a_file_that_exists() {

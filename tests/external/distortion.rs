@@ -1,8 +1,8 @@
 //! Distortion of a periodic record with a measured input, against an independent simulation.
 use serde_json::Value;
 
-use crate::program::{Bench, number};
-use crate::python;
+use crate::external::program::{Bench, number};
+use crate::external::python;
 
 #[test]
 fn odd_multisine_with_a_measured_current_gives_modes_verdict_and_distortion() {

@@ -1,8 +1,8 @@
 //! Results of an earlier analysis in the same folder.
 use serde_json::Value;
 
-use crate::program::Bench;
-use crate::signals::{csv, multisine};
+use crate::external::program::Bench;
+use crate::external::signals::{csv, multisine};
 
 fn identify(bench: &Bench, band: &str) -> Value {
     bench.json(&format!(

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::program::{Bench, number};
-use crate::python;
+use crate::external::program::{Bench, number};
+use crate::external::python;
 
 /// The path of the record; `None` with a message on standard error if it is missing.
 fn data() -> Option<PathBuf> {

@@ -3,8 +3,8 @@ use bench::identify::IdentifyError;
 use bench::identify::periodic::{Repetition, estimate};
 use bench::identify::settling::settling_periods;
 
-use crate::python;
-use crate::signals::{PERIOD, multisine, response};
+use crate::external::python;
+use crate::external::signals::{PERIOD, multisine, response};
 
 const BAND_HZ: (f64, f64) = (5.0, 200.0);
 

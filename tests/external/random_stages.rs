@@ -3,8 +3,8 @@ use std::f64::consts::TAU;
 
 use serde_json::Value;
 
-use crate::program::{Bench, number};
-use crate::python;
+use crate::external::program::{Bench, number};
+use crate::external::python;
 
 /// Seed and number of stages. The seed is not one that was used for development.
 const SEED: usize = 90_125;

@@ -1,8 +1,8 @@
 //! Records that cannot be analysed are rejected with the place of the error; unreliable ones give an undecided verdict.
 use bench::identify::Signals;
 
-use crate::program::{Answer, Bench};
-use crate::signals::{csv, multisine, normal};
+use crate::external::program::{Answer, Bench};
+use crate::external::signals::{csv, multisine, normal};
 
 const IDENTIFY: &str = "identify data.csv --input force_n --output position_m";
 

@@ -1,8 +1,8 @@
 //! A record without repetition that begins and ends at rest, like every run of the bench.
 use bench::identify::Signals;
 
-use crate::program::{Bench, near, number};
-use crate::signals::{STAGE, csv};
+use crate::external::program::{Bench, near, number};
+use crate::external::signals::{STAGE, csv};
 
 const RATE_HZ: f64 = 1000.0;
 
@@ -32,7 +32,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     };
     let input_a: Vec<f64> = (0..20_000).map(force).collect();
     let mut states = STAGE.map(|_| (0.0, 0.0));
-    let mut normal = crate::signals::normal(5);
+    let mut normal = crate::external::signals::normal(5);
     let output_m = input_a.iter().map(|force| {
         let position: f64 = states.iter().map(|(x, _)| x).sum();
         states
@@ -83,7 +83,7 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
             0.0
         }
     };
-    let mut normal = crate::signals::normal(5);
+    let mut normal = crate::external::signals::normal(5);
     let output_m = (0..20_000)
         .map(|n| impulse_response((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal())
         .collect();

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use bench_test_support::program::{Bench, NO_DAEMON};
 
-use crate::all::{all, folder};
+use crate::figures::all::{all, folder};
 
 #[test]
 fn every_command_of_the_page_runs_in_its_folder() {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use thesis_figures::{FIGURES, Make, Verdict, selected};
 
-use crate::all::{all, content, folder};
+use crate::figures::all::{all, content, folder};
 
 /// The required figures and tables; `a..b` is a range.
 const REQUIRED: &str = "1-3 1-4 2-3..2-6 3-2..3-6 3-8..3-16 4-1 4-2 4-4 4-6..4-10 5-2 6-2..6-13 \

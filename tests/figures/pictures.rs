@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use serde_json::json;
 use thesis_figures::page;
 
-use crate::all::{all, folder};
-use crate::{svg, truth};
+use crate::figures::all::{all, folder};
+use crate::figures::{svg, truth};
 
 /// Edges of the frames of a picture, in its units: left, right, top, bottom.
 fn frames(picture: &str) -> Vec<[f64; 4]> {

@@ -3,9 +3,9 @@
 use bench::report::Mark;
 use serde_json::{Value, json};
 
-use crate::all::{chart, curves, sampled};
-use crate::program::{Bench, near, number};
-use crate::truth;
+use crate::figures::all::{chart, curves, sampled};
+use crate::figures::program::{Bench, near, number};
+use crate::figures::truth;
 
 /// Pairs of numbers of an answer.
 fn pairs(answer: &Value) -> Vec<(f64, f64)> {

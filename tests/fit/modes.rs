@@ -3,7 +3,7 @@ use bench::identify::FrfDatum;
 use bench::identify::modal::{FitError, MeasurementChain, fit};
 use nalgebra::Complex;
 
-use crate::synthetic::{frf_data, stage, term};
+use crate::fit::synthetic::{frf_data, stage, term};
 
 /// About 0.1 % of the response above the modes.
 const SIGMA_M_PER_N: f64 = 1e-9;

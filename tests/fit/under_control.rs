@@ -10,8 +10,8 @@ use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
 
-use crate::identified::analysed;
-use crate::simulated;
+use crate::fit::identified::analysed;
+use crate::fit::simulated;
 
 /// The default stage at 5 kHz.
 fn config(sets: &[&str]) -> Config {

@@ -5,8 +5,8 @@ use bench::identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
 use bench::model::plant::{self, ModalModel};
 use nalgebra::Complex;
 
-use crate::identified::{analysed, config, measurable, model, truth};
-use crate::synthetic::{frf_data, stage, term};
+use crate::fit::identified::{analysed, config, measurable, model, truth};
+use crate::fit::synthetic::{frf_data, stage, term};
 
 #[test]
 fn unknown_delay_is_measured_and_does_not_change_the_verdict() {
@@ -90,7 +90,7 @@ fn verdict_from_non_finite_numbers_is_undecided() {
     assert_eq!(verdict_from(&good, &with_zero, 3).cnmp, Cnmp::Undecided);
     // The same for a stage without CNMP zeros: an undefined phase must not lead to `excluded`.
     let minimum_phase = [term(29.0, 0.009, 0.47), term(82.0, 0.004, 0.03)];
-    let mut frf_data = crate::synthetic::frf_data(&minimum_phase, 0.0, 1e-9, 12);
+    let mut frf_data = crate::fit::synthetic::frf_data(&minimum_phase, 0.0, 1e-9, 12);
     let fit = fit(&frf_data, &MeasurementChain::Direct).expect("modes");
     assert_eq!(verdict_from(&fit, &frf_data, 2).cnmp, Cnmp::Excluded);
     frf_data[valley].response = Complex::new(0.0, 0.0);

@@ -2,7 +2,7 @@
 
 use bench::identify::{EstimatorSettings, Frf, LocalModel, Signals, local};
 
-use crate::stage::{self, SampledPlant};
+use crate::identify::stage::{self, SampledPlant};
 
 const BAND_HZ: (f64, f64) = (0.5, 450.0);
 

@@ -2,7 +2,7 @@
 
 use bench::identify::{EstimatorSettings, Frf, LocalModel, ResolutionPoint, Signals, local};
 
-use crate::stage::{self, Dice, RATE_HZ, SampledPlant};
+use crate::identify::stage::{self, Dice, RATE_HZ, SampledPlant};
 
 /// Modes R, u and v in hertz.
 const PEAKS_HZ: [f64; 3] = [29.27, 82.23, 85.78];

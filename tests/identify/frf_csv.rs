@@ -5,7 +5,7 @@ use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
 use bench::util::atomic_file::write_atomic;
 use nalgebra::Complex;
 
-use crate::stage;
+use crate::identify::stage;
 
 fn frf(responses: &[(f64, f64)]) -> Frf {
     let mut frf = Frf::default();

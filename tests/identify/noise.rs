@@ -2,7 +2,7 @@
 
 use bench::identify::{EstimatorSettings, Frf, PHASE_SIGMA_LIMIT_RAD, Signals, local};
 
-use crate::stage::{self, Dice, RATE_HZ};
+use crate::identify::stage::{self, Dice, RATE_HZ};
 
 fn estimate(signals: &Signals, band_hz: (f64, f64)) -> Frf {
     local::estimate(signals, band_hz, &EstimatorSettings::default()).unwrap()

@@ -2,7 +2,7 @@
 
 use bench::identify::{EstimatorSettings, Frf, Signals, local, repeated};
 
-use crate::stage::{self, Dice, RATE_HZ, SampledPlant};
+use crate::identify::stage::{self, Dice, RATE_HZ, SampledPlant};
 
 const BAND_HZ: (f64, f64) = (2.0, 60.0);
 const REPETITIONS: usize = 5;

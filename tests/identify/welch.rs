@@ -3,8 +3,8 @@
 use bench::identify::{Estimator, Signals, welch};
 use nalgebra::Complex;
 
-use crate::python;
-use crate::stage::{self, Dice, SampledPlant};
+use crate::identify::python;
+use crate::identify::stage::{self, Dice, SampledPlant};
 
 /// The stage with white input and probe noise: every bin of every spectrum has energy.
 fn noisy_run(samples: usize, noise_m: f64) -> Signals {

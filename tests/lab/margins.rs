@@ -5,7 +5,7 @@ use assert_cmd::Command;
 use nalgebra::Complex;
 use serde_json::Value;
 
-use crate::aliases::{lab, modes, response};
+use crate::lab::aliases::{lab, modes, response};
 
 /// Devices that do not exist in place of those of the profile `lab`, which this machine may have.
 const NO_DEVICES: [&str; 4] = [

@@ -5,8 +5,8 @@ use bench::model::plant::Mode;
 use bench::rig::simulated::modes as simulated_modes;
 use nalgebra::Complex;
 
-use crate::aliases::{lab, response};
-use crate::simulated;
+use crate::lab::aliases::{lab, response};
+use crate::lab::simulated;
 
 const QUIET: [&str; 4] = [
     "sim.floor=[]",

@@ -12,7 +12,7 @@ use bench::rt::arming::State;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
 use bench_hal::Validity;
 
-use crate::aliases::{lab, response};
+use crate::lab::aliases::{lab, response};
 
 /// Time from a scheduled tick to its start, in seconds.
 const WOKE_S: f64 = 10e-6;

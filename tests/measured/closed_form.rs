@@ -4,7 +4,7 @@ use bench::control::measured::{LoopPeaks, MeasuredLoop, MeasuredMargins};
 use bench::util::estimate::Estimate;
 use nalgebra::Complex;
 
-use crate::sampled::points;
+use crate::measured::sampled::points;
 
 /// Crossover k in rad/s and delay d in seconds.
 const K: f64 = 100.0;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use crate::program::{Bench, number};
+use crate::measured::program::{Bench, number};
 
 /// A chirp of 40 s on the simulated stage, its FRF and its recording.
 fn chirp(bench: &Bench) -> (String, String) {

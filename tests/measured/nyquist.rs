@@ -3,8 +3,8 @@
 use bench::control::measured::Stability;
 use bench::experiment::{MeasuredFrf, closed_loop, measured_margins};
 
-use crate::program::Draw;
-use crate::sampled::{config, frf};
+use crate::measured::program::Draw;
+use crate::measured::sampled::{config, frf};
 
 #[test]
 fn count_equals_the_number_of_unstable_eigenvalues() {

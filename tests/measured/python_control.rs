@@ -4,9 +4,9 @@ use bench::experiment::closed_loop;
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use serde_json::{Value, json};
 
-use crate::program::{Bench, near, number};
-use crate::sampled::{config, frf};
-use crate::truth;
+use crate::measured::program::{Bench, near, number};
+use crate::measured::sampled::{config, frf};
+use crate::measured::truth;
 
 const CASES: [&[&str]; 4] = [
     &["control.controller=fast"],

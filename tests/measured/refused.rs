@@ -6,8 +6,8 @@ use bench::experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
 use bench::identify::Frf;
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 
-use crate::program::Bench;
-use crate::sampled::{config, frf};
+use crate::measured::program::Bench;
+use crate::measured::sampled::{config, frf};
 
 const BAND_HZ: (f64, f64) = (0.1, 500.0);
 

@@ -8,7 +8,7 @@ use bench::rig::motor::{Moment, MotorOrigin};
 use bench::rt::thread::Pace;
 use bench_test_support::program::catches_interrupt;
 
-use crate::common::{LIMIT_A, hot, memory, refusal, run};
+use crate::motor::common::{LIMIT_A, hot, memory, refusal, run};
 
 /// Names the folder of a child process.
 const FOLDER: &str = "BENCH_TEST_MOTOR_FOLDER";

@@ -5,7 +5,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
 use bench::rt::thread::Pace;
 
-use crate::common::{LIMIT_A, hot};
+use crate::motor::common::{LIMIT_A, hot};
 
 #[test]
 fn warm_motor_trips_although_the_run_was_not_refused_and_replays_bit_for_bit() {

@@ -2,7 +2,7 @@
 use bench::experiment::{Runner, Setup};
 use bench::recording::Recording;
 
-use crate::common::{hot, run};
+use crate::motor::common::{hot, run};
 
 #[test]
 fn simulated_motor_carries_heat_from_run_to_run_and_is_never_refused() {

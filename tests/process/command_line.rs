@@ -5,7 +5,7 @@ use std::process::Stdio;
 use bench_test_support::program::{Bench, number};
 use serde_json::Value;
 
-use crate::common::bench;
+use crate::process::common::bench;
 
 #[test]
 fn quantities_accept_units_and_default_to_si() {

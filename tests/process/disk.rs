@@ -5,7 +5,7 @@ use std::process::{Command, Output, Stdio};
 use bench::recording::Recording;
 use bench::rt::record::flag;
 
-use crate::common::{
+use crate::process::common::{
     AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr, stdout, without_daemon,
 };
 

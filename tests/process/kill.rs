@@ -5,7 +5,7 @@ use bench::recording::Recording;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-use crate::common::{LongRun, Running, arguments_of, bench, recording_in, stderr};
+use crate::process::common::{LongRun, Running, arguments_of, bench, recording_in, stderr};
 
 /// Kills of each kind of run; `BENCH_KILLS` sets another number.
 const KILLS: u64 = 1;

@@ -7,7 +7,7 @@ use bench::recording::Recording;
 use bench::rt::record::TickRecord;
 use serde_json::Value;
 
-use crate::common::{AT_1_KHZ, bench, recording_in, stderr, stdout};
+use crate::process::common::{AT_1_KHZ, bench, recording_in, stderr, stdout};
 
 /// A chirp of 8 s at 1 kHz in virtual time; a chunk holds 100 ticks.
 fn chirp(folder: &Path) -> PathBuf {

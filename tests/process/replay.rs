@@ -6,7 +6,7 @@ use std::time::Duration;
 use bench::recording::{Header, Recorder, Recording};
 use bench::rt::record::{LoopMessage, TickRecord};
 
-use crate::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr};
+use crate::process::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr};
 
 fn replay(path: &Path) -> Output {
     bench(&["replay", "--json"])

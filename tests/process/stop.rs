@@ -6,7 +6,7 @@ use bench::recording::Recording;
 use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, RequestKind, TickRecord};
 
-use crate::common::{
+use crate::process::common::{
     LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks, without_daemon,
 };
 

@@ -8,7 +8,7 @@ use bench::identify::verdict::Cnmp;
 use bench::model::study::{Block, Plan, Shard, StudyFile};
 use bench::rig::motor::{Moment, MotorMemory};
 
-use crate::damage::check_damaged;
+use crate::random_inputs::damage::check_damaged;
 
 fn stage() -> Config {
     load(&Source::default()).expect("the profile is valid")

@@ -2,7 +2,7 @@
 
 use bench::control::{Domain, GainUnit, ImportOptions, import};
 
-use crate::damage::check_damaged;
+use crate::random_inputs::damage::check_damaged;
 
 #[test]
 fn damaged_file_of_another_program_is_refused_or_has_a_finite_response() {

@@ -5,7 +5,7 @@ use std::path::Path;
 use bench::identify::external_csv::{self, Columns, Sampling};
 use bench::identify::frf_csv;
 
-use crate::damage::{check_damaged, check_damaged_text};
+use crate::random_inputs::damage::{check_damaged, check_damaged_text};
 
 const FRF: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz\n\
 1.0,1e-4,-10.0,0.99,1e-7,0.1,0.5\n2.0,2e-4,-20.0,0.98,1e-7,0.1,0.5\n3.5,1e-3,-90.0,0.97,1e-7,0.1,0.5\n";

@@ -6,7 +6,7 @@ use bench::config::{Config, Source, load, whole};
 use bench::control::{ControllerText, LawInput};
 use bench::rig::calibration::{KnownDevices, load_calibration};
 
-use crate::damage::{check_damaged, check_damaged_text};
+use crate::random_inputs::damage::{check_damaged, check_damaged_text};
 
 const STAGE: &str = include_str!("../../bench-config/stage.toml");
 

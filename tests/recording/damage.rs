@@ -6,7 +6,7 @@ use bench::recording::{Header, MissingTicks, Recorder, Recording, RecordingError
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use proptest::prelude::*;
 
-use crate::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
+use crate::recording::common::{CONFIG, bits, events_of, header, run, ticks_of, write};
 
 /// 20 ms per tick: few ticks make many chunks, so that a large part of the file is structure.
 fn slow_run(ticks: u64) -> Vec<LoopMessage> {

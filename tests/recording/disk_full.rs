@@ -12,7 +12,7 @@ use bench::recording::{
 use bench::rt::record::LoopMessage;
 use rtrb::RingBuffer;
 
-use crate::common::{disk_with_room, header, tick};
+use crate::recording::common::{disk_with_room, header, tick};
 
 fn dev_full() -> File {
     OpenOptions::new()

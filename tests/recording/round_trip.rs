@@ -10,7 +10,7 @@ use bench::rt::record::{
 use bench::rt::tuning::{Factors, Tune};
 use bench_hal::Validity;
 
-use crate::common::{
+use crate::recording::common::{
     CONFIG, PERIOD_NS, STARTED_NS, bits, events_of, header, run, tick, ticks_of, write,
 };
 

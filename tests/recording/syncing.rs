@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use bench::recording::{Recorder, Recording, Syncable};
 use bench::rt::record::LoopMessage;
 
-use crate::common::{header, tick};
+use crate::recording::common::{header, tick};
 
 /// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(60);

@@ -5,7 +5,7 @@ use bench::recording::{Recorder, Recording, spawn};
 use bench::rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
 
-use crate::common::{disk_with_room, header, run, tick};
+use crate::recording::common::{disk_with_room, header, run, tick};
 
 #[test]
 fn recording_contains_all_messages_sent_before_the_loop_ended() {

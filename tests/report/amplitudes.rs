@@ -8,7 +8,7 @@ use bench::identify::modal::{Estimate, FittedMode};
 use bench::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench::report::{AmplitudeOverview, ReportError, amplitudes_svg};
 
-use crate::svg;
+use crate::report::svg;
 
 const SCALES: [f64; 3] = [0.25, 0.5, 1.0];
 

@@ -6,8 +6,8 @@ use bench::report::{
 };
 use nalgebra::Complex;
 
-use crate::pictures::flat;
-use crate::svg;
+use crate::report::pictures::flat;
+use crate::report::svg;
 
 /// The groups of plots.
 fn plots(svg: &str) -> Vec<&str> {

@@ -5,9 +5,11 @@ use bench::report::{Curve, ReportError, Trace, bode_svg};
 use nalgebra::Complex;
 use proptest::prelude::*;
 
-use crate::pictures::{self, bode, flat, frequencies, keep, measured, model, short_and_noisy};
-use crate::stage::SampledPlant;
-use crate::svg::{self, Words};
+use crate::report::pictures::{
+    self, bode, flat, frequencies, keep, measured, model, short_and_noisy,
+};
+use crate::report::stage::SampledPlant;
+use crate::report::svg::{self, Words};
 
 const MEASURED: &str = "#0072B2";
 const MODEL: &str = "#D55E00";

@@ -5,7 +5,7 @@ use bench::recording::Recording;
 use bench_test_support::program::Bench;
 use serde_json::{Value, json};
 
-use crate::truth;
+use crate::report::truth;
 
 const PLOTS: [&str; 6] = [
     "signals",

@@ -4,8 +4,8 @@ use bench::identify::{Frf, Unit};
 use bench::report::{Identification, MagnitudeAxis, Trace, identification_svg};
 use nalgebra::Complex;
 
-use crate::pictures::flat;
-use crate::svg;
+use crate::report::pictures::flat;
+use crate::report::svg;
 
 const RESIDUAL: &str = "data-name=\"residual of the fit\"";
 

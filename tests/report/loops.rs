@@ -6,8 +6,8 @@ use bench::control::{Crossing, Margins};
 use bench::report::{LoopPlot, loop_bode_svg};
 use nalgebra::Complex;
 
-use crate::pictures::frequencies;
-use crate::svg;
+use crate::report::pictures::frequencies;
+use crate::report::svg;
 
 const VERMILION: &str = "#D55E00";
 const CROSSOVER_HZ: f64 = 10.0;

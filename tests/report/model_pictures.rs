@@ -4,7 +4,7 @@ use bench::report::{CnmpMap, map_svg};
 use bench_test_support::program::Bench;
 use serde_json::json;
 
-use crate::{svg, truth};
+use crate::report::{svg, truth};
 
 /// A command with the labels of its axes and the number of its named curves.
 struct Drawn {

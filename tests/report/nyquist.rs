@@ -6,8 +6,8 @@ use bench::identify::{Frf, Unit};
 use bench::report::{Curve, Trace, coherence_svg, nyquist_svg};
 use nalgebra::Complex;
 
-use crate::pictures::flat;
-use crate::svg;
+use crate::report::pictures::flat;
+use crate::report::svg;
 
 const BLUE: &str = "#0072B2";
 

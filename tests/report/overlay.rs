@@ -3,8 +3,8 @@
 use bench::identify::Unit;
 use bench::report::{ReportError, StepCurve, overlay_bode_svg, overlay_steps_svg};
 
-use crate::pictures::{keep, measured, short_and_noisy};
-use crate::svg;
+use crate::report::pictures::{keep, measured, short_and_noisy};
+use crate::report::svg;
 
 const FIRST: &str = "#0072B2";
 const SECOND: &str = "#D55E00";

@@ -7,8 +7,8 @@ use bench::report::phase::{is_ambiguous, offset_deg, unwrapped_deg};
 use bench::report::{Trace, bode_svg, has_ambiguous_phase};
 use nalgebra::Complex;
 
-use crate::pictures::frequencies;
-use crate::svg;
+use crate::report::pictures::frequencies;
+use crate::report::svg;
 
 #[test]
 fn unwraps_a_falling_phase() {

@@ -7,7 +7,7 @@ use bench::identify::{EstimatorSettings, Frf, Signals, local};
 use bench::report::{Curve, Trace, bode_svg};
 use nalgebra::Complex;
 
-use crate::stage::{self, RATE_HZ, SampledPlant};
+use crate::report::stage::{self, RATE_HZ, SampledPlant};
 
 /// The response of a plant at given frequencies.
 pub fn model(plant: &SampledPlant, frequency_hz: &[f64]) -> Vec<Complex<f64>> {

@@ -6,8 +6,8 @@ use bench::report::{
 };
 use nalgebra::Complex;
 
-use crate::pictures::{flat, keep};
-use crate::svg;
+use crate::report::pictures::{flat, keep};
+use crate::report::svg;
 
 const BLUE: &str = "#0072B2";
 const VERMILION: &str = "#D55E00";

@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use bench_test_support::program::NO_DAEMON;
 use serde_json::{Value, json};
 
-use crate::{svg, truth};
+use crate::report::{svg, truth};
 
 /// A title with characters that must be escaped.
 const TITLE: &str = "a <b> & \"c\"";

@@ -17,8 +17,8 @@ use bench::rt::thread::Pace;
 use bench_hal::{Rig, Validity};
 use rtrb::{Consumer, RingBuffer};
 
-use crate::faulty_rig::Fault;
-use crate::rig::{
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{
     AmplifierCall, Bench, CurrentProgram, LoggedRig, StillRig, endless, interlocks, stage,
 };
 

@@ -10,8 +10,8 @@ use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::servo::Request;
 
-use crate::faulty_rig::{Fault, FaultyRig};
-use crate::rig::{Bench, stage};
+use crate::safety::faulty_rig::{Fault, FaultyRig};
+use crate::safety::rig::{Bench, stage};
 
 const ALWAYS: Range<u64> = 0..u64::MAX;
 

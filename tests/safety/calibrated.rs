@@ -5,8 +5,8 @@ use bench::rig::calibration::{
 use bench::rt::arming::Trip;
 use bench::rt::record::EventKind;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{AmplifierCall, Bench, endless, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{AmplifierCall, Bench, endless, stage};
 
 /// Tick in which a reading or a command changes.
 const AT: u64 = 100;

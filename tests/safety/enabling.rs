@@ -4,8 +4,8 @@ use bench::rt::record::{EventKind, Refusal, RequestKind};
 use bench::rt::servo::Request;
 use bench_hal::Validity;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{AmplifierCall, Bench, endless, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{AmplifierCall, Bench, endless, stage};
 
 /// Healthy ticks before the amplifier is enabled.
 const HEALTHY: u64 = 10;

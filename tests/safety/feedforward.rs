@@ -7,7 +7,7 @@ use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
 use bench::rt::tuning::{Factors, Tune};
 
-use crate::rig::{Bench, stage};
+use crate::safety::rig::{Bench, stage};
 
 /// A law with a constant current in amperes.
 struct ConstantLaw(f64);

@@ -17,7 +17,7 @@ use bench_hal::{
 };
 use rtrb::RingBuffer;
 
-use crate::rig::{CurrentProgram, StillRig, interlocks, stage};
+use crate::safety::rig::{CurrentProgram, StillRig, interlocks, stage};
 
 /// A clock with late ticks: (call, missed ticks).
 struct LateClock {

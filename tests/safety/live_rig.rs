@@ -21,8 +21,8 @@ use bench_hal::{
 };
 use rtrb::{Consumer, RingBuffer};
 
-use crate::faulty_rig::{Fault, FaultyRig};
-use crate::rig::{
+use crate::safety::faulty_rig::{Fault, FaultyRig};
+use crate::safety::rig::{
     AmplifierCall, CurrentProgram, Log, LoggedRig, StillRig, endless, interlocks, stage,
 };
 

@@ -11,8 +11,8 @@ use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
 use bench_hal::Validity;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{AmplifierCall, Bench, CurrentProgram, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{AmplifierCall, Bench, CurrentProgram, stage};
 
 /// Tick of the failure.
 const AT: u64 = 100;

@@ -6,7 +6,7 @@ use bench::rt::arming::Trip;
 use bench::rt::thread::Pace;
 use bench_hal::{Reading, Tick, Validity};
 
-use crate::rig::{interlocks, stage};
+use crate::safety::rig::{interlocks, stage};
 
 /// The first check of a reading at `position_m`, behind a mounting with this gain.
 fn checked(position_m: f64, gain: f64) -> Result<(), Trip> {

@@ -17,9 +17,9 @@ use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench_hal::Validity;
 
-use crate::calibrated::calibration;
-use crate::faulty_rig::{Fault, FaultyRig};
-use crate::rig::{Bench, stage};
+use crate::safety::calibrated::calibration;
+use crate::safety::faulty_rig::{Fault, FaultyRig};
+use crate::safety::rig::{Bench, stage};
 
 fn short_chirp(sweep: Sweep) -> Plan {
     let mut config: Config = stage();

@@ -6,7 +6,7 @@ use bench::experiment::{self, Plan};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 
-use crate::rig::stage;
+use crate::safety::rig::stage;
 
 fn control(controller: &str, seed: u64) -> Plan {
     let mut config = stage();

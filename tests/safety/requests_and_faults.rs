@@ -8,8 +8,8 @@ use bench_hal::Validity;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{AmplifierCall, Bench, CurrentProgram, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{AmplifierCall, Bench, CurrentProgram, stage};
 
 const TICKS: u64 = 80;
 
@@ -233,7 +233,7 @@ fn virtual_pace_loses_no_message_with_a_full_request_ring() {
         bench.request(Request::Stop);
     }
     bench.request(Request::Arm);
-    bench.request(Request::Start(crate::rig::endless(|_| 0.1)));
+    bench.request(Request::Start(crate::safety::rig::endless(|_| 0.1)));
     let before = bench.all.len();
     bench.tick();
     let published = bench.all.len() - before;

@@ -12,7 +12,7 @@ use bench::rt::program::Decision;
 use bench::rt::thread::Pace;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
-use crate::rig::interlocks;
+use crate::safety::rig::interlocks;
 
 /// 10 % of the travel limit of 900 um.
 const TRAVEL_M: f64 = 90e-6;

@@ -3,7 +3,7 @@ use bench::rt::arming::State;
 use bench::rt::servo::Request;
 use bench_hal::{Devices, DisplacementProbe, Reading, Tick};
 
-use crate::rig::{Bench, StillRig, endless, stage};
+use crate::safety::rig::{Bench, StillRig, endless, stage};
 
 /// A probe that counts from `first`, with as many bits as `mask` has.
 struct Counting {

@@ -10,8 +10,8 @@ use bench::rt::servo::Request;
 use bench::rt::settling::{Settling, SettlingStep};
 use bench_hal::Validity;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{Bench, CurrentProgram, endless, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{Bench, CurrentProgram, endless, stage};
 
 /// Three periods of the first mode of the stage, 22.87 Hz, at 5 kHz.
 const RAMP_TICKS: u64 = 656;

@@ -11,7 +11,7 @@ use bench::rt::servo::Request;
 use bench::rt::supervision::{ArmLease, StopFlags};
 use bench::rt::thread::Pace;
 
-use crate::rig::{AmplifierCall, Bench, Log, LoggedRig, endless, stage};
+use crate::safety::rig::{AmplifierCall, Bench, Log, LoggedRig, endless, stage};
 
 const RAMP_TICKS: u64 = 10;
 const LEASE_TICKS: u64 = 50;

@@ -14,7 +14,7 @@ use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench::rt::tuning::{Factors, Tune, TuneError};
 
-use crate::rig::{Bench, StillRig, endless, stage};
+use crate::safety::rig::{Bench, StillRig, endless, stage};
 
 const RAMP_TICKS: u64 = 500;
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use bench::config::Config;
 use bench::rt::arming::State;
 
-use crate::sequence::{Fault, Faults, Load, Order, TickInputs};
+use crate::state_machine::sequence::{Fault, Faults, Load, Order, TickInputs};
 
 /// Settings of a run.
 #[derive(Clone, Copy, Debug)]

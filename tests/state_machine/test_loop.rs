@@ -18,8 +18,8 @@ use bench_hal::{
 };
 use rtrb::{Consumer, RingBuffer};
 
-use crate::model::{Begun, RunSettings};
-use crate::sequence::{Fault, Faults, Load, Order, TickInputs};
+use crate::state_machine::model::{Begun, RunSettings};
+use crate::state_machine::sequence::{Fault, Faults, Load, Order, TickInputs};
 
 /// What the amplifier was told in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use crate::program::{Bench, near, number};
-use crate::truth;
+use crate::study::program::{Bench, near, number};
+use crate::study::truth;
 
 /// Section 2.2.4: all secondary masses of the XY stage within 15 %.
 pub const XY: &str = "model study --config xy --vary plant.secondary_mass_deviation.*=+-0.15";

@@ -1,7 +1,7 @@
 //! Study files: joining shards, continuing, and rejecting damaged files.
 
-use crate::figures::XY;
-use crate::program::Bench;
+use crate::study::figures::XY;
+use crate::study::program::Bench;
 
 const DRAWS: &str = "--draws 2600";
 
@@ -11,7 +11,7 @@ fn whole(bench: &Bench) -> String {
     answer.out
 }
 
-fn shard(bench: &Bench, shard: &str, file: &str) -> crate::program::Answer {
+fn shard(bench: &Bench, shard: &str, file: &str) -> crate::study::program::Answer {
     bench.run(&format!("{XY} {DRAWS} --shard {shard} --file {file}"))
 }
 

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::figures::XY;
-use crate::program::{Bench, catches_interrupt};
+use crate::study::figures::XY;
+use crate::study::program::{Bench, catches_interrupt};
 
 /// More draws than a test lets the program complete.
 const LONG: &str = "--draws 3000000 --threads 2";

@@ -2,8 +2,8 @@
 
 use serde_json::json;
 
-use crate::figures::{XY, list};
-use crate::program::{Bench, number};
+use crate::study::figures::{XY, list};
+use crate::study::program::{Bench, number};
 
 #[test]
 fn rejects_invalid_tolerances() {

@@ -1,7 +1,7 @@
 //! Tables as CSV and Parquet.
 
-use crate::figures::XY;
-use crate::program::Bench;
+use crate::study::figures::XY;
+use crate::study::program::Bench;
 
 #[test]
 fn csv_has_one_row_per_draw() {
@@ -58,8 +58,8 @@ fn rejects_parquet_without_the_feature() {
 #[cfg(feature = "parquet")]
 mod parquet {
     use super::*;
-    use crate::program::number;
-    use crate::truth;
+    use crate::study::program::number;
+    use crate::study::truth;
     use serde_json::json;
 
     #[test]

@@ -7,7 +7,7 @@ use bench::model::plant::Mode;
 use bench::util::progress::Progress;
 use nalgebra::{Complex, DVector};
 
-use crate::stage::{config, requirements};
+use crate::tune::stage::{config, requirements};
 
 /// A stiff mode: below half the sampling rate of 15,708 rad/s its response is its static compliance to 1e-4.
 fn stiff_plant() -> NamedPlant {

@@ -12,7 +12,7 @@ use bench::util::progress::Progress;
 use bench_test_support::chirp_source::{config_at, sampled, true_loop};
 use nalgebra::{DMatrix, DVector};
 
-use crate::stage::requirements;
+use crate::tune::stage::requirements;
 
 /// Noise of each component of a response in m/A: a thousandth of the static response of 1.5e-4 m/A.
 const SIGMA_M_PER_A: f64 = 1.5e-7;

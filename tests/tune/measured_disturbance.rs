@@ -5,7 +5,7 @@ use bench::experiment::tuning::recorded_disturbance;
 use bench::recording::Recording;
 use bench_test_support::program::Bench;
 
-use crate::stage::{config, options, requirements};
+use crate::tune::stage::{config, options, requirements};
 
 /// The recording of a run.
 fn recorded(bench: &Bench, command: &str) -> String {

@@ -6,7 +6,7 @@ use bench::model::plant::{ModalModel, Mode, build};
 use bench_test_support::chirp_source::{config_at, sampled};
 use nalgebra::{Complex, DVector};
 
-use crate::measured::designed;
+use crate::tune::measured::designed;
 
 const BAND_HZ: (f64, f64) = (1.0, 200.0);
 

@@ -18,7 +18,7 @@ use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 use bench_hal::Validity;
 
-use crate::faulty_rig::{Fault, FaultyRig};
+use crate::campaign::faulty_rig::{Fault, FaultyRig};
 
 /// The shortest chirp over all modes and the shortest quiet intervals, at 1 kHz.
 const SETS: [&str; 8] = [

@@ -19,7 +19,7 @@ use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::faults::*;
 use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Validity};
 
-use crate::rig::Bench;
+use crate::devices::rig::Bench;
 
 /// A tick of the bench of these tests is a millisecond.
 const PERIOD: Duration = Duration::from_millis(1);

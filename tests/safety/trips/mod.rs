@@ -9,8 +9,8 @@ use bench::rt::record::{EventKind, flag};
 use bench::rt::servo::Request;
 use bench_hal::Validity;
 
-use crate::faulty_rig::Fault;
-use crate::rig::{AmplifierCall, Bench, endless, stage};
+use crate::safety::faulty_rig::Fault;
+use crate::safety::rig::{AmplifierCall, Bench, endless, stage};
 
 /// Tick in which a fault begins.
 const AT: u64 = 100;

@@ -6,7 +6,7 @@
 //!
 //! `BENCH_SEQUENCES` and `BENCH_SEQUENCE_TICKS` set number and length of the sequences, `BENCH_RANDOM_SEED` their seed; all are printed:
 //!
-//! `BENCH_SEQUENCES=100000 BENCH_SEQUENCE_TICKS=10000 cargo test --release --test state_machine -- --nocapture`
+//! `BENCH_SEQUENCES=100000 BENCH_SEQUENCE_TICKS=10000 cargo test --release --test operation state_machine -- --nocapture`
 
 mod model;
 mod sequence;

@@ -1,4 +1,4 @@
 //! `bench calibrate`: its estimates, its file, and the effect of a calibration on a run.
 mod files;
-mod skewed_rig;
+pub mod skewed_rig;
 mod steps;

@@ -6,8 +6,5 @@ mod command;
 mod lower_margin;
 mod refused;
 mod refused_response;
-#[path = "../calibration/skewed_rig.rs"]
-#[allow(dead_code, reason = "only some errors of the devices are needed here")]
-mod skewed_rig;
 mod stage;
 mod stage_check;
