@@ -1,14 +1,18 @@
 //! Calls of the file system for clients. On a network folder whose server does not answer, a call may take for ever: it must block neither
 //! the tasks that serve clients nor the threads that serve runs.
 
-use std::sync::Arc;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use tokio::sync::Semaphore;
+use tokio::sync::oneshot;
 
-/// Calls at the same time. A call that does not return keeps its place.
-const CALLS: usize = 4;
-/// Time in which a call returns, with its wait for a place.
+/// Threads that make the calls. A call that does not return keeps its thread.
+const THREADS: usize = 4;
+/// Their stacks. The memory of the daemon is locked, also what a stack does not use.
+const STACK_BYTES: usize = 1 << 20;
+/// Time in which a call returns, with its wait for a thread.
 const ANSWER_TIME: Duration = Duration::from_secs(10);
 
 /// Why there is no result.
@@ -24,24 +28,39 @@ pub enum FolderError {
     Panicked,
 }
 
-/// The calls for clients.
+type Call = Box<dyn FnOnce() + Send>;
+
+/// The calls for clients. They have threads of their own: a pool that grows with the number of requests would let a flood of them cost
+/// a locked stack each.
 #[derive(Debug)]
 pub struct Files {
-    places: Arc<Semaphore>,
+    calls: Sender<Call>,
     answer_time: Duration,
 }
 
 impl Default for Files {
     fn default() -> Files {
+        let (calls, waiting) = channel();
+        let waiting = Arc::new(Mutex::new(waiting));
+        for _ in 0..THREADS {
+            let waiting = Arc::clone(&waiting);
+            let builder = std::thread::Builder::new().name("bench-files".into());
+            let begun = builder
+                .stack_size(STACK_BYTES)
+                .spawn(move || make_calls(&waiting));
+            if let Err(error) = begun {
+                tracing::error!("a thread for the calls of the file system was refused: {error}");
+            }
+        }
         Files {
-            places: Arc::new(Semaphore::new(CALLS)),
+            calls,
             answer_time: ANSWER_TIME,
         }
     }
 }
 
 impl Files {
-    /// The result of work on files, on a thread of its own.
+    /// The result of work on files.
     ///
     /// # Errors
     /// When it does not end in time; its thread is left alone.
@@ -49,24 +68,37 @@ impl Files {
         &self,
         work: impl FnOnce() -> T + Send + 'static,
     ) -> Result<T, FolderError> {
-        let done = async {
-            let place = Arc::clone(&self.places).acquire_owned().await;
-            let place = place.map_err(|_| FolderError::NoAnswer)?;
-            // The place returns with the result: then the thread is free for the next call. With the place given back by the call
-            // itself, the next call begins another thread, and the locked memory grows by a stack each time.
-            let done = tokio::task::spawn_blocking(move || (work(), place));
-            let (result, _place) = done.await.map_err(|_| FolderError::Panicked)?;
-            Ok(result)
-        };
-        let in_time = tokio::time::timeout(self.answer_time, done).await;
-        in_time.unwrap_or(Err(FolderError::NoAnswer))
+        let (answer, answered) = oneshot::channel();
+        let call = Box::new(move || {
+            // Nobody waits for the result of a call that was late already.
+            if !answer.is_closed() {
+                // What the work has changed is dropped with it.
+                let _ = answer.send(catch_unwind(AssertUnwindSafe(work)));
+            }
+        });
+        self.calls.send(call).map_err(|_| FolderError::NoAnswer)?;
+        match tokio::time::timeout(self.answer_time, answered).await {
+            Ok(Ok(Ok(result))) => Ok(result),
+            Ok(Ok(Err(_)) | Err(_)) => Err(FolderError::Panicked),
+            Err(_) => Err(FolderError::NoAnswer),
+        }
+    }
+}
+
+/// Makes the calls one after the other until nobody can send any.
+fn make_calls(waiting: &Mutex<Receiver<Call>>) {
+    loop {
+        let next = waiting
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .recv();
+        let Ok(call) = next else { return };
+        call();
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc::channel;
-
     use super::*;
 
     fn files(answer_time: Duration) -> Files {
@@ -80,9 +112,9 @@ mod tests {
     async fn calls_that_do_not_return_are_few_and_refused_in_time() {
         let files = files(Duration::from_millis(50));
         let (dead, blocked) = channel::<()>();
-        let blocked = Arc::new(std::sync::Mutex::new(blocked));
+        let blocked = Arc::new(Mutex::new(blocked));
         let (begun, begins) = channel();
-        for _ in 0..3 * CALLS {
+        for _ in 0..3 * THREADS {
             let (blocked, begun) = (Arc::clone(&blocked), begun.clone());
             let call = files.run(move || {
                 let _ = begun.send(());
@@ -90,13 +122,23 @@ mod tests {
             });
             assert_eq!(call.await, Err(FolderError::NoAnswer));
         }
-        assert!(begins.try_iter().count() <= CALLS, "threads are limited");
+        assert!(begins.try_iter().count() <= THREADS, "threads are limited");
         // The folder answers again: the calls return, and others are served.
         drop(dead);
         let patient = Files {
-            places: Arc::clone(&files.places),
+            calls: files.calls.clone(),
             answer_time: Duration::from_secs(60),
         };
         assert_eq!(patient.run(|| 7).await, Ok(7));
+    }
+
+    #[tokio::test]
+    async fn a_panic_is_an_error_and_its_thread_goes_on() {
+        let files = files(Duration::from_secs(60));
+        for _ in 0..2 * THREADS {
+            let failed = files.run(|| panic!("a call that fails")).await;
+            assert_eq!(failed, Err::<(), _>(FolderError::Panicked));
+        }
+        assert_eq!(files.run(|| 7).await, Ok(7));
     }
 }

@@ -28,6 +28,8 @@ use crate::experiment::{FeedSender, StopSignals};
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);
+/// Stack of each thread that serves clients. The memory of the daemon is locked, also what a stack does not use.
+const STACK_BYTES: usize = 1 << 20;
 /// Longest time without a tick for which the watchdog is still notified, because the devices are being opened.
 const OPENING: Duration = Duration::from_secs(15);
 
@@ -38,6 +40,7 @@ const OPENING: Duration = Duration::from_secs(15);
 pub fn serve(options: ServeOptions, started: impl FnOnce(&Started)) -> Result<(), ServeError> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
+        .thread_stack_size(STACK_BYTES)
         .enable_all()
         .build()
         .map_err(|error| ServeError::System(error.to_string()))?;

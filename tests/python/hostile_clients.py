@@ -65,7 +65,7 @@ class Daemon:
 
     def memory_mb(self):
         with open(f"/proc/{self.process.pid}/status") as status:
-            found = re.findall(r"(VmRSS|VmPeak):\s+(\d+)", status.read())
+            found = re.findall(r"(VmRSS|RssAnon):\s+(\d+)", status.read())
         return {name: int(kilobytes) / 1e3 for name, kilobytes in found}
 
 
