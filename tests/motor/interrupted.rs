@@ -27,11 +27,14 @@ fn folder_of_child() -> Option<PathBuf> {
     std::env::var_os(FOLDER).map(PathBuf::from)
 }
 
-/// Starts this program again with one test only.
+/// Starts this program again with one test of this module only.
 fn child(test: &str, folder: &Path) -> Child {
+    // A test is named by its path without the program.
+    let (_program, module) = module_path!().split_once("::").expect("a module");
+    let test = format!("{module}::{test}");
     let program = std::env::current_exe().expect("this program");
     let mut command = Command::new(program);
-    command.args(["--exact", test, "--test-threads", "1"]);
+    command.args(["--exact", test.as_str(), "--test-threads", "1"]);
     command.env(FOLDER, folder).stdout(Stdio::null());
     command.spawn().expect("it starts")
 }
@@ -68,7 +71,7 @@ fn killed_run_leaves_a_hot_motor() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = hot(folder.path());
     memory(&config).state_cold(&Moment::now()).expect("a file");
-    let mut child = child("interrupted::in_a_child_a_long_run", folder.path());
+    let mut child = child("in_a_child_a_long_run", folder.path());
     until("the start of the run", || {
         matches!(
             memory(&config).read(None, &Moment::now()).known,
@@ -108,7 +111,7 @@ fn in_a_child_a_wait() {
 #[test]
 fn signal_ends_the_wait_without_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mut child = child("interrupted::in_a_child_a_wait", folder.path());
+    let mut child = child("in_a_child_a_wait", folder.path());
     until("the wait", || catches_interrupt(child.id()));
     signal(&child, libc::SIGINT);
     assert!(child.wait().expect("it ends").success());
