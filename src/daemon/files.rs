@@ -10,8 +10,8 @@ use tokio::sync::oneshot;
 
 /// Threads that make the calls. A call that does not return keeps its thread.
 const THREADS: usize = 4;
-/// Their stacks. The memory of the daemon is locked, also what a stack does not use.
-const STACK_BYTES: usize = 1 << 20;
+/// Stack of a thread that serves clients. The memory of the daemon is locked, also what a stack does not use.
+pub const STACK_BYTES: usize = 1 << 20;
 /// Time in which a call returns, with its wait for a thread.
 const ANSWER_TIME: Duration = Duration::from_secs(10);
 
@@ -72,7 +72,7 @@ impl Files {
         let call = Box::new(move || {
             // Nobody waits for the result of a call that was late already.
             if !answer.is_closed() {
-                // What the work has changed is dropped with it.
+                // After a panic nobody sees what the call owned.
                 let _ = answer.send(catch_unwind(AssertUnwindSafe(work)));
             }
         });

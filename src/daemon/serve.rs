@@ -15,6 +15,7 @@ use super::api::{Reach, router};
 use super::connections::{serve_tcp, serve_unix};
 use super::descriptors::Capacity;
 use super::dispatch;
+use super::files::STACK_BYTES;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
 use super::ownership::Ownership;
@@ -28,8 +29,6 @@ use crate::experiment::{FeedSender, StopSignals};
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);
-/// Stack of each thread that serves clients. The memory of the daemon is locked, also what a stack does not use.
-const STACK_BYTES: usize = 1 << 20;
 /// Longest time without a tick for which the watchdog is still notified, because the devices are being opened.
 const OPENING: Duration = Duration::from_secs(15);
 
