@@ -189,7 +189,7 @@ const FAULTS: [(u32, &str, &str); 25] = [
     ),
     (
         SERVICE_HUNG,
-        "the thread that monitors the drive has not run for 20 ms",
+        "the thread that monitors the drive has not run within its time limit (20 ms by default)",
         "stop programs that use all processors, then clear the fault; if it remains, start the program again",
     ),
 ];
