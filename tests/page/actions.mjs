@@ -55,12 +55,3 @@ export async function clickStop(page) {
   const box = await page.locator("#stop").boundingBox();
   await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
 }
-
-/** Waits until a condition of the daemon is true. */
-export async function until(condition) {
-  const endMs = performance.now() + PATIENCE.timeout;
-  while (!await condition()) {
-    if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE.timeout} ms: ${condition}`);
-    await new Promise((done) => setTimeout(done, 50));
-  }
-}

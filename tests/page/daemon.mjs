@@ -15,6 +15,15 @@ const BROWSER = process.env.BENCH_BROWSER ?? "/usr/bin/chromium";
 /** A step that waits longer than this has failed. It is not a requirement. */
 export const PATIENCE_MS = 180_000;
 
+/** Waits until a condition is true. */
+export async function until(condition) {
+  const endMs = performance.now() + PATIENCE_MS;
+  while (!await condition()) {
+    if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE_MS} ms: ${condition}`);
+    await new Promise((done) => setTimeout(done, 50));
+  }
+}
+
 export class Daemon {
   constructor() {
     this.folder = mkdtempSync(join(tmpdir(), "bench-page-"));
@@ -62,17 +71,9 @@ export class Daemon {
   async cut() { await this.ask("POST", "/stop", { how: "cut" }); }
 
   /** Waits until a condition of the state is true. */
-  async until(condition) {
-    const endMs = performance.now() + PATIENCE_MS;
-    while (true) {
-      const state = await this.get("/state");
-      if (condition(state)) return;
-      if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE_MS} ms: ${condition}; ${JSON.stringify(state)}`);
-      await new Promise((done) => setTimeout(done, 50));
-    }
-  }
+  until(condition) { return until(async () => condition(await this.get("/state"))); }
 
-  /** Resumes, and closes a loop that holds the position until it is stopped. The lease is free afterwards. */
+  /** Resumes, and closes a loop that holds the position until it is stopped. The loop keeps the lease until its end. */
   async startLoop() {
     // The lease of a page that was closed expires.
     await this.until((state) => state.run === null && state.queue.length === 0 && state.lease === null);

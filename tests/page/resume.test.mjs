@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { PATIENCE, clickStop, startLoop, stateIs, textIs, until } from "./actions.mjs";
+import { PATIENCE, clickStop, startLoop, stateIs, textIs } from "./actions.mjs";
 import { Daemon, browser, openPage } from "./daemon.mjs";
 
 const DESK = { width: 1400, height: 900 };
@@ -25,7 +25,7 @@ test("a command that waits does not start after STOP, and starts after Resume", 
   const page = await openPage(chrome, daemon.url, DESK), viewer = await openPage(chrome, daemon.url, DESK);
   await startLoop(page);
   await page.click("#start"); // the same once more: it waits
-  await until(async () => (await daemon.get("/state")).queue.length === 1);
+  await daemon.until((state) => state.queue.length === 1);
   await clickStop(viewer);
   for (const each of [page, viewer]) {
     await each.waitForSelector("#held:not([hidden])", PATIENCE);

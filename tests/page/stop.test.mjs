@@ -2,8 +2,8 @@
 
 import assert from "node:assert/strict";
 import { after, afterEach, before, beforeEach, describe, test } from "node:test";
-import { PATIENCE, clickStop, startLoop, stateIs, stopsOf, takeLease, until } from "./actions.mjs";
-import { Daemon, browser, openPage } from "./daemon.mjs";
+import { PATIENCE, clickStop, startLoop, stateIs, stopsOf, takeLease } from "./actions.mjs";
+import { Daemon, browser, openPage, until } from "./daemon.mjs";
 import { Link } from "./link.mjs";
 
 const DESK = { width: 1400, height: 900 }, TABLET = { width: 900, height: 700 }, PHONE = { width: 390, height: 844 };
@@ -102,7 +102,7 @@ describe("the space bar stops while the focus is", () => {
 test("a space is typed into a text field while nothing moves, and only there", async () => {
   const page = await observer(), stops = stopsOf(page);
   await clickStop(page);
-  await until(async () => (await daemon.get("/state")).run === null);
+  await daemon.until((state) => state.run === null);
   await stateIs(page, "disarmed");
   const before = stops.length;
   await page.focus("#run-note");
@@ -252,7 +252,7 @@ describe("over a link", () => {
     assert.match(await page.textContent("#undelivered"), /not delivered .no connection.: use the switch of the supply/);
     assert.equal(await loopState(), "running");
     await link.open();
-    await until(async () => await loopState() === "disarmed");
+    await daemon.until((state) => state.loop.state === "disarmed");
     await isGone();
     await stateIs(page, "disarmed");
   });
@@ -265,7 +265,7 @@ describe("over a link", () => {
     assert.match(await page.textContent("#undelivered"), /no answer/);
     assert.equal(await loopState(), "running");
     link.thaw();
-    await until(async () => await loopState() === "disarmed");
+    await daemon.until((state) => state.loop.state === "disarmed");
     await isGone();
     await stateIs(page, "disarmed");
   });
@@ -290,7 +290,7 @@ describe("over a link", () => {
     await clickStop(page);
     await isShown();
     await isGone();
-    await until(async () => await loopState() === "disarmed");
+    await daemon.until((state) => state.loop.state === "disarmed");
   });
 
   test("that loses the acknowledgement the state shows that it is stopped", async () => {
@@ -298,7 +298,7 @@ describe("over a link", () => {
     await clickStop(page);
     await isShown();
     await isGone();
-    await until(async () => await loopState() === "disarmed");
+    await daemon.until((state) => state.loop.state === "disarmed");
   });
 
   test("whose connections are all occupied STOP is delivered", async () => {
