@@ -39,8 +39,8 @@ const HEAD_TIME: Duration = Duration::from_secs(15);
 const RESERVED_TIME: Duration = Duration::from_secs(5);
 /// Time in which a client takes a part of an answer.
 const WRITE_TIME: Duration = Duration::from_secs(20);
-/// Largest head of a request, and largest part of an answer that waits for the client, in bytes.
-const BUFFER_BYTES: usize = 16 << 10;
+/// Largest head of a request, and largest part of an answer that waits for the client, in bytes. The HTTP library permits no less.
+const BUFFER_BYTES: usize = 8 << 10;
 /// Time after which a peer that acknowledges nothing is given up, in milliseconds.
 const PEER_TIME_MS: u32 = 60_000;
 /// Idle time after which a peer is asked whether it is still there, in seconds.

@@ -10,6 +10,7 @@ mod dispatch;
 mod files;
 #[cfg(feature = "foxglove")]
 mod foxglove;
+mod heap;
 mod hold;
 pub mod http_client;
 mod lease;

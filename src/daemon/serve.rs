@@ -16,6 +16,7 @@ use super::connections::{serve_tcp, serve_unix};
 use super::descriptors::Capacity;
 use super::dispatch;
 use super::files::STACK_BYTES;
+use super::heap;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
 use super::ownership::Ownership;
@@ -37,6 +38,7 @@ const OPENING: Duration = Duration::from_secs(15);
 /// # Errors
 /// When the daemon cannot start.
 pub fn serve(options: ServeOptions, started: impl FnOnce(&Started)) -> Result<(), ServeError> {
+    heap::configure();
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .thread_stack_size(STACK_BYTES)

@@ -64,6 +64,16 @@ class Daemon:
         return answer.status, json.loads(text) if text else None
 
     def memory_mb(self):
+        """After a run of the loop: the smallest values within 3 s, from 5 s after its end on. The threads that analyse a run have a low
+        priority, and return its memory, some 8 MB, only after a while."""
+        time.sleep(5)
+        samples = []
+        for _ in range(30):
+            samples.append(self.memory_now_mb())
+            time.sleep(0.1)
+        return {name: min(sample[name] for sample in samples) for name in samples[0]}
+
+    def memory_now_mb(self):
         with open(f"/proc/{self.process.pid}/status") as status:
             found = re.findall(r"(VmRSS|RssAnon):\s+(\d+)", status.read())
         return {name: int(kilobytes) / 1e3 for name, kilobytes in found}
@@ -146,7 +156,7 @@ class Attack:
     def slow(self, address):
         """64 connections of each address: silent, with slow heads and bodies, and with answers that are not read."""
         heads = [
-            b"", b"P", b"GET /api/v1/state HTTP/1.1\r\nX: " + b"x" * 15_000,
+            b"", b"P", b"GET /api/v1/state HTTP/1.1\r\nX: " + b"x" * 7_500,  # a head may have 8 KiB
             b"POST /api/v1/lease HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100000\r\n\r\n" + b"{" * 1000,
             b"GET /api/v1/openapi.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 50,
             b"GET /api/v1/recordings HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 50,

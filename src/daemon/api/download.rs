@@ -19,7 +19,7 @@ use crate::daemon::shared::Daemon;
 use crate::experiment::ErrorKind;
 
 /// Bytes that are read at a time: what a client that takes nothing costs.
-const PART_BYTES: u64 = 16 << 10;
+const PART_BYTES: u64 = 8 << 10;
 
 /// A file that is open.
 pub struct OpenFile {
