@@ -5,6 +5,7 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::*;
+use crate::daemon::hold::HoldCause;
 use crate::daemon::run_entry::{Command, OnDisconnect};
 
 /// What may happen.
@@ -208,6 +209,17 @@ impl Bench {
             tripped_by: trips.then(|| "the interlock travel".into()),
         };
         self.schedule.end_run(id, ended, self.now);
+    }
+
+    /// A settling stop by somebody, or a trip of the command that has its turn.
+    fn hold(&mut self, cause: HoldCause, by: &str) {
+        match cause {
+            HoldCause::Stop => drop(self.schedule.stop_bench(StopKind::Settle, by, self.now)),
+            HoldCause::Trip => {
+                let id = self.open_id(0).expect("a command");
+                self.schedule.trip(id, by.into(), self.now);
+            }
+        }
     }
 
     /// The rules of the module.
@@ -425,6 +437,25 @@ fn settling_twice_does_not_cut_and_a_cut_raises_both_flags() {
     assert_eq!(raised(&[Settle, Settle, Settle]), 1);
     assert_eq!(raised(&[Cut]), 2);
     assert_eq!(raised(&[Settle, Cut]), 2);
+}
+
+#[test]
+fn first_cause_of_a_hold_remains() {
+    use HoldCause::{Stop, Trip};
+    for first in [Stop, Trip] {
+        for second in [Stop, Trip] {
+            let mut bench = Bench::new();
+            bench.take(&Step::Attach(0, Command::Control));
+            bench.take(&Step::Advance);
+            bench.take(&Step::BeginRun);
+            bench.hold(first, "the first");
+            let held = bench.schedule.hold().cloned().expect("a hold");
+            assert_eq!((held.cause, held.by.as_str()), (first, "the first"));
+            bench.now.unix_s += 1.0;
+            bench.hold(second, "the second");
+            assert_eq!(bench.schedule.hold(), Some(&held), "{first:?}, {second:?}");
+        }
+    }
 }
 
 #[test]
