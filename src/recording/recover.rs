@@ -6,6 +6,7 @@ use std::path::Path;
 use super::losses::{Cut, DamagedRange, MissingTicks};
 use super::reader::Recording;
 use super::{CONFIG_ATTACHMENT, Header, RECOVERED, Recorder, RecordingError, Totals};
+use crate::util::locked::{Locked, NotLocked};
 
 /// The result of a recovery.
 #[derive(Debug)]
@@ -78,13 +79,16 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
 }
 
 /// The file, locked against a writer; `None` if it cannot be opened or locked, which reading it reports.
-fn not_in_use(path: &Path) -> Result<Option<File>, RecordingError> {
+fn not_in_use(path: &Path) -> Result<Option<Locked>, RecordingError> {
     let Ok(file) = File::open(path) else {
         return Ok(None);
     };
-    match file.try_lock_shared() {
-        Err(TryLockError::WouldBlock) => Err(RecordingError::InUse { path: path.into() }),
-        Ok(()) | Err(TryLockError::Error(_)) => Ok(Some(file)),
+    match Locked::shared(file) {
+        Ok(locked) => Ok(Some(locked)),
+        Err(NotLocked { error, .. }) => match error {
+            TryLockError::WouldBlock => Err(RecordingError::InUse { path: path.into() }),
+            TryLockError::Error(_) => Ok(None),
+        },
     }
 }
 

@@ -23,6 +23,7 @@ use super::timing::{Quantiles, Tally};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
 use crate::rt::clock::scheduled_ns;
 use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use crate::util::locked::Locked;
 
 /// A chunk is closed and written at every multiple of this scheduled time, at any rate: if the process is killed, at most
 /// 0.2 s is lost, the chunk and what is on the way to it. At 5 kHz a chunk holds 500 ticks, about 52 kB before compression.
@@ -94,7 +95,7 @@ pub struct Recorder {
     last_log_ns: u64,
     syncing: Option<Syncing>,
     /// Shows other processes that the file is being written; `None` if it is not a file.
-    in_use: Option<File>,
+    in_use: Option<Locked>,
     chunk_ends_ns: u64,
     encoded: Vec<u8>,
     account: Continuity,
@@ -330,11 +331,11 @@ impl Recorder {
     }
 }
 
-/// Locks a file that is being written (`flock`; the kernel releases it when the process ends). The lock has a descriptor of its own, so
+/// Locks a file that is being written (the kernel releases the lock when the process ends). The lock has a descriptor of its own, so
 /// that it ends with the recorder and not with the thread that syncs. A file system without locks is no reason not to record.
-fn mark_in_use(path: &Path) -> Option<File> {
+fn mark_in_use(path: &Path) -> Option<Locked> {
     let file = File::open(path).ok()?;
-    file.try_lock().ok().map(|()| file)
+    Locked::exclusive(file).ok()
 }
 
 /// Chunks are completed in memory and appended to the file without seeking, so that only the last chunk of a cut file can be

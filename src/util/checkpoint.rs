@@ -1,7 +1,7 @@
 //! Files that hold completed work, so that an interrupted command can continue.
 //!
-//! While a process works on such a file or folder it holds a lock on it. The operating system releases the lock however
-//! the process ends. Work is continued only with the settings that it was started with: [`differences`] names each setting
+//! While a process works on such a file or folder it holds a [lock](super::locked) on it. The operating system releases the lock
+//! however the process ends. Work is continued only with the settings that it was started with: [`differences`] names each setting
 //! that differs.
 //!
 //! A [`RecordFile`] is appended line by line, each line `CHECKSUM JSON`. The first line is the header. The checksum
@@ -16,6 +16,7 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::input_file::{self, MAX_RECORD_BYTES};
+use super::locked::{Locked, NotLocked};
 
 /// The step that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,24 +75,21 @@ impl FileError {
 }
 
 /// Locks a file or folder for this process alone.
-pub fn lock(file: &File, path: &Path) -> Result<(), FileError> {
-    check_lock(file.try_lock(), path)
+pub fn lock(file: File, path: &Path) -> Result<Locked, FileError> {
+    Locked::exclusive(file).map_err(|refused| lock_error(refused, path))
 }
 
 /// Locks a file for reading: other readers may hold it too, a writer may not.
-pub fn lock_for_reading(file: &File, path: &Path) -> Result<(), FileError> {
-    check_lock(file.try_lock_shared(), path)
+fn lock_for_reading(file: File, path: &Path) -> Result<Locked, FileError> {
+    Locked::shared(file).map_err(|refused| lock_error(refused, path))
 }
 
-fn check_lock(locked: Result<(), TryLockError>, path: &Path) -> Result<(), FileError> {
-    match locked {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(FileError::new(
-            FileAction::Use,
-            path,
-            &"another `bench` is using it",
-        )),
-        Err(TryLockError::Error(e)) => Err(FileError::new(FileAction::Lock, path, &e)),
+fn lock_error(refused: NotLocked, path: &Path) -> FileError {
+    match refused.error {
+        TryLockError::WouldBlock => {
+            FileError::new(FileAction::Use, path, &"another `bench` is using it")
+        }
+        TryLockError::Error(e) => FileError::new(FileAction::Lock, path, &e),
     }
 }
 
@@ -149,7 +147,7 @@ fn compare_entry(
 /// An open file of records, locked for this process.
 #[derive(Debug)]
 pub struct RecordFile {
-    file: File,
+    file: Locked,
     path: String,
     header: String,
 }
@@ -159,7 +157,7 @@ impl RecordFile {
     pub fn open(path: &Path, header: String) -> Result<(RecordFile, Vec<u8>), FileError> {
         let file = input_file::open_or_create(path)
             .map_err(|e| FileError::new(FileAction::Open, path, &e))?;
-        lock(&file, path)?;
+        let file = lock(file, path)?;
         let content = read(&file, path)?;
         let path = path.display().to_string();
         Ok((RecordFile { file, path, header }, content))
@@ -185,7 +183,7 @@ impl RecordFile {
     /// Keeps the first `bytes` of the file and continues behind them.
     pub fn truncate(&mut self, bytes: u64) -> Result<(), FileError> {
         let shortened = self.file.set_len(bytes);
-        let moved = shortened.and_then(|()| self.file.seek(SeekFrom::Start(bytes)));
+        let moved = shortened.and_then(|()| (&*self.file).seek(SeekFrom::Start(bytes)));
         moved.map(drop).map_err(|e| self.failed_to_write(&e))
     }
 
@@ -201,7 +199,7 @@ impl RecordFile {
     }
 
     fn write(&mut self, line: &str) -> Result<(), FileError> {
-        let written = self.file.write_all(line.as_bytes());
+        let written = (&*self.file).write_all(line.as_bytes());
         written.map_err(|e| self.failed_to_write(&e))
     }
 
@@ -213,7 +211,7 @@ impl RecordFile {
 /// The content of a file of records that another process may be reading as well.
 pub fn read_records(path: &Path) -> Result<Vec<u8>, FileError> {
     let file = input_file::open(path).map_err(|e| FileError::new(FileAction::Open, path, &e))?;
-    lock_for_reading(&file, path)?;
+    let file = lock_for_reading(file, path)?;
     read(&file, path)
 }
 

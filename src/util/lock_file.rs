@@ -1,5 +1,5 @@
-//! Lock files: one process owns a thing, and others learn which one. The lock is `flock` on the open file, so that the kernel releases it
-//! when the process ends for any reason. Processes that it starts do not inherit the file (O_CLOEXEC).
+//! Lock files: one process owns a thing, and others learn which one. The [lock](super::locked) is on the open file, so that the kernel
+//! releases it when the process ends for any reason. Processes that it starts do not inherit the file (O_CLOEXEC).
 
 use std::fmt;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -11,6 +11,7 @@ use std::time::SystemTime;
 use serde::{Deserialize, Serialize};
 
 use super::atomic_file::sync_folder;
+use super::locked::{Locked, NotLocked};
 use super::timestamp;
 
 /// Attempts to open a file that other processes create and remove at the same time.
@@ -70,7 +71,7 @@ fn holder_text(holder: Option<&Holder>) -> String {
 #[derive(Debug)]
 pub struct LockFile {
     path: PathBuf,
-    file: File,
+    file: Locked,
     was_left: bool,
     is_kept: bool,
 }
@@ -83,7 +84,7 @@ impl LockFile {
     pub fn take(path: &Path, holder: &Holder) -> Result<LockFile, LockError> {
         for _ in 0..ATTEMPTS {
             let (file, was_left) = open(path)?;
-            lock(&file)?;
+            let file = lock(file)?;
             // The process before may have removed the file after it was opened here: then the lock is on no file of this name.
             if is_file_at(path, &file) {
                 write(&file, path, holder)?;
@@ -148,19 +149,18 @@ fn of_another_user(path: &Path, denied: io::Error) -> LockError {
     let opened = options
         .custom_flags(libc::O_NOFOLLOW | libc::O_NONBLOCK)
         .open(path);
-    let locked = opened.map_err(LockError::Io).and_then(|file| lock(&file));
+    let locked = opened.map_err(LockError::Io).and_then(lock);
     match locked {
         Err(held @ LockError::Held(_)) => held,
-        Err(LockError::Io(_)) | Ok(()) => denied.into(),
+        Err(LockError::Io(_)) | Ok(_) => denied.into(),
     }
 }
 
-fn lock(file: &File) -> Result<(), LockError> {
-    match file.try_lock() {
-        Ok(()) => Ok(()),
-        Err(TryLockError::WouldBlock) => Err(LockError::Held(read(file))),
-        Err(TryLockError::Error(error)) => Err(error.into()),
-    }
+fn lock(file: File) -> Result<Locked, LockError> {
+    Locked::exclusive(file).map_err(|NotLocked { file, error }| match error {
+        TryLockError::WouldBlock => LockError::Held(read(&file)),
+        TryLockError::Error(error) => error.into(),
+    })
 }
 
 fn read(file: &File) -> Option<Holder> {

@@ -7,6 +7,7 @@ pub mod estimate;
 pub mod finding;
 pub mod input_file;
 pub mod lock_file;
+pub mod locked;
 pub mod nearest;
 pub mod numeric;
 pub mod progress;

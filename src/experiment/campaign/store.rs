@@ -20,6 +20,7 @@ use crate::config::Config;
 use crate::util::atomic_file::write_durable;
 use crate::util::checkpoint::{FileAction, checksum, differences, lock};
 use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
+use crate::util::locked::Locked;
 
 const FORMAT: &str = "bench campaign 1";
 /// Largest number of differences that are listed.
@@ -78,7 +79,7 @@ pub struct Store {
     /// Checksum of the settings.
     campaign: String,
     /// Holds the lock.
-    _lock: File,
+    _lock: Locked,
 }
 
 /// A folder with the finished points that it holds.
@@ -109,7 +110,7 @@ impl Store {
         std::fs::create_dir_all(&points)
             .map_err(|e| file_error(FileAction::Create, &points, &e))?;
         let held = File::open(folder).map_err(|e| file_error(FileAction::Open, folder, &e))?;
-        lock(&held, folder)?;
+        let held = lock(held, folder)?;
         let header = json(&Header {
             format: FORMAT,
             version: env!("CARGO_PKG_VERSION"),
