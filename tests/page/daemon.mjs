@@ -1,7 +1,7 @@
 // A daemon on the simulated stage for a test, and a browser.
 
 import { spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, readdirSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { chromium } from "playwright-core";
@@ -22,6 +22,23 @@ export async function until(condition) {
     if (performance.now() > endMs) throw new Error(`not true after ${PATIENCE_MS} ms: ${condition}`);
     await new Promise((done) => setTimeout(done, 50));
   }
+}
+
+/** Name and state of each thread of a process that is neither stopped (T) nor ended (Z, X). */
+function runningThreads(pid) {
+  const running = [];
+  for (const thread of readdirSync(`/proc/${pid}/task`)) {
+    let stat;
+    try {
+      stat = readFileSync(`/proc/${pid}/task/${thread}/stat`, "utf8");
+    } catch {
+      continue; // it has ended
+    }
+    // The name, in parentheses, may contain any character.
+    const [, name, state] = /\((.*)\) (.)/s.exec(stat);
+    if (!"TZX".includes(state)) running.push(`${name} (${state})`);
+  }
+  return running;
 }
 
 export class Daemon {
@@ -55,6 +72,21 @@ export class Daemon {
     this.process.kill(signal);
     await this.ended;
   }
+
+  /** Stops every thread. SIGSTOP returns before they are stopped, and one that still runs may answer a request. */
+  async freeze() {
+    const { pid } = this.process;
+    this.process.kill("SIGSTOP");
+    const endMs = performance.now() + PATIENCE_MS;
+    let running = runningThreads(pid);
+    while (running.length > 0) {
+      if (performance.now() > endMs) throw new Error(`threads of process ${pid} still run ${PATIENCE_MS} ms after SIGSTOP: ${running.join(", ")}`);
+      await new Promise((done) => setTimeout(done, 1));
+      running = runningThreads(pid);
+    }
+  }
+
+  thaw() { this.process.kill("SIGCONT"); }
 
   /** A request with the token, and with an arm lease if one is given; its answer, null if it has no body. */
   async ask(method, path, body, lease) {

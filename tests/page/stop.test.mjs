@@ -319,13 +319,13 @@ describe("over a link", () => {
 
 test("a daemon that is frozen: STOP is repeated until it is delivered", async () => {
   const page = await observer();
-  daemon.process.kill("SIGSTOP");
   try {
+    await daemon.freeze();
     await page.keyboard.press("Escape");
     await page.waitForSelector("#undelivered:not([hidden])", PATIENCE);
     await stateIs(page, "unknown");
   } finally {
-    daemon.process.kill("SIGCONT");
+    daemon.thaw();
   }
   await page.waitForSelector("#undelivered", { ...PATIENCE, state: "hidden" });
   await stateIs(page, "disarmed");
