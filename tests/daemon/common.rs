@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
+use bench_test_support::program::until_frozen;
+use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
@@ -253,9 +255,19 @@ impl Drop for Daemon {
     }
 }
 
-pub fn signal(child: &Child, signal: nix::sys::signal::Signal) {
+pub fn signal(child: &Child, signal: Signal) {
     let pid = nix::unistd::Pid::from_raw(i32::try_from(child.id()).expect("a process number"));
     nix::sys::signal::kill(pid, signal).expect("the process runs");
+}
+
+/// Stops every thread of a process until [`thaw`]. A process that has ended stays so.
+pub fn freeze(child: &Child) {
+    signal(child, Signal::SIGSTOP);
+    until_frozen(child.id());
+}
+
+pub fn thaw(child: &Child) {
+    signal(child, Signal::SIGCONT);
 }
 
 /// `bench` without a daemon.

@@ -8,7 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
-use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, signal};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, freeze, signal};
 
 /// Sequences in a test run, some 10 s each; `BENCH_HELD_SEQUENCES` for more.
 const SEQUENCES: u64 = 4;
@@ -124,10 +124,14 @@ impl Bench {
             return;
         }
         let which = self.below(self.terminals.len());
-        let kind = [Signal::SIGKILL, Signal::SIGSTOP][self.below(2)];
-        let ended = self.terminals[which].try_wait().expect("a process");
-        if ended.is_none() {
-            signal(&self.terminals[which], kind);
+        let is_killed = self.below(2) == 0;
+        let terminal = &mut self.terminals[which];
+        if terminal.try_wait().expect("a process").is_some() {
+            return;
+        }
+        match is_killed {
+            true => signal(terminal, Signal::SIGKILL),
+            false => freeze(terminal),
         }
     }
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use serde_json::{Value, json};
 
-use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, signal};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, freeze, signal, thaw};
 
 const SLOW: [&str; 5] = ["--slow", "--duration", "60s", "--pace", "realtime"];
 /// A closed loop that is unstable with this asymmetry, so that an interlock trips.
@@ -202,7 +202,7 @@ fn suspended_command_leaves_no_run_and_no_taken_bench() {
     let daemon = Daemon::start();
     let mut command = terminal(&daemon, "anna", &[&["control"], &SLOW[..]].concat());
     daemon.wait("running", "", is_running);
-    signal(&command, Signal::SIGSTOP);
+    freeze(&command);
     daemon.wait("the loop ends by its lease", "", |state| {
         state["loop"]["state"] == "disarmed"
     });
@@ -213,7 +213,7 @@ fn suspended_command_leaves_no_run_and_no_taken_bench() {
     let id = daemon.start_run(&lease, "control", &["--slow", "--duration", "1s"]);
     assert_eq!(daemon.wait_for_end(id, &lease)["outcome"], "completed");
     // The command continues, and its results complete its recording.
-    signal(&command, Signal::SIGCONT);
+    thaw(&command);
     assert_eq!(command.wait().expect("it ends").code(), Some(1));
 }
 
@@ -236,7 +236,7 @@ fn stop_frees_the_bench_of_a_suspended_command_before_and_after_its_run() {
     ];
     let mut command = terminal(&daemon, "anna", &chirp);
     daemon.wait("running", "", is_running);
-    signal(&command, Signal::SIGSTOP);
+    freeze(&command);
     let state = daemon.wait("analysing", "", |state| {
         state["run"]["phase"] == "analysing"
     });

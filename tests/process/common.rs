@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bench::recording::Recording;
 use bench::rt::record::TickRecord;
-use bench_test_support::program::NO_DAEMON;
+use bench_test_support::program::{NO_DAEMON, until_frozen};
 
 /// A test that waits longer than this has failed. It is not a requirement.
 const TIME_LIMIT: Duration = Duration::from_secs(120);
@@ -103,6 +103,16 @@ impl Running {
         // SAFETY: a child that was not waited for yet, so its id is not reused.
         let result = unsafe { libc::kill(self.pid(), signal) };
         assert_eq!(result, 0, "{}", std::io::Error::last_os_error());
+    }
+
+    /// Stops every thread of the program until [`Running::thaw`].
+    pub fn freeze(&self) {
+        self.signal(libc::SIGSTOP);
+        until_frozen(self.pid().unsigned_abs());
+    }
+
+    pub fn thaw(&self) {
+        self.signal(libc::SIGCONT);
     }
 
     /// Number of sleeps of the loop's thread: at most one for each started tick, and a few before the first tick.

@@ -31,9 +31,9 @@ fn real_time_run_with_missed_ticks_exits_with_3_and_replays_bit_for_bit() {
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
     // The process is paused for about 50 ms: about 50 ticks at 1 kHz are missed.
-    running.signal(libc::SIGSTOP);
+    running.freeze();
     std::thread::sleep(Duration::from_millis(50));
-    running.signal(libc::SIGCONT);
+    running.thaw();
     let output = running.end();
     let report = json(&output);
     assert_eq!(
@@ -79,9 +79,9 @@ fn more_missed_ticks_than_allowed_trip_and_exit_with_1() {
     .concat();
     let mut running = Running::start(&arguments, folder.path());
     running.until_slept(800);
-    running.signal(libc::SIGSTOP);
+    running.freeze();
     std::thread::sleep(Duration::from_secs(2));
-    running.signal(libc::SIGCONT);
+    running.thaw();
     let output = running.end();
     let report = json(&output);
     assert_eq!(

@@ -2,13 +2,16 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use tempfile::TempDir;
 
 /// Variable and value with which `bench` finds no daemon: a daemon of this machine makes no runs of tests.
 pub const NO_DAEMON: (&str, &str) = ("BENCH_SOCKET", "/nonexistent/bench.sock");
+
+/// A process that does not stop within this time has failed. It is not a requirement.
+const FREEZE_LIMIT: Duration = Duration::from_secs(120);
 
 /// A program with a temporary working folder.
 pub struct Bench {
@@ -178,6 +181,44 @@ pub fn catches_interrupt(process: u32) -> bool {
     let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
     let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
     mask.is_some_and(|mask| mask & 0b10 != 0)
+}
+
+/// Waits until every thread of a process that got SIGSTOP is stopped or has ended. The signal returns before they are, and a thread that
+/// still runs may answer a client or write a file.
+pub fn until_frozen(process: u32) {
+    let begun = Instant::now();
+    loop {
+        let running = running_threads(process);
+        if running.is_empty() {
+            return;
+        }
+        assert!(
+            begun.elapsed() < FREEZE_LIMIT,
+            "threads of process {process} still run {FREEZE_LIMIT:?} after SIGSTOP: {}",
+            running.join(", ")
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Name and state of each thread of a process that is neither stopped (`T`) nor ended (`Z`, `X`) [Linux, proc_pid_stat(5)].
+fn running_threads(process: u32) -> Vec<String> {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task"));
+    let threads = threads.into_iter().flatten().flatten();
+    // A thread whose file is missing has ended.
+    let stats =
+        threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("stat")).ok());
+    let states = stats.filter_map(|stat| thread_state(&stat));
+    states
+        .filter(|(_, state)| !matches!(state, 'T' | 'Z' | 'X'))
+        .map(|(name, state)| format!("{name} ({state})"))
+        .collect()
+}
+
+/// The name in parentheses, which may contain any character, and the state behind it.
+fn thread_state(stat: &str) -> Option<(String, char)> {
+    let (begin, end) = stat.split_once('(')?.1.rsplit_once(") ")?;
+    Some((begin.into(), end.chars().next()?))
 }
 
 /// A number of an answer.
