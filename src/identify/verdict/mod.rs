@@ -22,6 +22,8 @@ mod input;
 mod phase_check;
 mod phase_drop;
 mod sign_groups;
+#[cfg(test)]
+mod tests;
 mod zeros;
 
 pub(crate) use information::{DecisiveQuantity, decisive_quantities};
