@@ -313,4 +313,27 @@ mod tests {
         assert!((found.crossings[0].rad_s - w0 * 0.99f64.sqrt()).abs() < 1e-3);
         assert!((found.crossings[1].rad_s - w0 * 1.01f64.sqrt()).abs() < 1e-3);
     }
+
+    #[test]
+    fn gain_margin_is_that_of_smallest_magnitude_whether_the_gain_may_rise_or_fall_by_it() {
+        // L = k (s + 1)^2/(s^3 (s/6 + 1)^2): arg L = -270 deg + 2 (atan w - atan w/6) is -180 deg where w (1 - 1/6) = 1 + w^2/6, at w = 2
+        // and w = 3. There |L| = k (1 + w^2)/(w^3 (1 + w^2/36)) is 9/16 k and 8/27 k.
+        for (k, nearest_rad_s, nearest) in [(3.0, 3.0, 24.0 / 27.0), (2.0, 2.0, 18.0 / 16.0)] {
+            let l = |w: f64| {
+                let s = Complex::new(0.0, w);
+                let pole = s / 6.0 + 1.0;
+                (s + 1.0) * (s + 1.0) / (s * s * s * pole * pole) * k
+            };
+            let found = of(&l, &grid(1e-2, 1e3, &[]));
+            let gain_margin_db = -20.0 * libm::log10(nearest);
+            // The crossings are refined to some 1e-10 of their frequency.
+            assert!((found.gain_margin_db.unwrap() - gain_margin_db).abs() < 1e-8);
+            assert!((found.gain_margin_rad_s.unwrap() - nearest_rad_s).abs() < 1e-8);
+            let lower_db = -20.0 * libm::log10(9.0 / 16.0 * k);
+            let upper_db = -20.0 * libm::log10(8.0 / 27.0 * k);
+            assert!(lower_db < 0.0 && upper_db > 0.0);
+            assert!((found.lower_gain_margin_db.unwrap() - lower_db).abs() < 1e-8);
+            assert!((found.upper_gain_margin_db.unwrap() - upper_db).abs() < 1e-8);
+        }
+    }
 }

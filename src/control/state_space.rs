@@ -186,4 +186,21 @@ mod tests {
             assert!((cascade.response(z) - expected).norm() < 1e-12 * expected.norm());
         }
     }
+
+    #[test]
+    fn closed_poles_are_the_zeros_of_one_plus_the_response() {
+        // 1 + D + b c/(z - a) is zero at z = a - b c/(1 + D): -1 - 6/1.5 = -5.
+        let first = StateSpace::new(&[-1.0], &[2.0], &[3.0], 0.5);
+        let poles = first.closed_poles().unwrap();
+        assert!(poles.len() == 1 && (poles[0] + 5.0).norm() < 1e-14);
+        // 1 + N/M is zero where N + M is: 2.4 z^2 - 2.7 z + 1.1.
+        let second = StateSpace::from(&Biquad::new([0.4, -0.3, 0.2], [2.0, -2.4, 0.9]));
+        let poles = second.closed_poles().unwrap();
+        let [a, b] = poles.as_slice() else {
+            panic!("{poles:?}");
+        };
+        // Rounding of a matrix of order 2.
+        assert!((a + b - 2.7 / 2.4).norm() < 1e-14, "{poles:?}");
+        assert!((a * b - 1.1 / 2.4).norm() < 1e-14, "{poles:?}");
+    }
 }
