@@ -75,3 +75,57 @@ impl Lease {
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MILLISECOND: Duration = Duration::from_millis(1);
+
+    fn lease(keeper: Keeper) -> Lease {
+        Lease {
+            secret: Secret::known("0123".into()),
+            operator: "A. Operator".into(),
+            since_unix_s: 0.0,
+            keeper,
+            may_return: true,
+        }
+    }
+
+    #[test]
+    fn renewed_lease_expires_after_ten_seconds() {
+        let taken = Instant::now();
+        let renewed = taken + Duration::from_secs(7);
+        let mut lease = lease(Keeper::Client { expires: renewed });
+        lease.renew(renewed);
+        assert_eq!(lease.expires_in_s(renewed), Some(10.0));
+        let end = renewed + Duration::from_secs(10);
+        for (now, has_expired) in [
+            (renewed, false),
+            (end - MILLISECOND, false),
+            (end, true),
+            (end + MILLISECOND, true),
+        ] {
+            assert_eq!(lease.has_expired(now), has_expired);
+            assert_eq!(lease.is_of_client(now), !has_expired);
+        }
+        assert_eq!(lease.expires_in_s(end + MILLISECOND), Some(0.0));
+    }
+
+    #[test]
+    fn lease_of_a_run_does_not_expire() {
+        let lease = lease(Keeper::Run(7));
+        let later = Instant::now() + Duration::from_secs(86_400);
+        assert!(!lease.has_expired(later) && !lease.is_of_client(later));
+        assert_eq!(lease.expires_in_s(later), None);
+    }
+
+    #[test]
+    fn client_that_returns_takes_the_lease_back_for_ten_seconds() {
+        let now = Instant::now();
+        let mut lease = lease(Keeper::Run(7));
+        lease.renew(now);
+        assert!(lease.is_of_client(now));
+        assert_eq!(lease.expires_in_s(now), Some(10.0));
+    }
+}
