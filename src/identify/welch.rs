@@ -183,3 +183,49 @@ fn independent_averages(segments: usize) -> f64 {
     let count = segments as f64;
     count / (1.0 + 2.0 * OVERLAP_CORRELATION * OVERLAP_CORRELATION * (count - 1.0) / count)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One bin with H = 3 - 4 j and coherence 0.8.
+    fn spectra(segments: usize) -> PowerSpectra {
+        PowerSpectra {
+            frequency_hz: vec![10.0],
+            input: vec![2.0],
+            output: vec![62.5],
+            cross: vec![Complex::new(6.0, -8.0)],
+            segments,
+        }
+    }
+
+    #[test]
+    fn segments_that_overlap_by_half_are_worth_fewer_averages() {
+        // 3/(1 + 2 (2/3)/36) = 81/28; many segments are worth 18/19 of their number each.
+        for (segments, averages) in [(1, 1.0), (3, 81.0 / 28.0)] {
+            let degrees = spectra(segments).degrees_of_freedom();
+            assert!((degrees - 2.0 * averages).abs() < 1e-14, "{degrees}");
+        }
+        let many = 1_000_000;
+        let ratio = spectra(many).degrees_of_freedom() / (2.0 * many as f64);
+        assert!((ratio - 18.0 / 19.0).abs() < 1e-6, "{ratio}");
+    }
+
+    #[test]
+    fn variance_of_h1_is_that_of_a_regression_with_one_parameter() {
+        // H = sum of u* y / sum of |u|^2 over n averages has the variance s/sum of |u|^2, and s, the variance of one residual, is
+        // estimated from n residuals less one parameter: sum of |y - H u|^2/(n - 1). In means that is
+        // (S_yy/S_uu) (1 - C)/(n - 1), here 62.5/2 x 0.2/(81/28 - 1) = 6.25 x 28/53.
+        let point = spectra(3).h1(0, 1.5);
+        // Rounding.
+        assert!((point.response - Complex::new(3.0, -4.0)).norm() < 1e-14);
+        assert!((point.coherence - 0.8).abs() < 1e-14);
+        let expected = 6.25 * 28.0 / 53.0;
+        assert!((point.variance - expected).abs() < 1e-13, "{point:?}");
+    }
+
+    #[test]
+    fn one_segment_has_no_finite_variance() {
+        assert!(!spectra(1).h1(0, 1.5).variance.is_finite());
+    }
+}
