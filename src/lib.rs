@@ -67,4 +67,3 @@ pub mod recording;
 pub mod report;
 pub mod rig;
 pub mod rt;
-pub mod util;

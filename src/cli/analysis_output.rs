@@ -16,8 +16,8 @@ use crate::experiment::{
 use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
-use crate::util::decimal::Decimal;
-use crate::util::progress::Progress;
+use bench_base::decimal::Decimal;
+use bench_base::progress::Progress;
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

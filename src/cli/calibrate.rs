@@ -19,9 +19,9 @@ use crate::experiment::{PlanLimits, RunSummary, Runner};
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
-use crate::util::decimal::Decimal;
-use crate::util::progress::Progress;
-use crate::util::quantity::Current;
+use bench_base::decimal::Decimal;
+use bench_base::progress::Progress;
+use bench_base::quantity::Current;
 
 /// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]

@@ -9,7 +9,7 @@ use super::table::{labelled, table, wrap};
 use crate::experiment::Description;
 use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use crate::identify::verdict::Cnmp;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

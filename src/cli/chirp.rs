@@ -27,8 +27,8 @@ use crate::experiment::{
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
-use crate::util::progress::Progress;
-use crate::util::quantity::Time;
+use bench_base::progress::Progress;
+use bench_base::quantity::Time;
 
 /// The bench and its excitation.
 #[derive(Clone, Debug, clap::Args)]

@@ -15,8 +15,8 @@ use crate::experiment::run_comparison::{Comparison, RunResult, distinguish};
 use crate::recording::Recording;
 use crate::report::ReportError;
 use crate::report::run_pages::{MAX_COMPARED, comparison_page};
-use crate::util::atomic_file::write_atomic;
-use crate::util::progress::Progress;
+use bench_base::atomic_file::write_atomic;
+use bench_base::progress::Progress;
 
 /// The recordings, and where the page goes.
 #[derive(Clone, Debug, clap::Args)]

@@ -7,7 +7,7 @@ use crate::experiment::run_comparison::{
 use crate::identify::Estimate;
 use crate::identify::verdict::Cnmp;
 use crate::report::number::interval;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Tables of the differences, and what they mean.
 pub(super) fn text(comparison: &Comparison, page: Option<&str>) -> String {

@@ -12,7 +12,7 @@ use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
 use crate::config::OptionSetting;
 use crate::experiment::certificate::OverrideReason;
-use crate::util::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
+use bench_base::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
 
 /// A setting of a reference without its option.
 type Default = (&'static str, Value);

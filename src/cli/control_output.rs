@@ -26,7 +26,7 @@ use crate::recording::Recording;
 use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
 };
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

@@ -14,8 +14,8 @@ use crate::control::{
     Agreement, Cascade, Domain, GainUnit, ImportOptions, Imported, Roots, Section, TransferTable,
     import,
 };
-use crate::util::atomic_file::write_atomic;
-use crate::util::quantity::{OfFrequency, si};
+use bench_base::atomic_file::write_atomic;
+use bench_base::quantity::{OfFrequency, si};
 
 /// What to do with a controller.
 #[derive(Clone, Debug, clap::Args)]

@@ -19,7 +19,7 @@ use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
-use crate::util::quantity::{Dimension, OfFrequency, OfTime, si};
+use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
 
 /// Period at which commands and planned faults are handled.
 const PERIOD: Duration = Duration::from_millis(2);

@@ -11,7 +11,7 @@ use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
 use crate::model::study::StudyError;
-use crate::util::remedy;
+use bench_base::remedy;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]

@@ -7,7 +7,7 @@ use super::help::with_setting;
 use super::options::given;
 use crate::config::{Config, OptionSetting};
 use crate::experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
-use crate::util::quantity::{Current, Frequency};
+use bench_base::quantity::{Current, Frequency};
 
 /// Frequency band and amplitude.
 #[derive(Clone, Debug, clap::Args)]

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 use toml::Table;
 
 use crate::config::profiles;
-use crate::util::quantity::Dimension;
+use bench_base::quantity::Dimension;
 
 /// Where the terms of the help texts are explained.
 pub(super) const GLOSSARY: &str =

@@ -19,7 +19,7 @@ use crate::experiment::{
 };
 use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// The recording, and where the results go.
 #[derive(Clone, Debug, clap::Args)]

@@ -23,7 +23,7 @@ use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
 };
-use crate::util::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
+use bench_base::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
 /// a thousand times larger.

@@ -28,8 +28,8 @@ use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::MagnitudeAxis;
 use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
-use crate::util::progress::Progress;
-use crate::util::quantity::Ratio;
+use bench_base::progress::Progress;
+use bench_base::quantity::Ratio;
 
 /// Odd lines, one of each group of four omitted.
 const LINES: [(&str, &str); 2] = [

@@ -3,7 +3,7 @@
 use crate::report::number::angular_frequency;
 use crate::report::run_pages::LoopOutputs;
 use crate::report::{crossing_count, place};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The files of the responses, and the measured margins beside those of the model.
 pub(super) fn text(outputs: &LoopOutputs) -> String {

@@ -20,7 +20,7 @@ use crate::experiment::{LoopModel, Stage, check_calibration, closed_loop};
 use crate::report::{
     LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
 };
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]

@@ -18,7 +18,7 @@ use crate::identify::Estimate;
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
 use crate::report::{crossing_count, place};
-use crate::util::units::{UM_PER_M, hz};
+use bench_base::units::{UM_PER_M, hz};
 
 /// The margins with a measured plant, and the files of the loop.
 #[derive(Debug, Serialize)]

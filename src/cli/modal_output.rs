@@ -4,7 +4,7 @@ use super::table::{table, wrap};
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::UncertainZero;
 use crate::report::run_pages::ModalSummary;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary) -> String {

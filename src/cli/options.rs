@@ -5,7 +5,7 @@ use clap::Args;
 use super::error::CliError;
 use crate::config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
 use crate::rig::devices;
-use crate::util::quantity::{Measure, OperatingPoint, Ratio};
+use bench_base::quantity::{Measure, OperatingPoint, Ratio};
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::util::progress::{Progress, Snapshot};
+use bench_base::progress::{Progress, Snapshot};
 
 /// Interval between two updates of the line.
 const INTERVAL: Duration = Duration::from_millis(100);

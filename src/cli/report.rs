@@ -18,8 +18,8 @@ use crate::report::ReportError;
 use crate::report::run_pages::{
     BasicReport, BenchRun, ControlReport, comparison_page, page as analysed_page, plots,
 };
-use crate::util::atomic_file::write_atomic;
-use crate::util::progress::Progress;
+use bench_base::atomic_file::write_atomic;
+use bench_base::progress::Progress;
 
 /// The page on standard output instead of a file.
 const STANDARD_OUTPUT: &str = "-";

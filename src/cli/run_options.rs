@@ -20,7 +20,7 @@ use crate::experiment::{
 };
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]

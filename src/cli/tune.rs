@@ -26,10 +26,10 @@ use crate::experiment::tuning::{
 use crate::model::plant::SignalPath;
 use crate::recording::Recording;
 use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
-use crate::util::atomic_file::write_atomic;
-use crate::util::progress::Progress;
-use crate::util::quantity::{OfRatio, OperatingPoint, si};
-use crate::util::units::UM_PER_M;
+use bench_base::atomic_file::write_atomic;
+use bench_base::progress::Progress;
+use bench_base::quantity::{OfRatio, OperatingPoint, si};
+use bench_base::units::UM_PER_M;
 
 /// What is designed, and for which plants.
 #[derive(Clone, Debug, clap::Args)]

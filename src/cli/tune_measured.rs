@@ -12,8 +12,8 @@ use crate::control::tuning::{Goal, MeasuredPlant};
 use crate::experiment::campaign::recorded_points;
 use crate::experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
 use crate::identify::verdict::Cnmp;
-use crate::util::progress::Progress;
-use crate::util::units::UM_PER_M;
+use bench_base::progress::Progress;
+use bench_base::units::UM_PER_M;
 
 /// Where the plants come from.
 #[derive(Clone, Debug, clap::Args)]

@@ -4,7 +4,7 @@ use super::error::CliError;
 use super::options::BenchOptions;
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::NamedPlant;
-use crate::util::quantity::{OperatingPoint, QuantityError};
+use bench_base::quantity::{OperatingPoint, QuantityError};
 
 /// Name of the plant of a model without operating points.
 const ONLY_PLANT: &str = "the plant";

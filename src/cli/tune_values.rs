@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::ValueEnum;
 
 use crate::control::tuning::{Goal, SensitivityLimit};
-use crate::util::quantity::AngularFrequency;
+use bench_base::quantity::AngularFrequency;
 
 /// The goal as typed.
 #[derive(Clone, Copy, Debug, ValueEnum)]

@@ -22,8 +22,8 @@ use crate::identify::verdict::MAX_LOOKS;
 use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
-use crate::util::progress::Progress;
-use crate::util::quantity::Time;
+use bench_base::progress::Progress;
+use bench_base::quantity::Time;
 
 /// Options of a sequential experiment.
 #[derive(Clone, Debug, clap::Args)]

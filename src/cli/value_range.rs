@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use super::error::CliError;
-use crate::util::quantity::{OperatingPoint, QuantityError, Ratio};
+use bench_base::quantity::{OperatingPoint, QuantityError, Ratio};
 
 /// Largest number of values of a grid.
 const MOST: usize = 10_000;

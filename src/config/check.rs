@@ -7,9 +7,9 @@ use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
 use super::renamed::new_name;
-use crate::util::finding::Finding;
-use crate::util::nearest::nearest;
-use crate::util::quantity::{Dimension, Quantity};
+use bench_base::finding::Finding;
+use bench_base::nearest::nearest;
+use bench_base::quantity::{Dimension, Quantity};
 
 /// The errors in `value`.
 pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {

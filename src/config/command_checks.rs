@@ -1,7 +1,7 @@
 //! Relations between the settings of a command and the others.
 
 use super::{Config, FeedforwardSettings, MinimumTimeSettings, PrefilterSettings, ShaperSettings};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// The errors in shaping, prefilter and feedforward.
 pub(super) fn command_checks(config: &Config) -> Vec<Finding> {

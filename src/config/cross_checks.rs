@@ -6,7 +6,7 @@ use super::{
     CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, monitor_checks,
     mounting_checks, relations,
 };
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// Longest excitation in ticks, more than an hour at 5 kHz. It is analysed as one record, with about 80 bytes per tick.
 const MAX_TICKS: f64 = 2e7;

@@ -15,8 +15,8 @@ use super::overrides::{
 use super::profiles::{self, EmbeddedFile};
 use super::purpose::Purpose;
 use super::{Config, renamed, schema};
-use crate::util::finding::Finding;
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_base::finding::Finding;
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
 
 /// A profile or file, and single settings that override it.
 ///

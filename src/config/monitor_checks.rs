@@ -3,7 +3,7 @@
 use super::purpose::Purpose;
 use super::{Config, Detection, InterlockSettings, MAX_DETECTED_RATIO};
 use crate::model::plant::{self, ModalModel, Mode};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// Smallest frequency of the first mode over that of the mode with the largest static compliance. The low-pass of the plant's
 /// residual has half the frequency of the first mode: it reaches 90 % of a step after 3.89/(w/2), 1.24 periods of that mode.

@@ -1,7 +1,7 @@
 //! The scales in the driver of a serial probe, which are between the interlocks and the device.
 
 use super::{CalibrationSettings, Config, MIN_PROBE_GAIN, SerialParts, is_near_one};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 const GAIN: &str = "probe.device.mounting.gain";
 /// Rounding of the ends of a range, as a ratio of the travel limit.

@@ -8,8 +8,8 @@ use toml::{Table, Value};
 use super::ConfigError;
 use super::check;
 use super::layer::{Layer, overlay, same_kind};
-use crate::util::finding::Finding;
-use crate::util::quantity::{Dimension, Quantity};
+use bench_base::finding::Finding;
+use bench_base::quantity::{Dimension, Quantity};
 
 /// Largest number of parts of a key. The deepest key of a configuration has 5.
 const MAX_KEY_PARTS: usize = 32;

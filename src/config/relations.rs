@@ -1,7 +1,7 @@
 //! Relations between the settings of the plant and those of the simulated stage.
 
 use super::{Config, Geometry, PlantSettings};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// Errors in the relations between the settings of a plant and those of its simulation.
 pub(super) fn plant(config: &Config) -> Vec<Finding> {

@@ -13,7 +13,7 @@ use super::margins::{Known, Margins, grid, margins};
 use super::state_space::StateSpace;
 use crate::excitation::command::LoopCommand;
 use crate::model::plant::{LoopPlant, Mode};
-use crate::util::units::UM_PER_M;
+use bench_base::units::UM_PER_M;
 
 /// A closed loop, for the computation of its responses, poles, margins and step.
 pub struct ClosedLoop {

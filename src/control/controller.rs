@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
 use super::state_space::StateSpace;
 use super::{Biquad, BiquadState, Section};
-use crate::util::units::UM_PER_M;
+use bench_base::units::UM_PER_M;
 
 /// Coefficients of a discrete controller u = C (r - y), a cascade of sections in amperes per micrometre. Immutable.
 ///

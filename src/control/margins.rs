@@ -11,7 +11,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::landmarks::{Landmarks, landmarks, phase_margin_deg};
-use crate::util::numeric::is_within;
+use bench_base::numeric::is_within;
 
 /// A frequency at which |L| passes through 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

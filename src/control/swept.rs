@@ -11,7 +11,7 @@
 use super::ClosedLoop;
 use crate::config::{ChirpSettings, TravelPoint};
 use crate::excitation::AmplitudeCurve;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Number of points over the band; a configuration allows up to 64.
 const POINTS: usize = 48;

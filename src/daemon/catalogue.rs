@@ -12,9 +12,9 @@ use std::time::SystemTime;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::util::atomic_file::write_atomic;
-use crate::util::input_file::read_open;
-use crate::util::timestamp::unix_ns;
+use bench_base::atomic_file::write_atomic;
+use bench_base::input_file::read_open;
+use bench_base::timestamp::unix_ns;
 
 /// Data of a recording that are not in it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -26,7 +26,7 @@ use crate::experiment::{
 };
 use crate::recording::{RecordingError, Totals};
 use crate::rt::thread::Pace;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Longest time between two renewals of the arm lease of a run.
 const RENEWAL: Duration = Duration::from_millis(250);

@@ -18,7 +18,7 @@ use crate::experiment::{
 use crate::rig::motor::Moment;
 use crate::rt::supervision::{ArmLease, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Pause between two attempts to open the devices, and between two checks of open devices without a command.
 const RETRY: Duration = Duration::from_secs(2);

@@ -13,7 +13,7 @@ use super::run_record::{LastEnd, RunRecord};
 use super::secret::Secret;
 use super::start::{ServeError, ServeOptions};
 use crate::rig::devices::Reservation;
-use crate::util::lock_file::{Holder, LockError, LockFile};
+use bench_base::lock_file::{Holder, LockError, LockFile};
 
 /// The locks and files of a daemon. Dropping it removes the files that it made, in the order of the fields.
 #[derive(Debug)]

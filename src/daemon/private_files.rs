@@ -14,7 +14,7 @@ use nix::sys::socket::{
 use nix::sys::stat::{Mode, fchmod};
 use nix::unistd::geteuid;
 
-use crate::util::lock_file::is_file_at;
+use bench_base::lock_file::is_file_at;
 
 /// Permissions of the token, and of the socket until it listens.
 const PRIVATE_MODE: u32 = 0o600;

@@ -9,7 +9,7 @@ use super::hold::StopKind;
 use super::secret::Secret;
 use crate::experiment::{Description, operator_name, run_name, run_note};
 use crate::rt::supervision::StopFlags;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Commands that may be queued.
 #[derive(

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::recording::{Recording, RecordingError, recover};
-use crate::util::lock_file::{Holder, LockError, LockFile};
+use bench_base::lock_file::{Holder, LockError, LockFile};
 
 /// The file of the record, in the folder of the recordings.
 const FILE: &str = ".bench-daemon.lock";

@@ -23,7 +23,7 @@ use crate::experiment::{
 };
 use crate::rt::record::Origin;
 use crate::rt::supervision::ArmLease;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Period of the progress reports.
 const PROGRESS: Duration = Duration::from_millis(100);

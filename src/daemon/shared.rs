@@ -17,7 +17,7 @@ use super::owner::Owner;
 use super::schedule::{Now, Schedule};
 use crate::config::{Config, Source};
 use crate::experiment::Plan;
-use crate::util::timestamp::unix_ns;
+use bench_base::timestamp::unix_ns;
 
 /// Commands whose output is kept.
 const KEPT_OUTPUTS: usize = 100;

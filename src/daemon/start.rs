@@ -8,7 +8,7 @@ use super::private_files::FolderError;
 use super::secret::Secret;
 use super::shared::DaemonConfig;
 use crate::rig::devices::DeviceInUse;
-use crate::util::lock_file::Holder;
+use bench_base::lock_file::Holder;
 
 /// Where the daemon can be reached.
 #[derive(Clone, Debug)]

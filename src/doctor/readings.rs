@@ -9,8 +9,8 @@ use serde::Serialize;
 use super::finding::{Finding, Subject};
 use crate::config::{InterlockSettings, ProbeSettings};
 use crate::rig::devices::first_reading;
-use crate::util::decimal::Decimal;
-use crate::util::numeric::is_within;
+use bench_base::decimal::Decimal;
+use bench_base::numeric::is_within;
 
 /// Duration of the observation.
 const OBSERVED: Duration = Duration::from_secs(1);

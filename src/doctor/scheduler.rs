@@ -9,7 +9,7 @@ use super::finding::{Finding, Severity, Subject};
 use super::trial::Trial;
 use crate::config::LoopSettings;
 use crate::rt::thread::{Pace, Scheduling};
-use crate::util::remedy;
+use bench_base::remedy;
 
 /// The requested and the granted scheduling, and the limits that apply.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -5,7 +5,7 @@ use super::design::ChosenExcitation;
 use super::extremes::Extremes;
 use super::limits::Limits;
 use super::waveform::Excitation;
-use crate::util::numeric::is_within;
+use bench_base::numeric::is_within;
 
 /// An excitation that the interlocks would trip, or whose record could not be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -2,7 +2,7 @@
 
 use super::sweep::ChirpSettings;
 use super::{Excitation, Pattern};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// The settings that every kind of excitation shares: band, rest times, fades and amplitude over frequency in
 /// `[chirp]`, and the servo rate.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::limits::Limits;
 use super::waveform::Excitation;
-use crate::util::numeric::larger;
+use bench_base::numeric::larger;
 
 /// The extremes of an excitation. An extreme is not a number if a value of any tick is not a number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

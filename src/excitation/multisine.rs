@@ -21,7 +21,7 @@ use super::design::{ExcitationDesign, Length, SharedSettings};
 use super::fourier::{samples, transform, turn};
 use super::periodic::Periodic;
 use super::waveform::Excitation;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A random-phase multisine. Amplitudes over its lines have the shape of `chirp.amplitude`, whose largest value within the
 /// band is the largest current of the sum.

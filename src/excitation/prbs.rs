@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::design::{ExcitationDesign, Length, SharedSettings};
 use super::periodic::Periodic;
 use super::waveform::Excitation;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A maximum-length sequence of plus and minus one amplitude.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -9,7 +9,7 @@
 
 use super::amplitude::AmplitudePoint;
 use super::limits::Limits;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Largest number of points of an amplitude curve.
 pub const MAX_POINTS: usize = 64;

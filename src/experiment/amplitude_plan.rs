@@ -11,7 +11,7 @@ use crate::config::Config;
 use crate::excitation::{CurrentLimit, shaped_amplitude};
 use crate::identify::frf_csv;
 use crate::model::plant::{self, LoopPlant, ModalModel};
-use crate::util::units::{hz, rad_s};
+use bench_base::units::{hz, rad_s};
 
 /// Frequencies at which the model is evaluated, beside those of its modes: 0.2 % apart over four decades.
 const GRID: usize = 4000;

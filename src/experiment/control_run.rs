@@ -21,7 +21,7 @@ use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::recording::Recording;
 use crate::rig::devices::SIMULATED;
 use crate::rig::simulated::DisturbanceSpectra;
-use crate::util::units::{hz, rad_s};
+use bench_base::units::{hz, rad_s};
 use nalgebra::Complex;
 
 /// Lowest drawn frequency of the loop as a part of its lowest mode or of its crossover.

@@ -18,8 +18,8 @@ use crate::control::ClosedLoop;
 use crate::identify::welch;
 use crate::identify::{IdentifyError, Signals};
 use crate::rig::simulated::DisturbanceSpectra;
-use crate::util::numeric::{linspace, variance_interval};
-use crate::util::units::rad_s;
+use bench_base::numeric::{linspace, variance_interval};
+use bench_base::units::rad_s;
 
 /// Length of a segment in seconds, in a record that is long enough.
 const SEGMENT_S: f64 = 2.0;

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use crate::util::atomic_file::numbered_names;
-use crate::util::timestamp;
+use bench_base::atomic_file::numbered_names;
+use bench_base::timestamp;
 
 /// `2026-11-21T16-21-09Z_chirp.mcap` in `folder`, with `-2`, `-3`, ... where that is taken.
 pub(super) fn recording(folder: &Path, what: &str, now: SystemTime) -> PathBuf {

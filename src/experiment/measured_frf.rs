@@ -20,7 +20,7 @@ use crate::identify::frf_csv::{self, FrfCsvError};
 use crate::identify::{Estimate, Frf, FrfDatum};
 use crate::model::plant::LoopPlant;
 use crate::recording::{Recording, RecordingError};
-use crate::util::units::{hz, rad_s};
+use bench_base::units::{hz, rad_s};
 
 /// The phases are compared with the model up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;

@@ -15,7 +15,7 @@ use crate::control::measured::{
 };
 use crate::identify::{Frf, FrfPoint};
 use crate::model::plant::SignalPath;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Margins of a measured loop: with 95 % intervals within the band of the FRF, with bounds by the model outside of it.
 #[derive(Clone, Debug, Serialize)]

@@ -16,7 +16,7 @@ use super::run_error::RunError;
 use super::signals::stop_on_signal;
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::supervision::StopFlags;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Longest time in seconds from the entry in the file to the first tick of the run.
 const ENABLING_S: f64 = 10.0;

@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use crate::control::measured::{MeasuredLoop, MeasuredLoopError, MeasuredMargins, ResponsePoint};
 use crate::identify::Frf;
 use crate::model::plant::SignalPath;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// The margins of a measured L, without a model.
 ///

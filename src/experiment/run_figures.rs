@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::recording::{Recording, RecordingError};
 use crate::rig::motor::ThermalModel;
 use crate::rt::record::{TickRecord, flag};
-use crate::util::numeric::larger;
+use bench_base::numeric::larger;
 
 /// Figures of a run from the tick on in which the loop closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

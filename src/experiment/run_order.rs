@@ -20,7 +20,7 @@ use crate::recording::Totals;
 use crate::rig::calibration::Calibration;
 use crate::rt::servo_run::RunOutcome;
 use crate::rt::thread::{Pace, Scheduling};
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Everything that the owner of a rig needs for a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]

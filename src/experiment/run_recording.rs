@@ -11,7 +11,7 @@ use crate::recording::{
     Header, MIN_FREE_BYTES, Recorder, RecordingError, lacks_space, predicted_bytes,
 };
 use crate::rt::thread::{Pace, Scheduling};
-use crate::util::timestamp;
+use bench_base::timestamp;
 
 /// Creates the recording, with everything that is known before the first tick.
 pub(super) fn create_recording(

@@ -27,7 +27,7 @@ use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// The rig on which a plan runs, its pace, and the folder for its recording.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use crate::identify::joint::LoopSignals;
 use crate::identify::resampling::Readings;
 use crate::identify::{Signals, setpoint_timing};
 use crate::rt::record::TickRecord;
-use crate::util::running_stats::RunningStats;
+use bench_base::running_stats::RunningStats;
 
 /// Largest ratio of interpolated ticks: each of them adds an error.
 const FILLED_RATIO: f64 = 1e-3;

@@ -14,7 +14,7 @@ use tokio::sync::oneshot::error::RecvError;
 
 use super::run_error::RunError;
 use crate::rt::supervision::StopFlags;
-use crate::util::thread_priority::lower;
+use bench_base::thread_priority::lower;
 
 const START: &str = "start the analysis";
 /// Nice value of an analysis: less urgent than the recorder and everything else.

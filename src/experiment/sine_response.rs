@@ -12,7 +12,7 @@
 use nalgebra::{Complex, Matrix3, Vector3};
 use serde::Serialize;
 
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Shortest block in seconds.
 const MIN_BLOCK_S: f64 = 0.1;

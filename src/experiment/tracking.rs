@@ -7,7 +7,7 @@ use crate::config::{ControlSettings, LoopSettings};
 use crate::control::{SETTLING_BAND, StepMeter, StepMetrics};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::{TickRecord, flag};
-use crate::util::running_stats::RunningStats;
+use bench_base::running_stats::RunningStats;
 
 /// How well a closed loop followed its reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -5,8 +5,8 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use super::ExportError;
-use crate::util::atomic_file::create_free;
-use crate::util::input_file::special_kind;
+use bench_base::atomic_file::create_free;
+use bench_base::input_file::special_kind;
 
 /// The file that is being written.
 pub(super) type Output = BufWriter<File>;

@@ -18,7 +18,7 @@ use super::{ExportError, SIGNALS, Signal, Value};
 use crate::identify::Frf;
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Types of data elements.
 const INT8: u32 = 1;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::Signals;
-use crate::util::input_file::{self, MAX_RECORD_BYTES};
+use bench_base::input_file::{self, MAX_RECORD_BYTES};
 
 /// Largest deviation of a time step from the median step, as a ratio: that of times rounded to a few digits.
 const MAX_IRREGULARITY: f64 = 0.1;

@@ -10,7 +10,7 @@ use nalgebra::Complex;
 use thiserror::Error;
 
 use super::Frf;
-use crate::util::input_file::{self, MAX_TABLE_BYTES};
+use bench_base::input_file::{self, MAX_TABLE_BYTES};
 
 /// Name of the magnitude column of a response from current to displacement.
 pub const METRES_PER_AMPERE: &str = "magnitude_m_per_a";

@@ -49,7 +49,7 @@ pub mod welch;
 
 use crate::config::IdentifySettings;
 pub use crate::config::{Estimator, EstimatorSettings, LocalModel, ResolutionPoint};
-pub use crate::util::estimate::{Estimate, SIGMAS_95};
+pub use bench_base::estimate::{Estimate, SIGMAS_95};
 pub use error::IdentifyError;
 pub use excited_band::excited_band_hz;
 pub(crate) use frf::best_of;

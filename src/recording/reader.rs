@@ -19,7 +19,7 @@ use super::walk::{Stop, Walk};
 use super::writer::{PERIOD_S, STARTED_NS};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
 use crate::rt::record::{Event, TickRecord};
-use crate::util::input_file;
+use bench_base::input_file;
 
 /// Receives a tick of a recording, and what precedes it.
 pub type TickReceiver<'a> = dyn FnMut(&Preceding<'_>, &TickRecord) + 'a;

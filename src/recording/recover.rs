@@ -6,7 +6,7 @@ use std::path::Path;
 use super::losses::{Cut, DamagedRange, MissingTicks};
 use super::reader::Recording;
 use super::{CONFIG_ATTACHMENT, Header, RECOVERED, Recorder, RecordingError, Totals};
-use crate::util::locked::{Locked, NotLocked};
+use bench_base::locked::{Locked, NotLocked};
 
 /// The result of a recovery.
 #[derive(Debug)]

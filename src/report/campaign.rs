@@ -8,7 +8,7 @@ use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use crate::identify::verdict::Cnmp;
 use crate::model::plant::PlantError;
 use crate::model::zeros::cnmp_map;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Number of cells of the map along the asymmetries.
 const COLUMNS: usize = 161;

@@ -2,7 +2,7 @@
 
 use super::number::{angular_frequency, plain};
 use crate::control::Margins;
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Names and values of the margins of a stable loop; `None` where there is no such crossing.
 pub fn margin_rows(margins: &Margins) -> Vec<(&'static str, Option<String>)> {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Decimals that show two digits of an error.
 pub fn decimals(error: f64) -> usize {

@@ -12,7 +12,7 @@ use super::following_error::FollowingError;
 use super::program::Decision;
 use super::residual::Residuals;
 use crate::config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
-use crate::util::numeric::is_within;
+use bench_base::numeric::is_within;
 
 /// The limits, and the state that their checks need.
 pub struct Interlocks {

@@ -34,7 +34,7 @@ use super::program::Decision;
 use crate::config::CLOSED_SHARE_FACTOR;
 use crate::control::{ControlLaw, LawInput};
 use crate::model::plant::{LoopPlant, LoopPlantState, Mode};
-use crate::util::numeric::is_within;
+use bench_base::numeric::is_within;
 
 /// Factor of the share where the reference replaces the prediction, because the law is not linear.
 const NOT_LINEAR_FACTOR: f64 = 2.0;

@@ -9,7 +9,7 @@ use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
 use serde::{Deserialize, Serialize};
 
 use crate::config::LoopSettings;
-use crate::util::thread_priority::set_fifo;
+use bench_base::thread_priority::set_fifo;
 
 /// `virtual` or `realtime`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

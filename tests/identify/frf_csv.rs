@@ -2,7 +2,7 @@
 
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
-use bench::util::atomic_file::write_atomic;
+use bench_base::atomic_file::write_atomic;
 use nalgebra::Complex;
 
 use crate::identify::stage;

@@ -3,7 +3,7 @@
 use bench::control::measured::{MeasuredLoop, MeasuredMargins};
 use bench::identify::EstimatorSettings;
 use bench::identify::joint;
-use bench::util::units::rad_s;
+use bench_base::units::rad_s;
 use bench_test_support::feedback_loop;
 use nalgebra::Complex;
 

@@ -4,7 +4,7 @@ use bench::config::{Config, Source, load};
 use bench::control::ClosedLoop;
 use bench::control::measured::ResponsePoint;
 use bench::identify::{Frf, FrfPoint};
-use bench::util::units::{hz, rad_s};
+use bench_base::units::{hz, rad_s};
 use nalgebra::Complex;
 
 /// The default configuration with some settings.

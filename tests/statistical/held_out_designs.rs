@@ -5,7 +5,7 @@ use bench::control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, Tolerances,
     TuneError, design,
 };
-use bench::util::progress::Progress;
+use bench_base::progress::Progress;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 

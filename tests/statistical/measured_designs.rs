@@ -8,7 +8,7 @@ use bench::control::tuning::{
     Tolerances, design,
 };
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
-use bench::util::progress::Progress;
+use bench_base::progress::Progress;
 use bench_test_support::chirp_source::{config_at, measured, true_loop};
 use bench_test_support::seeds::over_seeds;
 

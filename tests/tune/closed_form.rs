@@ -4,7 +4,7 @@ use bench::control::tuning::{
     DesignOptions, DesignTask, Effort, Goal, NamedPlant, Tolerances, design,
 };
 use bench::model::plant::Mode;
-use bench::util::progress::Progress;
+use bench_base::progress::Progress;
 use nalgebra::{Complex, DVector};
 
 use crate::tune::stage::{config, requirements};

@@ -8,7 +8,7 @@ use bench::control::tuning::{
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench::model::plant::{Mode, SignalPath};
 use bench::rig::simulated;
-use bench::util::progress::Progress;
+use bench_base::progress::Progress;
 use bench_test_support::chirp_source::{config_at, sampled, true_loop};
 use nalgebra::{DMatrix, DVector};
 

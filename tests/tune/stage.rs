@@ -5,7 +5,7 @@ use bench::control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MarginDisc, NamedPlant, Requirements,
     SensitivityLimit, Tolerances, TuneError, design,
 };
-use bench::util::progress::Progress;
+use bench_base::progress::Progress;
 
 pub fn config(sets: &[&str]) -> Config {
     config_of("stage", sets)

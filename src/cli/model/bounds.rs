@@ -10,8 +10,8 @@ use super::Profiled;
 use crate::config::Purpose;
 use crate::model::plant;
 use crate::model::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
-use crate::util::decimal::Decimal;
-use crate::util::quantity::{OfAngularFrequency, OfRatio, si};
+use bench_base::decimal::Decimal;
+use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
 
 /// The demands on the loop.
 #[derive(Clone, Debug, clap::Args)]

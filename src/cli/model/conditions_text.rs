@@ -7,7 +7,7 @@ use crate::model::veering::propositions::Proposition;
 use crate::model::veering::report::{
     Assumptions, ConditionRow, ConditionsReport, Explanation, PredictionTally, SideReport,
 };
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 pub(super) fn text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
     let here = match &conditions.here {

@@ -16,7 +16,7 @@ use crate::model::zeros::{
     ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
 use crate::report::{Picture, ReportError, locus_svg, plant_conditions};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The setting that varies, and the zeros to follow.
 #[derive(Clone, Debug, clap::Args)]

@@ -12,8 +12,8 @@ use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
 use crate::model::zeros;
 use crate::report::{CnmpMap, Picture, ReportError, map_svg};
-use crate::util::decimal::Decimal;
-use crate::util::quantity::{OperatingPoint, Ratio};
+use bench_base::decimal::Decimal;
+use bench_base::quantity::{OperatingPoint, Ratio};
 
 /// The largest picture in lines and characters, which fits 80 columns.
 const PICTURE: (usize, usize) = (60, 67);

@@ -7,7 +7,7 @@ use super::super::table::table;
 use super::Profiled;
 use crate::config::Purpose;
 use crate::model::zeros::{ModeSummary, PlantSummary, Zero};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;

@@ -3,7 +3,7 @@
 use super::super::table::{table, wrap};
 use crate::model::veering::QuadrantSummary;
 use crate::model::veering::placement::{MIN_REMAINDER_RATIO, Placement, PlacementReport, Trial};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Placements that are listed; the JSON has all.
 const LISTED: usize = 16;

@@ -14,9 +14,9 @@ use crate::model::zeros::{
     ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
 };
 use crate::report::{Picture, ReportError, model_step_svg, plant_conditions};
-use crate::util::decimal::Decimal;
-use crate::util::numeric::linspace;
-use crate::util::quantity::{OfTime, si};
+use bench_base::decimal::Decimal;
+use bench_base::numeric::linspace;
+use bench_base::quantity::{OfTime, si};
 
 /// The table of the response.
 #[derive(Clone, Debug, clap::Args)]

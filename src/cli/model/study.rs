@@ -16,7 +16,7 @@ use crate::model::study::{
     Answer, Block, Opened, Plan, Results, Shard, StudyFile, Tolerance, complete, joined,
 };
 use crate::report::{Picture, ReportError, plant_conditions, study_svg};
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// The settings that vary, and the number of draws.
 #[derive(Clone, Debug, clap::Args)]

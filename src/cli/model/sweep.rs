@@ -5,8 +5,8 @@ use super::super::options::BenchOptions;
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::model::plant::{self, Structure};
 use crate::model::veering::PairError;
-use crate::util::numeric::linspace;
-use crate::util::quantity::{Quantity, QuantityError};
+use bench_base::numeric::linspace;
+use bench_base::quantity::{Quantity, QuantityError};
 
 /// The setting that varies, and its values. Defaults and limits differ between the commands: see `mut_arg` there.
 #[derive(Clone, Debug, clap::Args)]

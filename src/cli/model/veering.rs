@@ -14,8 +14,8 @@ use crate::config::{Config, Purpose};
 use crate::model::veering::report::{Shares, VeeringReport};
 use crate::model::veering::{Loci, ModesAt, close_pair};
 use crate::report::{Picture, ReportError, plant_conditions, veering_caption, veering_svg};
-use crate::util::decimal::Decimal;
-use crate::util::units::hz;
+use bench_base::decimal::Decimal;
+use bench_base::units::hz;
 
 /// The setting that varies, and the two modes.
 #[derive(Clone, Debug, clap::Args)]

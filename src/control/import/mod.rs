@@ -29,7 +29,7 @@ use super::error::ControllerError;
 use super::file::ControllerText;
 use super::import_error::{FormatError, ImportError};
 use super::transfer::{Cascade, TransferError, TransferSettings};
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
 
 pub use select::ImportOptions;
 pub use value::{NumericArray, Value, Variables};

@@ -7,7 +7,7 @@ use super::margins::MeasuredMargins;
 use super::measured_loop::MeasuredLoop;
 use super::point::ResponsePoint;
 use crate::control::ClosedLoop;
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Points further apart than this many resolutions have a gap between them.
 const GAP_RESOLUTIONS: f64 = 2.0;

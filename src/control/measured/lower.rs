@@ -11,8 +11,8 @@ use super::count::{NyquistCount, Stability};
 use super::measured_loop::MeasuredLoop;
 use crate::control::ClosedLoop;
 use crate::control::landmarks::{Peak, lowest};
-use crate::util::estimate::SIGMAS_95;
-use crate::util::units::hz;
+use bench_base::estimate::SIGMAS_95;
+use bench_base::units::hz;
 
 /// Lowest examined frequency as a ratio of the lowest measured one.
 const LOWEST: f64 = 1e-3;

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::measured_loop::MeasuredLoop;
 use crate::control::landmarks::{Landmarks, Peak, landmarks, peak, phase_margin_deg};
-use crate::util::estimate::Estimate;
+use bench_base::estimate::Estimate;
 
 /// Decibels of a natural logarithm.
 const DB_PER_NEPER: f64 = 20.0 / std::f64::consts::LN_10;

@@ -6,7 +6,7 @@ use super::error::MeasuredLoopError;
 use super::point::ResponsePoint;
 use super::smoothing::SmoothResponse;
 use crate::control::landmarks::lowest;
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Step of a numerical derivative as a ratio of frequency; measured points are about ten times farther apart.
 const STEP_RATIO: f64 = 1e-4;

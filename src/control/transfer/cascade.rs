@@ -13,7 +13,7 @@ use super::settings::{GainUnit, TransferSettings};
 use crate::control::controller::{Controller, SectionController};
 use crate::control::law::{ControlDesign, ControlLaw};
 use crate::control::{Biquad, Section};
-use crate::util::units::UM_PER_M;
+use bench_base::units::UM_PER_M;
 
 /// A transfer function as sections in amperes per micrometre.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,8 +8,8 @@ use super::frequencies::frequencies;
 use super::given::Given;
 use super::roots::Factors;
 use crate::control::Section;
-use crate::util::numeric::is_within;
-use crate::util::units::hz;
+use bench_base::numeric::is_within;
+use bench_base::units::hz;
 
 /// Largest difference of the responses, relative to the largest magnitude of the original: a millionth is 0.00001 dB or 0.00006 degrees.
 const MAX_DIFFERENCE: f64 = 1e-6;

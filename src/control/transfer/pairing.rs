@@ -10,7 +10,7 @@ use nalgebra::Complex;
 use super::domain::Domain;
 use super::roots::{Factors, Roots};
 use crate::control::Section;
-use crate::util::numeric::assign;
+use bench_base::numeric::assign;
 
 /// Zeros and poles of a section.
 #[derive(Clone, Debug, Default)]

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::roots::Roots;
 use super::wide::WIDE_EPSILON;
-use crate::util::numeric::{is_within, larger};
+use bench_base::numeric::{is_within, larger};
 
 /// Largest number of refining steps. Simple roots need two or three, a root of multiplicity m converges by 1 - 1/m per step.
 const MAX_STEPS: usize = 100;

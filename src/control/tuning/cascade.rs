@@ -10,7 +10,7 @@
 use nalgebra::Complex;
 
 use crate::control::SectionSettings;
-use crate::util::units::UM_PER_M;
+use bench_base::units::UM_PER_M;
 
 /// A factor of the cascade beside the integrator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

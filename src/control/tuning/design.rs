@@ -12,7 +12,7 @@ use super::requirement::Requirements;
 use super::sampled::{SampledPlant, Spacing};
 use super::search::{Effort, search};
 use super::unmodelled::UnmodelledBound;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Everything that determines a design.
 #[derive(Clone, Debug)]

@@ -13,7 +13,7 @@ use nalgebra::Complex;
 use super::disturbance_spectrum::DisturbanceSpectrum;
 use crate::config::FloorLine;
 use crate::model::plant::Mode;
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Variances in m^2 that belong to one frequency of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -14,7 +14,7 @@ use super::variance::{current_sigma_a, sigma_m};
 use crate::control::StateSpace;
 use crate::control::features;
 use crate::control::landmarks::lowest;
-use crate::util::units::UM_PER_M;
+use bench_base::units::UM_PER_M;
 
 /// Figures of the loop with one plant, with the modes that its model lacks at their most unfavourable phase.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -9,7 +9,7 @@ use rand_pcg::Pcg64;
 use super::cascade::Cascade;
 use super::descent::{Candidate, Problem};
 use super::requirement::Goal;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// How much is tried.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use crate::config::UnmodelledMode;
 use crate::control::features::alias;
 use crate::model::plant::{LoopPlant, Mode, SignalPath};
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Points of the table per decade.
 const PER_DECADE: f64 = 300.0;

@@ -11,7 +11,7 @@ use super::plant::DesignPlant;
 use super::requirement::{Goal, Kind};
 use super::sampled::SampledPlant;
 use crate::control::features;
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Rounds of verification and improvement of each candidate.
 const ROUNDS: usize = 10;

@@ -10,7 +10,7 @@ use crate::daemon::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcom
 use crate::daemon::schedule::Now;
 use crate::daemon::shared::{Daemon, now};
 use crate::rig::devices::is_simulated;
-use crate::util::progress::Snapshot;
+use bench_base::progress::Snapshot;
 
 /// Everything at one moment.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

@@ -21,8 +21,8 @@ use crate::experiment::{Feed, FeedSender, FeedSource, RunKind};
 use crate::identify::GrowingResponse;
 use crate::recording::{EncodedMessage, LiveEncoder};
 use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
-use crate::util::thread_priority::lower;
-use crate::util::timestamp::unix_ns;
+use bench_base::thread_priority::lower;
+use bench_base::timestamp::unix_ns;
 
 /// Period of the thread.
 const PERIOD: Duration = Duration::from_millis(5);

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use crate::excitation::sweep::ChirpSettings;
 use crate::excitation::waveform::{Reference, ticks};
-use crate::util::finding::Finding;
-use crate::util::input_file::{self, MAX_TABLE_BYTES};
-use crate::util::quantity::Dimension;
+use bench_base::finding::Finding;
+use bench_base::input_file::{self, MAX_TABLE_BYTES};
+use bench_base::quantity::Dimension;
 
 /// The properties of a run that a reference needs in addition to its own settings.
 #[derive(Clone, Copy, Debug)]

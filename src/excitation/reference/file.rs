@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError};
 use crate::excitation::waveform::Reference;
-use crate::util::numeric::is_within;
+use bench_base::numeric::is_within;
 
 /// A CSV file with the columns `time_s,reference_m`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

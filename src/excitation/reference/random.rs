@@ -19,8 +19,8 @@ use super::design::{
 use crate::excitation::fourier::{samples, turn};
 use crate::excitation::multisine::random_phases;
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
-use crate::util::numeric::bisect;
+use bench_base::finding::Finding;
+use bench_base::numeric::bisect;
 
 /// Largest number of ticks of a period, which is stored as a table: 200 s at 5 kHz.
 const MAX_TICKS: f64 = 1e6;

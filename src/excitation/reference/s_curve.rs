@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, check_amplitude, um};
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// From 0 to a height with bounded speed, acceleration and jerk, then constant.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

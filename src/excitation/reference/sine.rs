@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, um};
 use super::wave::{Wave, check_wave};
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A sine that starts at zero.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

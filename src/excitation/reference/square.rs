@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, um};
 use super::wave::check_wave;
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A half period whose end is less than this part of it after a tick ends at this tick: the difference is rounding.
 const ROUNDING: f64 = 1e-9;

@@ -7,7 +7,7 @@ use super::design::{
     ReferenceContext, ReferenceDesign, ReferenceError, StepOfReference, check_amplitude, um,
 };
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -7,7 +7,7 @@ use super::design::{ReferenceContext, ReferenceDesign, ReferenceError};
 use crate::excitation::amplitude::{AmplitudeCurve, TravelPoint};
 use crate::excitation::sweep::SweptSine;
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// The sweep of `[chirp]` in metres.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

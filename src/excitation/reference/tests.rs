@@ -1,6 +1,6 @@
 use super::*;
 use crate::excitation::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 fn made(settings: &ReferenceSettings) -> Result<Box<dyn Reference>, ReferenceError> {
     let chirp = crate::config::load(&Default::default()).unwrap().chirp;

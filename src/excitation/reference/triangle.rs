@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::design::{ReferenceContext, ReferenceDesign, ReferenceError, um};
 use super::wave::{Wave, check_wave};
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A triangle wave that starts at zero: constant speed of 4 times amplitude times frequency, in alternating directions.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

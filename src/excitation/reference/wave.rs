@@ -2,7 +2,7 @@
 
 use super::design::{check_amplitude, check_frequency};
 use crate::excitation::waveform::Reference;
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A wave that begins at tick 0.
 pub(super) struct Wave {

@@ -17,7 +17,7 @@ use crate::recording::Recording;
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
-use crate::util::timestamp;
+use bench_base::timestamp;
 
 /// A calibration and its runs.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use crate::excitation::Staircase;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
 use crate::rt::record::TickRecord;
-use crate::util::running_stats::RunningStats;
+use bench_base::running_stats::RunningStats;
 
 /// The stage must move by this many standard deviations of the mean of a level.
 const MIN_SIGMAS: f64 = 20.0;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::experiment::error::ExperimentError;
 use crate::model::plant::PlantError;
-use crate::util::checkpoint::{FileAction, FileError};
+use bench_base::checkpoint::{FileAction, FileError};
 
 /// A campaign that was refused or that failed.
 #[derive(Debug, thiserror::Error)]

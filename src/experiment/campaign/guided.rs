@@ -17,7 +17,7 @@ use super::load_check::{Finding, LoadCheck};
 use super::point::PointResult;
 use super::rest_position::RestPosition;
 use crate::config::{Config, Sr4dofSettings};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// A question to the operator.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use super::load::{Load, StageModel};
 use super::rest_position::RestPosition;
 use crate::config::{PlantSettings, Sr4dofSettings};
 use crate::model::plant::{self, ModalModel, Mode, Sign};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// A difference of more standard deviations is not noise; noise alone exceeds it once in two million cases.
 const SIGMAS: f64 = 5.0;

@@ -16,7 +16,7 @@ use crate::experiment::runner::close;
 use crate::experiment::sequential::{
     SequenceEnd, SequenceLimits, default_max_motion_s, until_decided,
 };
-use crate::util::checkpoint::FileAction;
+use bench_base::checkpoint::FileAction;
 
 /// How each point is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -8,7 +8,7 @@ use super::error::CampaignError;
 use super::grid::{Grid, GridPoint};
 use super::measure::Method;
 use super::store::{check_format, name};
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
 
 /// Asymmetries that differ by less than this are equal: they were typed in percent.
 const SAME_ASYMMETRY: f64 = 1e-6;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::error::CampaignError;
 use crate::recording::{Recording, RecordingError};
 use crate::rt::record::flag;
-use crate::util::running_stats::RunningStats;
+use bench_base::running_stats::RunningStats;
 use bench_hal::Validity;
 
 /// Number of segments whose means are compared.

@@ -23,7 +23,7 @@ use crate::experiment::run::Run;
 use crate::experiment::runner::{Runner, Setup, close};
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
-use crate::util::progress::Progress;
+use bench_base::progress::Progress;
 
 /// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.
 pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;

@@ -17,10 +17,10 @@ use super::grid::{Grid, GridPoint};
 use super::measure::Method;
 use super::point::PointResult;
 use crate::config::Config;
-use crate::util::atomic_file::write_durable;
-use crate::util::checkpoint::{FileAction, checksum, differences, lock};
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
-use crate::util::locked::Locked;
+use bench_base::atomic_file::write_durable;
+use bench_base::checkpoint::{FileAction, checksum, differences, lock};
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_base::locked::Locked;
 
 const FORMAT: &str = "bench campaign 1";
 /// Largest number of differences that are listed.

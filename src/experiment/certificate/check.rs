@@ -10,7 +10,7 @@ use crate::config::Config;
 use crate::control::ControllerText;
 use crate::experiment::plan_error::PlanError;
 use crate::model::plant::{self, ModalModel};
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// Relative difference of two equal numbers after a conversion of units.
 const ROUNDING: f64 = 1e-9;

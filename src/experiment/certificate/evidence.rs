@@ -22,7 +22,7 @@ use crate::experiment::response_points::points;
 use crate::experiment::stage_check::RestAfterCheck;
 use crate::model::plant::SignalPath;
 use crate::rig::calibration::Calibration;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// The evidence with which a loop closes. The names in JSON must not change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -10,7 +10,7 @@ use super::error::CertificateError;
 use super::signs::SignCheck;
 use crate::identify::modal::FittedMode;
 use crate::identify::{Estimate, Frf, frf_csv};
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES, MAX_TABLE_BYTES};
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES, MAX_TABLE_BYTES};
 
 /// Version of the format.
 pub(super) const FORMAT: u32 = 1;

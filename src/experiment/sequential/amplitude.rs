@@ -8,7 +8,7 @@ use crate::experiment::amplitude_plan::{limit_travel, shape_travel_m};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::prediction::extremes;
 use crate::identify::modal::{MeasurementChain, ModalFit};
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Frequencies at which the response of a fit is evaluated, beside those of its modes.
 const GRID: usize = 400;

@@ -6,7 +6,7 @@ use crate::config::Config;
 use crate::excitation::{AmplitudePoint, ExcitationKind, Sweep};
 use crate::experiment::error::ExperimentError;
 use crate::model::plant::{self, ModalModel};
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Length of the first shot in periods of the lowest mode.
 const FIRST_PERIODS: f64 = 90.0;

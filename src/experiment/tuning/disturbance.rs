@@ -19,7 +19,7 @@ use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::tracking::steady_tick;
 use crate::recording::{Recording, RecordingError};
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// Least length of the steady state in seconds: ten segments of the spectrum, which give each band to about 30 %.
 const LEAST_STEADY_S: f64 = 10.0;

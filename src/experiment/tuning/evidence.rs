@@ -15,7 +15,7 @@ use crate::identify::Estimate;
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::Cnmp;
 use crate::model::plant::SignalPath;
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Part of half the sampling rate up to which the tolerance above the band is computed: C has zeros at its end.
 const HIGHEST: f64 = 0.98;

@@ -17,7 +17,7 @@ use crate::experiment::response_points::points;
 use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
 use crate::identify::verdict::Verdict;
 use crate::model::plant::{LoopPlant, Mode, SignalPath};
-use crate::util::units::{hz, rad_s};
+use bench_base::units::{hz, rad_s};
 
 /// The verdict on CNMP zeros covers the band up to this multiple of the highest mode that is used with its sign.
 const LAST_MODE: f64 = 1.2;

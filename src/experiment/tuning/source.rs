@@ -9,7 +9,7 @@ use crate::config::{Config, PlantSettings};
 use crate::experiment::measured_frf::MeasuredFrf;
 use crate::experiment::response_points::variance;
 use crate::identify::{Frf, FrfDatum};
-use crate::util::numeric::to_four_decimals;
+use bench_base::numeric::to_four_decimals;
 
 /// A measured frequency response, from command (A) to reading (m), with the data for a fit.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::linear_algebra::modes;
 use super::{PlantError, Structure};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A coefficient with less than this ratio of the damping is zero except for rounding.
 const ROUNDING_RATIO: f64 = 1e-9;

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::structure::Assembly;
 use super::{DampingSettings, PlantModel, Port, Structure};
-use crate::util::finding::Finding;
-use crate::util::nearest::nearest;
+use bench_base::finding::Finding;
+use bench_base::nearest::nearest;
 
 /// The name of the fixed end of a spring, which no node may have.
 const GROUND: &str = "ground";

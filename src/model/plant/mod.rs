@@ -57,8 +57,8 @@ pub use sr4dof::Sr4dofSettings;
 pub use structure::Structure;
 pub use xy::{SecondaryMassDeviation, XyLayout, XySettings};
 
-use crate::util::finding::Finding;
-use crate::util::numeric::to_four_decimals;
+use bench_base::finding::Finding;
+use bench_base::numeric::to_four_decimals;
 
 /// The functions that the settings of each model provide.
 trait PlantModel {

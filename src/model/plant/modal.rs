@@ -10,7 +10,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::{PlantError, PlantModel, Structure};
-use crate::util::finding::Finding;
+use bench_base::finding::Finding;
 
 /// A plant as the sum of its modes: G(s) = sum of r/(s^2 + 2 zeta w s + w^2). Coordinates in the order of the names.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

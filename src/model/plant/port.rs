@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::util::nearest::nearest;
+use bench_base::nearest::nearest;
 
 /// The displacement row^T z of a stage. A force along it is the generalised force row.
 #[derive(Clone, Debug, PartialEq)]

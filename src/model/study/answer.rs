@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::effects::{Cell, Effects, Share};
 use super::{Block, Failure, Results, Shard, Varied};
-use crate::util::numeric::wilson_interval;
+use bench_base::numeric::wilson_interval;
 
 /// Failures that are reported one by one; the others are counted.
 const EXAMPLES: usize = 5;

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{Block, Plan, Results, Shard, StudyError};
-use crate::util::checkpoint::{FileAction, FileError, RecordFile, Records};
-use crate::util::checkpoint::{differences, read_records};
+use bench_base::checkpoint::{FileAction, FileError, RecordFile, Records};
+use bench_base::checkpoint::{differences, read_records};
 
 const FORMAT: &str = "bench study 1";
 

@@ -29,7 +29,7 @@ pub use results::{Block, Failure, Results};
 pub use tolerance::{Deviation, Tolerance};
 pub use workers::complete;
 
-use crate::util::checkpoint::FileError;
+use bench_base::checkpoint::FileError;
 
 /// The reason why a study is refused or fails.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

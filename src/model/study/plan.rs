@@ -11,7 +11,7 @@ use serde_json::Value;
 use super::counter::Counter;
 use super::{Deviation, StudyError, Tolerance};
 use crate::config::{Config, PlantSettings, validate};
-use crate::util::nearest::nearest;
+use bench_base::nearest::nearest;
 
 /// Settings that may vary at once: the classes of all pairs of them take less than 40 MB.
 const MOST_VARIED: usize = 64;

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 use super::StudyError;
-use crate::util::quantity::{Dimension, Quantity, QuantityError};
+use bench_base::quantity::{Dimension, Quantity, QuantityError};
 
 /// Limit of a normal deviation in standard deviations: two values in 10^9 lie beyond it and are set to it.
 const NORMAL_END: f64 = 6.0;

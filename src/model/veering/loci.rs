@@ -247,7 +247,7 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::util::numeric::linspace;
+    use bench_base::numeric::linspace;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 

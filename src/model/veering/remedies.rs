@@ -3,7 +3,7 @@
 use super::CloseModes;
 use super::conditions::{c4_1, c4_2, deciding_residue, pattern};
 use super::quadrants::residue_signs;
-use crate::util::decimal::Decimal;
+use bench_base::decimal::Decimal;
 
 /// A sentence on C4-1 and one on C4-2.
 pub(super) fn remedies(modes: &CloseModes) -> Vec<String> {

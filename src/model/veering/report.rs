@@ -6,7 +6,7 @@ use super::conditions::{Condition, c4_1, c4_2};
 use super::propositions::{Interval, Prediction, Proposition, Side, p4_1};
 use super::remedies::remedies;
 use super::{Meeting, ModesAt, Sample, Trajectory, ZeroConfiguration};
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// The veering point of two modes.
 #[derive(Clone, Debug, PartialEq, Serialize)]

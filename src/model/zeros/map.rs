@@ -230,7 +230,7 @@ fn discriminant([d, c, b, a]: [Bounded; 4]) -> Bounded {
 mod tests {
     use super::*;
     use crate::config::{PlantSettings, Source, load};
-    use crate::util::numeric::linspace;
+    use bench_base::numeric::linspace;
     use rand_core::Rng;
 
     fn chapter2(sets: &[&str]) -> Sr4dofSettings {

@@ -13,8 +13,8 @@ use std::f64::consts::{PI, TAU};
 use serde::Serialize;
 
 use super::{ModalSum, ModalTerm, ZeroCounts};
-use crate::util::numeric::bisect;
-use crate::util::units::hz;
+use bench_base::numeric::bisect;
+use bench_base::units::hz;
 
 /// Samples in the shortest period.
 const SAMPLES_PER_PERIOD: f64 = 64.0;

@@ -6,7 +6,7 @@ use super::bounds::{Bound, Demand};
 use super::kinds::{Zero, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 use super::sequence::{dominant_sequence, sign_sequence};
 use crate::model::plant::{ModalModel, Mode, PlantError, PlantSettings, Sign, build};
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// One mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]

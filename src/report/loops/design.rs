@@ -7,7 +7,7 @@ use crate::control::tuning::{Goal, LoopCurve, Requirements};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, INK, SKY, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, sheet_svg};
-use crate::util::units::{UM_PER_M, hz};
+use bench_base::units::{UM_PER_M, hz};
 
 /// Heights of the charts of L, S and K S in pixels.
 const HEIGHTS: [f64; 3] = [230.0, 260.0, 230.0];

@@ -10,7 +10,7 @@ use crate::report::chart::colours::{BLUE, GREEN, GREY, ORANGE, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::frequency_text;
 use crate::report::trace::{self, Line, Trace};
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// Heights of the frames in pixels.
 const MAGNITUDE_HEIGHT: f64 = 300.0;

@@ -6,7 +6,7 @@ use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::frequency_text;
-use crate::util::numeric::linspace;
+use bench_base::numeric::linspace;
 
 const HEIGHT: f64 = 420.0;
 const MICRO: f64 = 1e6;

@@ -10,7 +10,7 @@ use crate::report::{
     MeasuredLoopPlot, MeasuredMark, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
     measured_nyquist_svg, measured_sensitivity_svg,
 };
-use crate::util::units::hz;
+use bench_base::units::hz;
 
 /// A measured loop beside that of the model.
 pub(super) struct MeasuredLoop<'a> {

@@ -6,7 +6,7 @@ use crate::experiment::PlanError;
 use crate::identify::Frf;
 use crate::identify::frf_csv;
 use crate::report::ReportError;
-use crate::util::atomic_file::{write_atomic, write_new};
+use bench_base::atomic_file::{write_atomic, write_new};
 
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -8,7 +8,7 @@ use bench_hal::can::drive::OpenError;
 use bench_hal::can::emulator::EmulatedAmplifier;
 
 use crate::config::{AmplifierDevice, AmplifierSettings, LoopSettings};
-use crate::util::thread_priority::device_thread_setup;
+use bench_base::thread_priority::device_thread_setup;
 
 /// An amplifier that cannot be opened.
 #[derive(Debug, thiserror::Error)]

@@ -5,7 +5,7 @@ use std::time::Duration;
 use bench_hal::serial::{self, SerialError, SerialProbe};
 
 use crate::config::{ProbeDevice, ProbeSettings};
-use crate::util::thread_priority::device_thread_setup;
+use bench_base::thread_priority::device_thread_setup;
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]

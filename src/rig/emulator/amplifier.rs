@@ -15,7 +15,7 @@ use super::stage::{Stage, seconds};
 use super::{EmulatedDevice, EmulatorError};
 use crate::config::AmplifierDevice;
 use crate::rig::devices::amplifier::CanAddress;
-use crate::util::thread_priority::device_thread_setup;
+use bench_base::thread_priority::device_thread_setup;
 
 /// Serves an emulated amplifier; dropping it takes the amplifier from the bus.
 pub struct AmplifierServer {

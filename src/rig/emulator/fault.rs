@@ -6,7 +6,7 @@ use bench_hal::can::emulator::DeviceFault;
 use bench_hal::serial::emulator::Fault;
 
 use super::EmulatedDevice;
-use crate::util::quantity::Length;
+use bench_base::quantity::Length;
 
 /// A fault, or the end of all faults.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use super::fault::{FaultError, FaultRequest};
-use crate::util::quantity::Time;
+use bench_base::quantity::Time;
 
 /// Latest planned time, in seconds: one day.
 const LATEST_S: f64 = 86_400.0;

@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::EmulatorError;
-use crate::util::lock_file::{Holder, LockError, LockFile};
+use bench_base::lock_file::{Holder, LockError, LockFile};
 
 /// Folder of the pseudo terminals.
 const TERMINALS: &str = "/dev/pts";

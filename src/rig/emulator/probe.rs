@@ -12,7 +12,7 @@ use super::stage::Stage;
 use super::{EmulatedDevice, EmulatorError};
 use crate::config::{Config, ProbeSettings};
 use crate::rig::simulated::Sensor;
-use crate::util::thread_priority::device_thread_setup;
+use bench_base::thread_priority::device_thread_setup;
 
 /// Measurements per second of a streaming probe, if the configuration does not state its rate.
 const STREAM_HZ: f64 = 4000.0;

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::moment::Moment;
 use super::thermal::ThermalModel;
 use crate::config::{AmplifierSettings, Config, MotorSettings};
-use crate::util::atomic_file::write_durable;
-use crate::util::checkpoint::checksum;
-use crate::util::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_base::atomic_file::write_durable;
+use bench_base::checkpoint::checksum;
+use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
 
 /// A file of the motor that cannot be used. Nothing was moved.
 #[derive(Debug, thiserror::Error)]

@@ -19,7 +19,7 @@ use nalgebra::Complex;
 use super::modes;
 use crate::config::{Config, FloorLine};
 use crate::model::plant::{Mode, PlantError};
-use crate::util::units::rad_s;
+use bench_base::units::rad_s;
 
 /// One-sided spectra of the simulated rig at rest, in m^2/Hz at the probe.
 #[derive(Clone, Debug)]

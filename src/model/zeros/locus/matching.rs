@@ -3,7 +3,7 @@
 
 use nalgebra::Complex;
 
-use crate::util::numeric::assign;
+use bench_base::numeric::assign;
 
 /// A point of the plane; `None` at infinity.
 pub(super) type Point = Option<Complex<f64>>;

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
     use crate::model::plant::PlantError;
     use crate::model::zeros::{ModalSum, ModalTerm};
-    use crate::util::numeric::linspace;
+    use bench_base::numeric::linspace;
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {
         linspace(from, to, count).collect()

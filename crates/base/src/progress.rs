@@ -1,7 +1,7 @@
 //! Progress of a task: written by the task, read by the display.
 //!
 //! ```
-//! use bench::util::progress::Progress;
+//! use bench_base::progress::Progress;
 //!
 //! let progress = Progress::default();
 //! progress.begin("fitting", 20);

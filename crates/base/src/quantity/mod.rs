@@ -2,16 +2,16 @@
 //!
 //! A bare number is in SI units. A percentage refers to the reference of the quantity: an operating point is given in
 //! percent of the beam length, a ratio in percent of 1. No other quantity has a reference, and none is given in percent;
-//! tolerances of other settings ([`crate::model::study`]) are in percent of the nominal value.
+//! tolerances of other settings (`bench model study`) are in percent of the nominal value.
 //!
 //! ```
-//! use bench::util::quantity::{Current, Length};
+//! use bench_base::quantity::{Current, Length};
 //!
 //! let amplitude: Current = "100mA".parse()?;
 //! assert_eq!(amplitude.si(), 0.1);
 //! let error = "5s".parse::<Length>().unwrap_err().to_string();
 //! assert_eq!(error, "`5s` is a time in s; give a length in m, such as 50um or 3.8mm");
-//! # Ok::<(), bench::util::quantity::QuantityError>(())
+//! # Ok::<(), bench_base::quantity::QuantityError>(())
 //! ```
 
 mod dimension;

@@ -7,7 +7,7 @@ const SEPARATOR: &str = "; ";
 /// first part contains none; the remedy may contain several instructions.
 ///
 /// ```
-/// use bench::util::remedy::split;
+/// use bench_base::remedy::split;
 ///
 /// let text = "--at 9 is outside of the range 0 to 5; give a value inside, or change --from and --to";
 /// let (what, remedy) = split(text);

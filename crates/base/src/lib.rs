@@ -1,4 +1,4 @@
-//! Small helpers that several modules use.
+//! Small helpers that several crates use: quantities with units, numbers, atomic files, locks, checkpoints, progress.
 
 pub mod atomic_file;
 pub mod checkpoint;
@@ -14,6 +14,6 @@ pub mod progress;
 pub mod quantity;
 pub mod remedy;
 pub mod running_stats;
-pub(crate) mod thread_priority;
+pub mod thread_priority;
 pub mod timestamp;
 pub mod units;

@@ -8,7 +8,7 @@ pub const UM_PER_M: f64 = 1e6;
 /// Angular frequency in rad/s of a frequency in hertz, w = 2 pi f.
 ///
 /// ```
-/// assert_eq!(bench::util::units::rad_s(0.5), std::f64::consts::PI);
+/// assert_eq!(bench_base::units::rad_s(0.5), std::f64::consts::PI);
 /// ```
 pub fn rad_s(frequency_hz: f64) -> f64 {
     TAU * frequency_hz

@@ -5,7 +5,7 @@ use std::fmt::{Display, Formatter, LowerExp, Result};
 /// A number that is printed like an `f64`, but without a negative zero: a value that rounds to zero is `0.00` or `+0.00`.
 ///
 /// ```
-/// use bench::util::decimal::Decimal;
+/// use bench_base::decimal::Decimal;
 ///
 /// assert_eq!(format!("{:+.4}", -1e-9), "-0.0000");
 /// assert_eq!(format!("{:+.4}", Decimal(-1e-9)), "+0.0000");

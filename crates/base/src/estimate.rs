@@ -8,7 +8,7 @@ pub const SIGMAS_95: f64 = 1.959_963_984_540_054;
 /// A number with its standard deviation. In JSON: `value`, and the limits `low` and `high` of its 95 % confidence interval.
 ///
 /// ```
-/// use bench::identify::Estimate;
+/// use bench_base::estimate::Estimate;
 ///
 /// let frequency_hz = Estimate { value: 29.27, sigma: 0.01 };
 /// assert!((frequency_hz.half_width_95() - 0.0196).abs() < 1e-6);

@@ -141,7 +141,8 @@ impl Dimension {
         own.map(|(unit, _, scale)| (*unit, *scale))
     }
 
-    pub(crate) fn description(self) -> String {
+    /// The dimension in words, with the units in which it can be given.
+    pub fn description(self) -> String {
         let name = match self {
             Dimension::Length => "a length",
             Dimension::Time => "a time",
