@@ -14,6 +14,7 @@ use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
 use crate::config::{Config, Purpose, profiles};
 use crate::experiment::check_named_files;
+use bench_settings::files::{find, own};
 
 /// What to do with the configuration.
 #[derive(Clone, Debug, clap::Args)]
@@ -150,8 +151,8 @@ fn all_profiles() -> Vec<Profile> {
         hidden: false,
     });
     let own = profiles::own_profiles().into_iter().map(|(name, file)| {
-        let is_built_in = profiles::find(profiles::PROFILES, &name).is_some();
-        let hidden = is_built_in || profiles::own(&name, "").as_ref() != Some(&file);
+        let is_built_in = find(profiles::PROFILES, &name).is_some();
+        let hidden = is_built_in || own(&name, "").as_ref() != Some(&file);
         Profile {
             name,
             file: Some(file.display().to_string()),

@@ -2,6 +2,7 @@
 
 use super::help::with_setting;
 use crate::config::{OptionSetting, profiles};
+use bench_settings::files::names;
 
 /// Which controller.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -32,7 +33,7 @@ impl ControllerChoice {
 }
 
 fn controller_help() -> String {
-    let names = profiles::names(profiles::CONTROLLERS);
+    let names = names(profiles::CONTROLLERS);
     let text = format!(
         "A controller by name ({names}), or a TOML file with a `title` and [[section]] tables, one for each factor of C(s) (gain, integrator, zero_pole, pole, pole_pair, biquad, coefficients: docs/own-stage.md lists their keys), or one of the tables [tf], [zpk], [ss] and [law]"
     );

@@ -6,6 +6,7 @@ use toml::Table;
 
 use crate::config::profiles;
 use bench_base::quantity::Dimension;
+use bench_settings::files::find;
 
 /// Where the terms of the help texts are explained.
 pub(super) const GLOSSARY: &str =
@@ -40,7 +41,7 @@ fn with_unit(key: &str, si: f64) -> String {
 fn profile() -> &'static Table {
     static PROFILE: OnceLock<Table> = OnceLock::new();
     PROFILE.get_or_init(|| {
-        let embedded = profiles::find(profiles::PROFILES, profiles::DEFAULT);
+        let embedded = find(profiles::PROFILES, profiles::DEFAULT);
         let table = embedded.and_then(|profile| profile.text.parse().ok());
         table.unwrap_or_default()
     })

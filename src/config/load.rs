@@ -1,22 +1,20 @@
 //! From layers of TOML to a checked [`Config`].
 
-use std::path::Path;
-
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
-use super::check;
 use super::cross_checks::cross_checks;
-use super::error::{ConfigError, MAX_ERRORS};
-use super::layer::{Layer, overlay, same_kind};
 use super::overrides::{
     OptionSetting, convert_quantities, in_terms_of_option, overlay_options, sets,
 };
-use super::profiles::{self, EmbeddedFile};
+use super::profiles;
 use super::purpose::Purpose;
 use super::{Config, renamed, schema};
 use bench_base::finding::Finding;
-use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_settings::check::check;
+use bench_settings::files::{find, text_of};
+use bench_settings::layer::{Layer, overlay, place_in, same_kind};
+use bench_settings::{ConfigError, MAX_ERRORS};
 
 /// A profile or file, and single settings that override it.
 ///
@@ -59,7 +57,7 @@ const LATER_TABLES: [&str; 6] = [
 /// ratios are not checked: earlier versions accepted all of them.
 pub fn whole(name: &str, text: &str) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
-    if let Some(base) = profiles::find(profiles::PROFILES, profiles::DEFAULT) {
+    if let Some(base) = find(profiles::PROFILES, profiles::DEFAULT) {
         let mut base = Layer::embedded(base)?;
         base.table.retain(|key, _| LATER_TABLES.contains(&key));
         layers.push(base);
@@ -79,7 +77,7 @@ fn checked(
     let (merged, findings) = merge(&schema, layers, options);
     let refuse = |findings| refuse(layers, options, findings, &schema, &merged);
     refuse(findings)?;
-    refuse(check::check(&schema, &merged))?;
+    refuse(check(&schema, &merged, renamed::RENAMED))?;
     let typed: Result<Config, toml::de::Error> = merged.clone().try_into();
     let config = typed.map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
     refuse(cross_checks(&config, purpose))?;
@@ -108,19 +106,12 @@ fn sets_of(layers: &[Layer]) -> Option<&Table> {
 /// Checks a configuration that was changed after it was loaded.
 pub(crate) fn validate(config: &Config) -> Result<(), ConfigError> {
     let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
-    let mut findings = check::check(&schema(), &value);
+    let mut findings = check(&schema(), &value, renamed::RENAMED);
     findings.extend(cross_checks(config, Purpose::Model));
     let lines = findings
         .iter()
         .map(|f| format!("  `{}` {}", f.path, f.what));
-    refuse_lines(lines.collect())
-}
-
-fn refuse_lines(lines: Vec<String>) -> Result<(), ConfigError> {
-    match lines.is_empty() {
-        true => Ok(()),
-        false => Err(ConfigError::Refused(lines)),
-    }
+    ConfigError::unless_empty(lines.collect())
 }
 
 fn refuse(
@@ -133,96 +124,29 @@ fn refuse(
     let sets = sets_of(layers);
     let line = |finding: &Finding| {
         in_terms_of_option(options, sets, finding, schema, merged).unwrap_or_else(|| {
-            let place = place(layers, finding.at());
+            let place = place_in(layers, finding.at());
             format!("  {place}: `{}` {}", finding.path, finding.what)
         })
     };
     let mut lines: Vec<String> = findings.iter().take(MAX_ERRORS).map(line).collect();
     // One option may set several settings.
     lines.dedup();
-    refuse_lines(lines)
-}
-
-/// The last layer that sets `path`, with the line; or the last layer that sets a table around it.
-fn place(layers: &[Layer], path: &str) -> String {
-    let mut path = path;
-    loop {
-        if let Some(place) = layers.iter().rev().find_map(|layer| layer.place(path)) {
-            return place;
-        }
-        match path.rsplit_once('.') {
-            Some((outer, _)) => path = outer,
-            None => break,
-        }
-    }
-    let last = layers.last();
-    last.map_or("the configuration".into(), |layer| layer.name.clone())
+    ConfigError::unless_empty(lines)
 }
 
 fn layers(source: &Source) -> Result<Vec<Layer>, ConfigError> {
-    let embedded = |name: &str| profiles::find(profiles::PROFILES, name);
+    let embedded = |name: &str| find(profiles::PROFILES, name);
     let base = embedded(profiles::DEFAULT).into_iter();
     let mut layers: Vec<Layer> = base.map(Layer::embedded).collect::<Result<_, _>>()?;
     let name = source.config.as_deref();
     if let Some(name) = name.filter(|name| *name != profiles::DEFAULT) {
         layers.push(match embedded(name) {
             Some(profile) => Layer::embedded(profile)?,
-            None => Layer::parse(name.into(), read(name, profiles::PROFILES, "profile")?)?,
+            None => Layer::parse(name.into(), text_of(name, profiles::PROFILES, "profile")?)?,
         });
     }
     if !source.sets.is_empty() {
         layers.push(sets(&source.sets)?);
     }
     Ok(layers)
-}
-
-fn read(name: &str, known: &[EmbeddedFile], what: &'static str) -> Result<String, ConfigError> {
-    let folder = match what {
-        "controller" => "controllers",
-        _ => "",
-    };
-    let own = profiles::own(name, folder);
-    let path = own.as_deref().unwrap_or(Path::new(name));
-    if !path.exists() {
-        return Err(ConfigError::NotFound {
-            what,
-            name: name.into(),
-            known: profiles::names(known),
-        });
-    }
-    input_file::read_text(path, MAX_SETTINGS_BYTES).map_err(|e| ConfigError::Unreadable {
-        path: path.into(),
-        why: e.to_string(),
-    })
-}
-
-/// The text of an embedded file by its name, or of any file by its path.
-pub(crate) fn text_of(
-    name: &str,
-    known: &[EmbeddedFile],
-    what: &'static str,
-) -> Result<String, ConfigError> {
-    match profiles::find(known, name) {
-        Some(embedded) => Ok(embedded.text.to_string()),
-        None => read(name, known, what),
-    }
-}
-
-/// The text of a file by its path.
-pub(crate) fn text_of_file(name: &str, what: &'static str) -> Result<String, ConfigError> {
-    read(name, &[], what)
-}
-
-/// Parses TOML of any type and checks it against the schema of the type.
-pub(crate) fn typed<T>(name: &str, text: &str) -> Result<T, ConfigError>
-where
-    T: serde::de::DeserializeOwned + schemars::JsonSchema,
-{
-    let layer = Layer::parse(name.to_string(), text.to_string())?;
-    let schema = schemars::schema_for!(T).to_value();
-    let value = Value::Table(layer.table.clone());
-    let findings = check::check(&schema, &value);
-    refuse(std::slice::from_ref(&layer), &[], findings, &schema, &value)?;
-    let typed: Result<T, toml::de::Error> = value.try_into();
-    typed.map_err(|e: toml::de::Error| ConfigError::Refused(vec![format!("  {name}: {e}")]))
 }

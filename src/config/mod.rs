@@ -14,23 +14,19 @@
 
 mod calibration;
 mod campaign;
-mod check;
 mod command;
 mod command_checks;
 mod control;
 mod cross_checks;
 mod devices;
 mod differences;
-mod error;
 mod excitation;
 mod identify;
 mod interlock;
-mod layer;
 mod load;
 mod monitor_checks;
 mod mounting_checks;
 mod overrides;
-mod place;
 pub mod profiles;
 mod purpose;
 mod relations;
@@ -46,18 +42,18 @@ pub use crate::excitation::{
     AmplitudePoint, ChirpSettings, ExcitationKind, Lines, MultisineSettings, PrbsSettings,
     ReferenceSettings, Spacing, SteppedSineSettings, Sweep, TravelPoint,
 };
+pub use bench_settings::ConfigError;
 pub use calibration::*;
 pub use campaign::*;
 pub use command::*;
 pub use control::*;
 pub use devices::*;
 pub use differences::{SettingDifference, changed_settings, differences};
-pub use error::ConfigError;
 pub use excitation::*;
 pub use identify::*;
 pub use interlock::*;
+pub(crate) use load::validate;
 pub use load::{Source, load, whole};
-pub(crate) use load::{text_of, text_of_file, typed, validate};
 pub use overrides::OptionSetting;
 pub(crate) use overrides::texts_of_set;
 pub use purpose::Purpose;

@@ -5,11 +5,11 @@ use std::ops::RangeInclusive;
 use serde_json::Value as Json;
 use toml::{Table, Value};
 
-use super::ConfigError;
-use super::check;
-use super::layer::{Layer, overlay, same_kind};
 use bench_base::finding::Finding;
 use bench_base::quantity::{Dimension, Quantity};
+use bench_settings::ConfigError;
+use bench_settings::check;
+use bench_settings::layer::{Layer, overlay, same_kind};
 
 /// Largest number of parts of a key. The deepest key of a configuration has 5.
 const MAX_KEY_PARTS: usize = 32;

@@ -1,9 +1,10 @@
 //! Keys of earlier versions: translated in recordings, refused with the new name elsewhere.
 
+use bench_settings::check::RenamedKeys;
 use toml::{Table, Value};
 
 /// Old path, new key within the same table.
-const RENAMED: [(&str, &str); 6] = [
+pub(super) const RENAMED: RenamedKeys = &[
     ("amplifier.device.when_unheard", "on_communication_loss"),
     ("calibrate.largest_hysteresis_ratio", "max_hysteresis_ratio"),
     (
@@ -14,12 +15,6 @@ const RENAMED: [(&str, &str); 6] = [
     ("campaign.askew_rad", "cable_misalignment_rad"),
     ("control.least_modulus_margin", "min_modulus_margin"),
 ];
-
-/// The new name of a key of an earlier version.
-pub(super) fn new_name(path: &str) -> Option<&'static str> {
-    let entry = RENAMED.iter().find(|(old, _)| *old == path);
-    entry.map(|(_, new)| *new)
-}
 
 /// Gives the keys of a recorded configuration their new names.
 pub(super) fn translate(config: &mut Table) {

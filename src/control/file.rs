@@ -11,7 +11,7 @@ use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
 };
 use super::unstable::MAX_INTEGRATORS;
-use crate::config::{self, profiles};
+use crate::config::profiles;
 
 /// A controller file with a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -135,7 +135,7 @@ impl ControllerText {
     pub fn find(name: &str) -> Result<Self, ControllerError> {
         Ok(ControllerText {
             name: name.into(),
-            text: config::text_of(name, profiles::CONTROLLERS, "controller")?,
+            text: bench_settings::text_of(name, profiles::CONTROLLERS, "controller")?,
         })
     }
 
@@ -175,7 +175,7 @@ impl ControllerText {
     }
 
     fn law(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
-        let file: LawFile = config::typed(&self.name, &self.text)?;
+        let file: LawFile = bench_settings::typed(&self.name, &self.text)?;
         let checked = file.law.check(rate_hz);
         checked.map_err(|why| ControllerError::Law {
             name: self.name.clone(),
@@ -185,7 +185,7 @@ impl ControllerText {
     }
 
     fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
-        let file: ControllerFile = config::typed(&self.name, &self.text)?;
+        let file: ControllerFile = bench_settings::typed(&self.name, &self.text)?;
         let numbered = (1..).zip(&file.section);
         let checked =
             numbered.map(|(number, settings)| self.checked_section(number, settings, rate_hz));
@@ -203,9 +203,15 @@ impl ControllerText {
     fn cascade(&self, table: TransferTable) -> Result<Cascade, ControllerError> {
         let (name, text) = (&self.name, &self.text);
         let settings = match table {
-            TransferTable::Tf => TransferSettings::Tf(config::typed::<TfFile>(name, text)?.tf),
-            TransferTable::Zpk => TransferSettings::Zpk(config::typed::<ZpkFile>(name, text)?.zpk),
-            TransferTable::Ss => TransferSettings::Ss(config::typed::<SsFile>(name, text)?.ss),
+            TransferTable::Tf => {
+                TransferSettings::Tf(bench_settings::typed::<TfFile>(name, text)?.tf)
+            }
+            TransferTable::Zpk => {
+                TransferSettings::Zpk(bench_settings::typed::<ZpkFile>(name, text)?.zpk)
+            }
+            TransferTable::Ss => {
+                TransferSettings::Ss(bench_settings::typed::<SsFile>(name, text)?.ss)
+            }
         };
         Cascade::of(&settings).map_err(|why| self.transfer_error(table, why))
     }

@@ -15,7 +15,7 @@ use super::plan_error::PlanError;
 use super::reference_check::{self, PlannedReference};
 use super::stage_check::RestAfterCheck;
 use super::swept_reference;
-use crate::config::{self, CampaignSettings, Config, PlantSettings, whole};
+use crate::config::{CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::command::CommandFilter;
 use crate::excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
@@ -223,8 +223,8 @@ impl Plan {
             return Err(PlanError::Missing("command"));
         }
         let calibration = attached_text(recording, CALIBRATION);
-        let calibration =
-            calibration.map(|text| config::typed("the calibration of the recording", &text));
+        let calibration = calibration
+            .map(|text| bench_settings::typed("the calibration of the recording", &text));
         Ok(Plan {
             controller,
             description: Description::of(recording),

@@ -126,7 +126,7 @@ impl RunOrder {
     /// When its text cannot be read.
     pub fn calibration(&self) -> Result<Option<Calibration>, PlanError> {
         let text = self.calibration_toml.as_deref();
-        let calibration = text.map(|text| config::typed("the ordered calibration", text));
+        let calibration = text.map(|text| bench_settings::typed("the ordered calibration", text));
         Ok(calibration.transpose()?)
     }
 }

@@ -7,8 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{
-    self, CalibrationSettings, Config, ConfigError, MIN_PROBE_GAIN, OnInvalidCalibration,
-    is_near_one,
+    CalibrationSettings, Config, ConfigError, MIN_PROBE_GAIN, OnInvalidCalibration, is_near_one,
 };
 
 /// The result of `bench calibrate`, with the date and the devices.
@@ -231,8 +230,8 @@ fn warnings(
 
 /// The calibration in a file, if its values allow a run.
 fn read(file: &str, config: &Config) -> Result<Calibration, CalibrationError> {
-    let text = config::text_of_file(file, "calibration")?;
-    let calibration: Calibration = config::typed(file, &text)?;
+    let text = bench_settings::text_of_file(file, "calibration")?;
+    let calibration: Calibration = bench_settings::typed(file, &text)?;
     match calibration.check(&config.calibration, config.interlock.current_error_a) {
         Ok(()) => Ok(calibration),
         Err(defect) => Err(CalibrationError::Defect {

@@ -3,13 +3,16 @@
 use toml::{Table, Value};
 
 use super::ConfigError;
+use super::files::EmbeddedFile;
 use super::place::line_of;
-use super::profiles::EmbeddedFile;
 
 /// One layer of settings, with the text it came from.
-pub(super) struct Layer {
+pub struct Layer {
+    /// File, profile or flag.
     pub name: String,
+    /// The text, in which the line of a key is searched.
     pub text: String,
+    /// The settings.
     pub table: Table,
 }
 
@@ -22,6 +25,7 @@ impl Layer {
         Layer::parse(format!("profile {}", profile.name), profile.text.into())
     }
 
+    /// Parses the text of a layer.
     pub fn parse(name: String, text: String) -> Result<Layer, ConfigError> {
         match text.parse::<Table>() {
             Ok(table) => Ok(Layer { name, text, table }),
@@ -42,9 +46,25 @@ impl Layer {
     }
 }
 
+/// The last of the layers that sets `path`, with the line; or the last layer that sets a table around it.
+pub fn place_in(layers: &[Layer], path: &str) -> String {
+    let mut path = path;
+    loop {
+        if let Some(place) = layers.iter().rev().find_map(|layer| layer.place(path)) {
+            return place;
+        }
+        match path.rsplit_once('.') {
+            Some((outer, _)) => path = outer,
+            None => break,
+        }
+    }
+    let last = layers.last();
+    last.map_or("the configuration".into(), |layer| layer.name.clone())
+}
+
 /// Merges `over` into `base`: tables that `joins` accepts are merged key by key; everything else replaces the old
 /// value.
-pub(super) fn overlay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
+pub fn overlay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) -> bool) {
     for (key, value) in over {
         match (base.get_mut(key), value) {
             (Some(Value::Table(old)), Value::Table(new)) if joins(old, new) => {
@@ -58,7 +78,7 @@ pub(super) fn overlay(base: &mut Table, over: &Table, joins: fn(&Table, &Table) 
 }
 
 /// Whether two tables have the same `kind` and `model`. Tables of different kinds have different keys and are not merged.
-pub(super) fn same_kind(old: &Table, new: &Table) -> bool {
+pub fn same_kind(old: &Table, new: &Table) -> bool {
     ["kind", "model"]
         .iter()
         .all(|tag| match (old.get(*tag), new.get(*tag)) {

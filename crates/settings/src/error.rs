@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// Largest number of errors in a message. The place of each is searched in all layers.
-pub(super) const MAX_ERRORS: usize = 50;
+pub const MAX_ERRORS: usize = 50;
 
 /// A configuration that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -63,6 +63,15 @@ fn refused(lines: &[String]) -> String {
 }
 
 impl ConfigError {
+    /// Refuses with one line for each error, if there are any.
+    pub fn unless_empty(lines: Vec<String>) -> Result<(), ConfigError> {
+        if lines.is_empty() {
+            Ok(())
+        } else {
+            Err(ConfigError::Refused(lines))
+        }
+    }
+
     /// The file, line or option of the first error.
     pub fn place(&self) -> Option<String> {
         match self {

@@ -6,15 +6,18 @@ use std::ops::RangeInclusive;
 use serde_json::{Map, Value as Json};
 use toml::{Table, Value};
 
-use super::renamed::new_name;
 use bench_base::finding::Finding;
 use bench_base::nearest::nearest;
 use bench_base::quantity::{Dimension, Quantity};
 
-/// The errors in `value`.
-pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
+/// Old path and new key of the settings that were renamed.
+pub type RenamedKeys = &'static [(&'static str, &'static str)];
+
+/// The errors in `value`. An unknown key that is in `renamed` is refused with its new name.
+pub fn check(schema: &Json, value: &Value, renamed: RenamedKeys) -> Vec<Finding> {
     let mut checker = Checker {
         root: schema,
+        renamed,
         findings: Vec::new(),
     };
     checker.node(schema, value, "");
@@ -22,12 +25,12 @@ pub(super) fn check(schema: &Json, value: &Value) -> Vec<Finding> {
 }
 
 /// Whether the schema expects a number at `path` of `value`.
-pub(super) fn expects_number(schema: &Json, value: &Value, path: &str) -> bool {
+pub fn expects_number(schema: &Json, value: &Value, path: &str) -> bool {
     keywords_at(schema, value, path).is_some_and(|keywords| keywords.is("number"))
 }
 
 /// The range of a number at `path` of `value`.
-pub(super) fn range_at(schema: &Json, value: &Value, path: &str) -> Option<RangeInclusive<f64>> {
+pub fn range_at(schema: &Json, value: &Value, path: &str) -> Option<RangeInclusive<f64>> {
     let keywords = keywords_at(schema, value, path)?;
     Some(keywords.number("minimum")?..=keywords.number("maximum")?)
 }
@@ -105,6 +108,7 @@ impl Keywords {
 
 struct Checker<'a> {
     root: &'a Json,
+    renamed: RenamedKeys,
     findings: Vec<Finding>,
 }
 
@@ -175,7 +179,10 @@ impl Checker<'_> {
         for (key, value) in entries {
             match properties.get(key).or(any_key) {
                 Some(schema) => self.node(schema, value, &join(path, key)),
-                None => self.add(&join(path, key), unknown_key(path, key, properties)),
+                None => {
+                    let what = unknown_key(self.renamed, path, key, properties);
+                    self.add(&join(path, key), what);
+                }
             }
         }
         let required = keywords.words("required").into_iter();
@@ -250,7 +257,8 @@ fn chosen<'a>(variants: &'a [Json], tag: &str, value: &Value) -> Option<&'a Json
     variants.find(|variant| constant(&variant["properties"][tag]) == Some(word))
 }
 
-pub(super) fn join(path: &str, key: &str) -> String {
+/// The path of the entry `key` of a table.
+pub fn join(path: &str, key: &str) -> String {
     match path.is_empty() {
         true => key.to_string(),
         false => format!("{path}.{key}"),
@@ -268,8 +276,14 @@ fn tag_of(variant: &Json) -> Option<String> {
     Some(key.clone())
 }
 
-fn unknown_key(table: &str, key: &str, properties: &Map<String, Json>) -> String {
-    if let Some(new) = new_name(&join(table, key)) {
+fn unknown_key(
+    renamed: RenamedKeys,
+    table: &str,
+    key: &str,
+    properties: &Map<String, Json>,
+) -> String {
+    let path = join(table, key);
+    if let Some((_, new)) = renamed.iter().find(|(old, _)| *old == path) {
         return format!("was renamed; use `{new}`");
     }
     match nearest(key, properties.keys().map(String::as_str)) {
