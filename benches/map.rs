@@ -3,7 +3,7 @@
 //! numpy's batched pencil, for comparison.
 
 use bench::config::{PlantSettings, Source, Sr4dofSettings, load};
-use bench::model::zeros::cnmp_map;
+use bench_plant::zeros::cnmp_map;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Values along either side.

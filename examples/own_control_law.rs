@@ -5,10 +5,10 @@
 use bench::config::{Source, load};
 use bench::control::{ControlLaw, LawInput};
 use bench::excitation::Reference;
-use bench::model::plant::{ModalModel, build};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
+use bench_plant::{ModalModel, build};
 
 /// Position and velocity of the first driven mode are observed; the error is integrated.
 struct StateFeedback {

@@ -34,7 +34,7 @@
 //!
 //! ```
 //! use bench::config::{Source, load};
-//! use bench::model::plant::{ModalModel, build};
+//! use bench_plant::{ModalModel, build};
 //!
 //! let config = load(&Source::default())?;
 //! let model = ModalModel::of(&build(&config.plant)?)?;

@@ -23,13 +23,13 @@ use crate::experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
     recorded_disturbance,
 };
-use crate::model::plant::SignalPath;
 use crate::recording::Recording;
 use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, si};
 use bench_base::units::UM_PER_M;
+use bench_plant::SignalPath;
 
 /// What is designed, and for which plants.
 #[derive(Clone, Debug, clap::Args)]

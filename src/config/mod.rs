@@ -63,7 +63,7 @@ pub use settings::*;
 pub use sim::*;
 pub use warnings::warnings;
 
-pub use crate::model::plant::{
+pub use bench_plant::{
     DampingPoint, DampingSettings, LumpedSettings, ModalSettings, ModeSettings, NodeSettings,
     PlantSettings, SecondaryMassDeviation, SpringSettings, Sr4dofSettings, XyLayout, XySettings,
 };

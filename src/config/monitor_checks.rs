@@ -2,8 +2,8 @@
 
 use super::purpose::Purpose;
 use super::{Config, Detection, InterlockSettings, MAX_DETECTED_RATIO};
-use crate::model::plant::{self, ModalModel, Mode};
 use bench_base::finding::Finding;
+use bench_plant::{ModalModel, Mode};
 
 /// Smallest frequency of the first mode over that of the mode with the largest static compliance. The low-pass of the plant's
 /// residual has half the frequency of the first mode: it reaches 90 % of a step after 3.89/(w/2), 1.24 periods of that mode.
@@ -58,7 +58,7 @@ fn responsible(share: f64) -> &'static str {
 
 /// A first mode far below the one that the stage moves in, for example with a negligible residue, makes the low-pass slow.
 fn slow(config: &Config) -> Option<Finding> {
-    let modes = ModalModel::of(&plant::build(&config.plant).ok()?)
+    let modes = ModalModel::of(&bench_plant::build(&config.plant).ok()?)
         .ok()?
         .modes;
     let first_rad_s = modes.iter().map(|mode| mode.omega_rad_s).reduce(f64::min)?;

@@ -12,8 +12,8 @@ use super::law::{ControlDesign, LawInput, LinearLaw};
 use super::margins::{Known, Margins, grid, margins};
 use super::state_space::StateSpace;
 use crate::excitation::command::LoopCommand;
-use crate::model::plant::{LoopPlant, Mode};
 use bench_base::units::UM_PER_M;
+use bench_plant::{LoopPlant, Mode};
 
 /// A closed loop, for the computation of its responses, poles, margins and step.
 pub struct ClosedLoop {

@@ -18,7 +18,7 @@ use nalgebra::Complex;
 
 use crate::excitation::command::{CommandFilter, CommandFilterError, Taps};
 use crate::excitation::fourier;
-use crate::model::plant::LoopPlant;
+use bench_plant::LoopPlant;
 
 /// Attenuation of F beyond its stop frequency in decibels; its ripple below `bandwidth_hz` is 10^(-60/20) = 0.1 %.
 const ATTENUATION_DB: f64 = 60.0;
@@ -177,7 +177,7 @@ fn negligible<'a>(weights: impl Iterator<Item = &'a f64>, limit: f64) -> usize {
 mod tests {
     use super::*;
     use crate::config::{Source, load};
-    use crate::model::plant::{Mode, SignalPath};
+    use bench_plant::{Mode, SignalPath};
 
     fn plant(modes: &[Mode]) -> LoopPlant {
         let config = load(&Source::default()).expect("embedded");

@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::{Biquad, Section};
-use crate::model::plant::{Mode, linear_algebra};
+use bench_plant::{Mode, linear_algebra};
 
 /// x' (or x+) = A x + B u, y = C x + D u.
 #[derive(Clone, Debug, PartialEq)]

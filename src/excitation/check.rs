@@ -213,15 +213,13 @@ mod tests {
     use super::*;
     use crate::config::{Config, Source, load};
     use crate::excitation::{AmplitudePoint, ExcitationKind};
-    use crate::model::plant::DiscretePlant;
+    use bench_plant::DiscretePlant;
 
     fn checked(change: &dyn Fn(&mut Config)) -> Result<Extremes, ExcitationError> {
         let mut config = load(&Source::default()).unwrap();
         change(&mut config);
-        let structure = crate::model::plant::build(&config.plant).unwrap();
-        let modes = crate::model::plant::ModalModel::of(&structure)
-            .unwrap()
-            .modes;
+        let structure = bench_plant::build(&config.plant).unwrap();
+        let modes = bench_plant::ModalModel::of(&structure).unwrap().modes;
         let (bandwidth_hz, force_constant) = (
             config.amplifier.bandwidth_hz,
             config.motor.force_constant_n_per_a,

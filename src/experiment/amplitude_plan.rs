@@ -10,8 +10,8 @@ use super::prediction::extremes;
 use crate::config::Config;
 use crate::excitation::{CurrentLimit, shaped_amplitude};
 use crate::identify::frf_csv;
-use crate::model::plant::{self, LoopPlant, ModalModel};
 use bench_base::units::{hz, rad_s};
+use bench_plant::{LoopPlant, ModalModel};
 
 /// Frequencies at which the model is evaluated, beside those of its modes: 0.2 % apart over four decades.
 const GRID: usize = 4000;
@@ -133,7 +133,7 @@ pub(super) fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), Exp
 
 /// The gain of the chain by the model over the band.
 fn gain_of_model(config: &Config) -> Result<Gain, ExperimentError> {
-    let modal = ModalModel::of(&plant::build(&config.plant)?)?;
+    let modal = ModalModel::of(&bench_plant::build(&config.plant)?)?;
     let chain = LoopPlant::with_mean_age(config, &modal.modes);
     let frequencies = grid_hz(config.chirp.band_hz(), &modal);
     let gain = |f: f64| (f, chain.response(rad_s(f)).norm());

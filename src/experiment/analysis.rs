@@ -20,8 +20,8 @@ use crate::identify::linearity::Linearity;
 use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use crate::identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
-use crate::model::plant::{self, ModalModel, Mode, Sign};
 use crate::recording::Recording;
+use bench_plant::{ModalModel, Mode, Sign};
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;
@@ -249,7 +249,7 @@ impl ModalStep<'_> {
         progress: &mut AnalysisProgress<'_>,
     ) -> Result<Analysis, AnalysisError> {
         let config = self.config;
-        let modal = ModalModel::of(&plant::build(&config.plant)?)?;
+        let modal = ModalModel::of(&bench_plant::build(&config.plant)?)?;
         let chain = MeasurementChain::bench(config);
         let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
         let scope = VerdictScope::of_model(&modal, self.certainty);

@@ -4,8 +4,8 @@ use super::plan_error::PlanError;
 use crate::control::ControllerError;
 use crate::control::measured::MeasuredLoopError;
 use crate::identify::IdentifyError;
-use crate::model::plant::PlantError;
 use crate::recording::RecordingError;
+use bench_plant::PlantError;
 
 /// Why a recording gives no frequency response.
 #[derive(Debug, thiserror::Error)]

@@ -12,10 +12,10 @@ use super::stage_check::StageCheckError;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
 use crate::excitation::ExcitationError;
-use crate::model::plant::PlantError;
 use crate::recording::RecordingError;
 use crate::rig::calibration::CalibrationError;
 use crate::rig::devices::DevicesError;
+use bench_plant::PlantError;
 
 /// An experiment that was refused or that failed.
 #[derive(Debug, thiserror::Error)]

@@ -5,8 +5,8 @@ use std::fmt;
 use super::plan_error::PlanError;
 use crate::config::Config;
 use crate::control::{ClosedLoop, ControllerText, Margins};
-use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::rig::devices;
+use bench_plant::{LoopPlant, ModalModel};
 
 /// A loop that is refused: too small a margin, or unstable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -98,7 +98,7 @@ pub(super) fn closed_loop_of(
     config: &Config,
 ) -> Result<ClosedLoop, PlanError> {
     let design = controller.design(config.servo.rate_hz)?;
-    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
+    let modes = ModalModel::of(&bench_plant::build(&config.plant)?)?.modes;
     let plant = LoopPlant::new(config, &modes);
     let force_constant_n_per_a = config.motor.force_constant_n_per_a;
     Ok(ClosedLoop::new(

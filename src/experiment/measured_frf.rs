@@ -18,9 +18,9 @@ use crate::control::measured::MeasuredLoopError;
 use crate::identify::delay::excess_delay;
 use crate::identify::frf_csv::{self, FrfCsvError};
 use crate::identify::{Estimate, Frf, FrfDatum};
-use crate::model::plant::LoopPlant;
 use crate::recording::{Recording, RecordingError};
 use bench_base::units::{hz, rad_s};
+use bench_plant::LoopPlant;
 
 /// The phases are compared with the model up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;

@@ -14,8 +14,8 @@ use crate::control::measured::{
     least_damping_ratio,
 };
 use crate::identify::{Frf, FrfPoint};
-use crate::model::plant::SignalPath;
 use bench_base::units::rad_s;
+use bench_plant::SignalPath;
 
 /// Margins of a measured loop: with 95 % intervals within the band of the FRF, with bounds by the model outside of it.
 #[derive(Clone, Debug, Serialize)]

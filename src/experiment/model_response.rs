@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use crate::config::Config;
-use crate::model::plant::{LoopPlant, ModalModel};
+use bench_plant::{LoopPlant, ModalModel};
 
 /// The model of a configuration between set-point and reading, for readings of the mean age.
 #[derive(Clone, Debug)]

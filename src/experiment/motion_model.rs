@@ -4,8 +4,8 @@ use super::loop_check::closed_loop_of;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use crate::control::ControllerText;
-use crate::model::plant::{self, LoopPlant, ModalModel};
 use crate::rt::residual::{LoopPrediction, ResidualBound, Residuals};
+use bench_plant::{LoopPlant, ModalModel};
 
 /// The monitor of a run, by the model of the configuration; `None` if the settings switch it off, and for the static steps of a
 /// calibration.
@@ -18,7 +18,7 @@ pub fn residuals(plan: &Plan) -> Result<Option<Residuals>, PlanError> {
     if settings.model_error_off.is_some() || plan.kind == RunKind::Calibrate {
         return Ok(None);
     }
-    let modes = ModalModel::of(&plant::build(&plan.config.plant)?)?.modes;
+    let modes = ModalModel::of(&bench_plant::build(&plan.config.plant)?)?.modes;
     let model = LoopPlant::with_mean_age(&plan.config, &modes);
     let bound = ResidualBound {
         absolute_m: ratio * settings.soft_limit_m,

@@ -19,10 +19,10 @@ use crate::config::{CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
 use crate::excitation::command::CommandFilter;
 use crate::excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
-use crate::model::plant::{self, ModalModel};
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, Correction};
 use crate::rt::program::{Control, Excite, Program};
+use bench_plant::ModalModel;
 
 /// Name of the attachment with the controller.
 const CONTROLLER: &str = "controller.toml";
@@ -400,7 +400,7 @@ fn zero_current(campaign: &CampaignSettings, period_s: f64) -> ZeroCurrent {
 
 /// Three periods of the first mode of the model in seconds, at most [`LONGEST_RAMP_S`]. A free body is not a mode.
 fn three_periods_s(plant: &PlantSettings) -> Result<f64, PlanError> {
-    let model = ModalModel::of(&plant::build(plant)?)?;
+    let model = ModalModel::of(&bench_plant::build(plant)?)?;
     let frequencies = model.modes.iter().map(|mode| mode.omega_rad_s / TAU);
     let first_hz = frequencies.filter(|hz| *hz > 0.0).reduce(f64::min);
     Ok(first_hz.map_or(LONGEST_RAMP_S, |hz| (3.0 / hz).min(LONGEST_RAMP_S)))

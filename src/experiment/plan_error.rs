@@ -5,7 +5,7 @@ use crate::config::ConfigError;
 use crate::control::{ControllerError, MinimumTimeError};
 use crate::excitation::command::CommandFilterError;
 use crate::excitation::{ExcitationError, ReferenceError};
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 
 /// A run that cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -3,8 +3,8 @@
 use super::error::ExperimentError;
 use crate::config::Config;
 use crate::excitation::{Excitation, Extremes};
-use crate::model::plant::DiscretePlant;
 use crate::rig::simulated;
+use bench_plant::DiscretePlant;
 
 /// The model of the rig: plant with all its modes, amplifier and hold.
 pub fn rig_model(config: &Config) -> Result<DiscretePlant, ExperimentError> {

@@ -4,8 +4,8 @@ use nalgebra::Complex;
 
 use crate::control::measured::{MeasuredLoop, MeasuredLoopError, MeasuredMargins, ResponsePoint};
 use crate::identify::Frf;
-use crate::model::plant::SignalPath;
 use bench_base::units::rad_s;
+use bench_plant::SignalPath;
 
 /// The margins of a measured L, without a model.
 ///

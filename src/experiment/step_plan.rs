@@ -6,8 +6,8 @@ use crate::control::{
     ClosedLoop, ControllerText, MinimumTime, SETTLING_BAND, StepLimits, StepPlant, StepTiming,
     minimum_time,
 };
-use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
+use bench_plant::LoopPlant;
 
 /// Time in seconds after the last change of the reference over which the error is limited.
 const WATCHED_S: f64 = 0.3;

@@ -4,8 +4,8 @@ use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use crate::excitation::{Extremes, ReferenceContext, SweptReference};
-use crate::model::plant::LoopPlant;
 use crate::rig::simulated;
+use bench_plant::LoopPlant;
 
 /// The configuration with the amplitudes of a swept reference, and the predicted extremes of the run, both by the model of the
 /// whole rig. Another reference has no extremes, and its configuration is returned unchanged. Refuses a run that would trip

@@ -4,7 +4,5 @@
 //!  settings -> plant (structure, modes, sampled responses) -> zeros (kinds, loci, maps) -> veering -> study (tolerances)
 //! ```
 
-pub mod plant;
 pub mod study;
 pub mod veering;
-pub mod zeros;

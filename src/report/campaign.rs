@@ -6,9 +6,9 @@ use colours::{BLUE, Colour, GREEN, INK, PAPER, VERMILION};
 
 use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use crate::identify::verdict::Cnmp;
-use crate::model::plant::PlantError;
-use crate::model::zeros::cnmp_map;
 use bench_base::decimal::Decimal;
+use bench_plant::PlantError;
+use bench_plant::zeros::cnmp_map;
 
 /// Number of cells of the map along the asymmetries.
 const COLUMNS: usize = 161;

@@ -33,8 +33,8 @@ use super::arming::Trip;
 use super::program::Decision;
 use crate::config::CLOSED_SHARE_FACTOR;
 use crate::control::{ControlLaw, LawInput};
-use crate::model::plant::{LoopPlant, LoopPlantState, Mode};
 use bench_base::numeric::is_within;
+use bench_plant::{LoopPlant, LoopPlantState, Mode};
 
 /// Factor of the share where the reference replaces the prediction, because the law is not linear.
 const NOT_LINEAR_FACTOR: f64 = 2.0;

@@ -5,10 +5,10 @@ use bench::experiment::certificate::{ResponseFile, SignAgreement, SignCheck, cer
 use bench::experiment::{self, Plan, analyse};
 use bench::identify::modal::FittedMode;
 use bench::identify::{Estimate, SIGMAS_95};
-use bench::model::plant::{ModalModel, build};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_plant::{ModalModel, build};
 use serde_json::Value;
 
 use crate::certificate::stage::{Chirp, chirp, config, reversed_chirp};

@@ -1,7 +1,7 @@
 //! Response and poles of a fit with given parameters, against closed forms.
 
 use bench::identify::modal::{MeasurementChain, ModalFit, ModalParameters};
-use bench::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 use nalgebra::{Complex, DMatrix};
 
 const DELAY_S: f64 = 3e-4;

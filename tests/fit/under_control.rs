@@ -5,10 +5,10 @@ use bench::config::{Config, ReferenceSettings, Source, load};
 use bench::excitation::SweptReference;
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench::identify::verdict::Cnmp;
-use bench::model::plant::LoopPlant;
 use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
+use bench_plant::LoopPlant;
 
 use crate::fit::identified::analysed;
 use crate::fit::simulated;

@@ -2,7 +2,7 @@
 use bench::identify::FrfDatum;
 use bench::identify::modal::{MeasurementChain, ModalFit, fit};
 use bench::identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
-use bench::model::plant::{self, ModalModel};
+use bench_plant::ModalModel;
 use nalgebra::Complex;
 
 use crate::fit::identified::{analysed, config, measurable, model, truth};
@@ -43,7 +43,7 @@ fn unknown_delay_is_measured_and_does_not_change_the_verdict() {
 }
 
 fn verdict_on(
-    modes: &[bench::model::zeros::ModalTerm],
+    modes: &[bench_plant::zeros::ModalTerm],
     sigma_m_per_n: f64,
     expected: usize,
 ) -> Verdict {
@@ -122,11 +122,11 @@ fn verdict_is_undecided_for_zeros_on_the_imaginary_axis() {
             "plant.operating_point_m=0.0038".to_string(),
             format!("plant.mass_asymmetry={d:.17}"),
         ];
-        plant::build(&config(&sets).plant).expect("a model")
+        bench_plant::build(&config(&sets).plant).expect("a model")
     };
     let pairs = |d: f64| {
-        bench::model::zeros::cnmp_pairs(
-            &bench::model::zeros::damped_zeros(&structure(d)).expect("zeros"),
+        bench_plant::zeros::cnmp_pairs(
+            &bench_plant::zeros::damped_zeros(&structure(d)).expect("zeros"),
         )
     };
     let (mut low, mut high) = (-0.02, 0.02);

@@ -1,8 +1,8 @@
 //! A chirp over the simulated chain of the profile `lab`, against the closed form.
 use bench::config::Config;
 use bench::experiment::{Analysis, Plan};
-use bench::model::plant::Mode;
 use bench::rig::simulated::modes as simulated_modes;
+use bench_plant::Mode;
 use nalgebra::Complex;
 
 use crate::lab::aliases::{lab, response};

@@ -5,12 +5,12 @@ use std::path::Path;
 use bench::config::Config;
 use bench::excitation::{Chirp, Excitation};
 use bench::experiment::{Plan, analyse};
-use bench::model::plant::Mode;
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::simulated::{self, LiveStage};
 use bench::rt::arming::State;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
 use bench_hal::Validity;
+use bench_plant::Mode;
 
 use crate::lab::aliases::{lab, response};
 

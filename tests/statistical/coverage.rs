@@ -8,8 +8,7 @@ use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::{Analysis, Plan};
 use bench::identify::Estimate;
 use bench::identify::verdict::zeros;
-use bench::model::plant;
-use bench::model::zeros::damped_zeros;
+use bench_plant::zeros::damped_zeros;
 use bench_test_support::identified::{measurable, model, stands_for};
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::sequences::decided;
@@ -265,7 +264,7 @@ impl Cell {
 
 /// The complex zeros of the model above the real axis.
 fn complex_zeros(config: &Config) -> Vec<Complex<f64>> {
-    let zeros = damped_zeros(&plant::build(&config.plant).expect("a model")).expect("zeros");
+    let zeros = damped_zeros(&bench_plant::build(&config.plant).expect("a model")).expect("zeros");
     let zeros = zeros.iter().map(|zero| zero.s);
     zeros.filter(|s| s.im > 0.0).collect()
 }

@@ -46,7 +46,7 @@ fn intervals_of_modes_contain_the_truth_in_95_percent_of_the_seeds() {
 #[test]
 fn ellipses_of_complex_zeros_contain_the_truth_in_95_percent_of_the_seeds() {
     let truth = stage();
-    let exact = bench::model::zeros::ModalSum::new(truth.clone(), 0.0)
+    let exact = bench_plant::zeros::ModalSum::new(truth.clone(), 0.0)
         .unwrap()
         .damped_zeros()
         .unwrap();

@@ -4,8 +4,8 @@ use bench::config::{Config, Source, load};
 use bench::control::{ClosedLoop, ControllerText};
 use bench::experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
 use bench::identify::{Estimate, response};
-use bench::model::plant::LoopPlant;
 use bench::rig::simulated;
+use bench_plant::LoopPlant;
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::unrecorded;
 

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use bench::model::zeros::{
+use bench_plant::zeros::{
     MmpLocation, ModalSum, ModalTerm, Sequence, StepResponse, TABLES, TableRow, ZeroCounts,
     table_of,
 };

@@ -3,8 +3,8 @@
 use bench::control::tuning::{
     DesignOptions, DesignTask, Effort, Goal, NamedPlant, Tolerances, design,
 };
-use bench::model::plant::Mode;
 use bench_base::progress::Progress;
+use bench_plant::Mode;
 use nalgebra::{Complex, DVector};
 
 use crate::tune::stage::{config, requirements};

@@ -1,14 +1,15 @@
 //! Designs from measured responses: on the true plant they have what they promise.
 
-use bench::config::{Config, UnmodelledMode};
+use bench::config::Config;
 use bench::control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
     MeasuredPlant, NamedPlant, Tolerances, design, evaluate,
 };
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
-use bench::model::plant::{Mode, SignalPath};
 use bench::rig::simulated;
 use bench_base::progress::Progress;
+use bench_plant::UnmodelledMode;
+use bench_plant::{Mode, SignalPath};
 use bench_test_support::chirp_source::{config_at, sampled, true_loop};
 use nalgebra::{DMatrix, DVector};
 

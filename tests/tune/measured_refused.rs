@@ -2,7 +2,7 @@
 
 use bench::config::Config;
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, TuneSourceError, evidence};
-use bench::model::plant::{ModalModel, Mode, build};
+use bench_plant::{ModalModel, Mode, build};
 use bench_test_support::chirp_source::{config_at, sampled};
 use nalgebra::{Complex, DVector};
 

@@ -5,11 +5,11 @@ use super::content::signed;
 use super::model::{Model, even, response};
 use super::{Comparison, Content, FigureError, Runs};
 use bench::config::{PlantSettings, Sr4dofSettings};
-use bench::model::plant::{self, ModalModel, Mode};
 use bench::model::veering::{Loci, ModesAt};
-use bench::model::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
+use bench_plant::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
+use bench_plant::{ModalModel, Mode};
 
 const TAU: f64 = std::f64::consts::TAU;
 /// Length of a beam of the stage in metres.
@@ -186,7 +186,7 @@ pub(crate) fn fig_2_4(_: &Runs) -> Result<Content, FigureError> {
 /// The discriminant of Eq. (2-8), b3^4 times the product of (ui - uj)^2 over the three zeros u = s^2, and whether two of them
 /// are complex: from the zeros of the pencil, without summing a polynomial.
 fn discriminant(settings: &Sr4dofSettings) -> Result<(f64, bool), FigureError> {
-    let structure = plant::build(&PlantSettings::Sr4dof(settings.clone()))?;
+    let structure = bench_plant::build(&PlantSettings::Sr4dof(settings.clone()))?;
     let zeros = undamped_zeros(&structure)?;
     let b3: f64 = ModalModel::of(&structure)?
         .modes

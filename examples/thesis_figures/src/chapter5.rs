@@ -3,9 +3,9 @@
 use super::model::{Model, even};
 use super::{Comparison, Content, FigureError, Runs};
 use bench::config::PlantSettings;
-use bench::model::zeros::cnmp_map;
 use bench::report::colours::Colour;
 use bench::report::{Chart, Mark, Scale};
+use bench_plant::zeros::cnmp_map;
 
 pub(crate) fn fig_5_2(_: &Runs) -> Result<Content, FigureError> {
     let (points, asymmetries) = (even(-0.15, 0.15, 201), even(-0.10, 0.10, 201));

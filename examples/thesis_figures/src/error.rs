@@ -3,10 +3,10 @@
 use bench::config::ConfigError;
 use bench::control::ControllerError;
 use bench::experiment::{AnalysisError, RunError};
-use bench::model::plant::PlantError;
 use bench::recording::RecordingError;
 use bench::report::ReportError;
 use bench::rig::devices::DevicesError;
+use bench_plant::PlantError;
 
 /// Why a figure could not be made.
 #[derive(Debug, thiserror::Error)]

@@ -5,8 +5,8 @@ use nalgebra::Complex;
 use super::FigureError;
 use bench::config::{Config, PlantSettings, Source, load};
 use bench::control;
-use bench::model::plant::{self, ModalModel, Structure};
-use bench::model::zeros::{ModalSum, Zero};
+use bench_plant::zeros::{ModalSum, Zero};
+use bench_plant::{ModalModel, Structure};
 
 /// A profile and settings over it, from which both the numbers and the printed command come.
 #[derive(Clone, Debug, Default)]
@@ -89,7 +89,7 @@ impl Model {
 
     /// The structure.
     pub fn structure(&self) -> Result<Structure, FigureError> {
-        Ok(plant::build(&self.config()?.plant)?)
+        Ok(bench_plant::build(&self.config()?.plant)?)
     }
 
     /// Its modes.
@@ -128,7 +128,7 @@ impl Varied {
         let settings: PlantSettings = serde_json::from_value(plant).map_err(|e| {
             FigureError::Run(format!("the plant at {} = {value}: {e}", self.pointer))
         })?;
-        Ok(plant::build(&settings)?)
+        Ok(bench_plant::build(&settings)?)
     }
 
     /// The sum of the modes that can be observed, at a value.
@@ -196,5 +196,5 @@ pub(crate) fn response(
 
 /// Zeros without damping as text: kinds by pairs and quartets.
 pub(crate) fn kinds(zeros: &[Zero]) -> String {
-    bench::model::zeros::ZeroCounts::of(zeros).to_string()
+    bench_plant::zeros::ZeroCounts::of(zeros).to_string()
 }

@@ -7,8 +7,7 @@ use super::content::signed;
 use super::model::Model;
 use super::{Comparison, Content, FigureError, Runs};
 use bench::config::{PlantSettings, XySettings};
-use bench::model::plant;
-use bench::model::zeros::{
+use bench_plant::zeros::{
     MmpLocation, ModalSum, ModalTerm, Sequence, TABLES, Table, TableRow, ZeroCounts,
     phase_drop_deg, table_of, undamped_zeros,
 };
@@ -122,7 +121,7 @@ fn labelled(base: &XySettings, row: usize, labels: &[usize; 8]) -> XySettings {
 }
 
 fn drop_deg(settings: XySettings) -> Result<f64, FigureError> {
-    Ok(phase_drop_deg(&undamped_zeros(&plant::build(
+    Ok(phase_drop_deg(&undamped_zeros(&bench_plant::build(
         &PlantSettings::Xy(settings),
     )?)?))
 }
@@ -257,7 +256,7 @@ fn mmp_places(sum: &ModalSum) -> Result<Vec<MmpLocation>, FigureError> {
     let zeros = sum.undamped_zeros()?;
     let mmp = zeros
         .iter()
-        .filter(|zero| zero.kind == bench::model::zeros::ZeroKind::Mmp && zero.s.im > 0.0);
+        .filter(|zero| zero.kind == bench_plant::zeros::ZeroKind::Mmp && zero.s.im > 0.0);
     Ok(mmp.map(|zero| place(zero.s.im)).collect())
 }
 

@@ -8,10 +8,9 @@ use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::Profiled;
 use crate::config::Purpose;
-use crate::model::plant;
-use crate::model::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
+use bench_plant::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
 
 /// The demands on the loop.
 #[derive(Clone, Debug, clap::Args)]
@@ -51,7 +50,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 
 fn report(args: &Args) -> Result<Report, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
-    let structure = plant::build(&config.plant)?;
+    let structure = bench_plant::build(&config.plant)?;
     let (alpha, peak) = (args.alpha, args.peak);
     let demand = args.bandwidth.map_or(Demand::Peak(peak), Demand::Bandwidth);
     Ok(Report {

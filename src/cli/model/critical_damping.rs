@@ -2,8 +2,8 @@
 
 use super::super::error::CliError;
 use super::super::output::print_result;
-use crate::model::zeros::CriticalDamping;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
+use bench_plant::zeros::CriticalDamping;
 
 /// Two close modes and a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]

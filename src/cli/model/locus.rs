@@ -11,12 +11,12 @@ use super::super::table::{table, wrap};
 use super::evenly_spread_rows;
 use super::sweep::SweepArgs;
 use crate::config::{Config, Purpose};
-use crate::model::plant::ModalModel;
-use crate::model::zeros::{
-    ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
-};
 use crate::report::{Picture, ReportError, locus_svg, plant_conditions};
 use bench_base::decimal::Decimal;
+use bench_plant::ModalModel;
+use bench_plant::zeros::{
+    ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
+};
 
 /// The setting that varies, and the zeros to follow.
 #[derive(Clone, Debug, clap::Args)]

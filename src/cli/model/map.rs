@@ -10,7 +10,6 @@ use super::super::output::print_result;
 use super::super::table::wrap;
 use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use crate::config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
-use crate::model::zeros;
 use crate::report::{CnmpMap, Picture, ReportError, map_svg};
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OperatingPoint, Ratio};
@@ -64,7 +63,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     let asymmetries = args.asymmetries.ratios()?;
     check_ends(args, &settings, &points, &asymmetries)?;
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    let cnmp_pairs = zeros::cnmp_map(&settings, &points, &asymmetries, threads)?;
+    let cnmp_pairs = bench_plant::zeros::cnmp_map(&settings, &points, &asymmetries, threads)?;
     let report = Report {
         operating_points: &points,
         asymmetries: &asymmetries,

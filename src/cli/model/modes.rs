@@ -6,8 +6,8 @@ use super::super::output::print_result;
 use super::super::table::table;
 use super::Profiled;
 use crate::config::Purpose;
-use crate::model::zeros::{ModeSummary, PlantSummary, Zero};
 use bench_base::decimal::Decimal;
+use bench_plant::zeros::{ModeSummary, PlantSummary, Zero};
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;

@@ -5,8 +5,8 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::Profiled;
 use crate::config::Purpose;
-use crate::model::plant::{ModalModel, build};
-use crate::model::zeros::{SequenceReport, TableRow, ZeroCounts};
+use bench_plant::zeros::{SequenceReport, TableRow, ZeroCounts};
+use bench_plant::{ModalModel, build};
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;

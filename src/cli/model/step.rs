@@ -9,14 +9,14 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
 use crate::config::{Config, Purpose};
-use crate::model::plant::{self, ModalModel};
-use crate::model::zeros::{
-    ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
-};
 use crate::report::{Picture, ReportError, model_step_svg, plant_conditions};
 use bench_base::decimal::Decimal;
 use bench_base::numeric::linspace;
 use bench_base::quantity::{OfTime, si};
+use bench_plant::ModalModel;
+use bench_plant::zeros::{
+    ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
+};
 
 /// The table of the response.
 #[derive(Clone, Debug, clap::Args)]
@@ -59,7 +59,7 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
     check_duration(args.duration)?;
     args.table.check()?;
     let config = args.bench.load(Purpose::Model, &[])?;
-    let sum = ModalSum::visible(&ModalModel::of(&plant::build(&config.plant)?)?)?;
+    let sum = ModalSum::visible(&ModalModel::of(&bench_plant::build(&config.plant)?)?)?;
     let response = StepResponse::new(&sum);
     let features = response.initial();
     let end_s = args.duration.unwrap_or(features.window_s);

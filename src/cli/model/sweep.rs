@@ -3,10 +3,10 @@
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use crate::config::{Config, OptionSetting, Purpose};
-use crate::model::plant::{self, Structure};
 use crate::model::veering::PairError;
 use bench_base::numeric::linspace;
 use bench_base::quantity::{Quantity, QuantityError};
+use bench_plant::Structure;
 
 /// The setting that varies, and its values. Defaults and limits differ between the commands: see `mut_arg` there.
 #[derive(Clone, Debug, clap::Args)]
@@ -58,7 +58,7 @@ impl SweepArgs {
 
     /// The plant at a value.
     pub fn structure(&self, value: f64) -> Result<Structure, CliError> {
-        Ok(plant::build(&self.config(value)?.plant)?)
+        Ok(bench_plant::build(&self.config(value)?.plant)?)
     }
 
     /// The configuration at a value.

@@ -11,9 +11,9 @@
 use nalgebra::Complex;
 
 use super::disturbance_spectrum::DisturbanceSpectrum;
-use crate::config::FloorLine;
-use crate::model::plant::Mode;
 use bench_base::units::rad_s;
+use bench_plant::FloorLine;
+use bench_plant::Mode;
 
 /// Variances in m^2 that belong to one frequency of a grid.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

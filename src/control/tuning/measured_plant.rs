@@ -3,8 +3,8 @@
 use super::plant::{DesignPlant, Tolerances, variations};
 use super::uncertainty::{IdentifiedResponse, Uncertainty, loop_plant};
 use super::unmodelled::UnmodelledBound;
-use crate::config::UnmodelledMode;
-use crate::model::plant::Mode;
+use bench_plant::Mode;
+use bench_plant::UnmodelledMode;
 
 /// A plant from a measured frequency response.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::uncertainty::Uncertainty;
 use crate::control::features::alias;
-use crate::model::plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{LoopPlant, Mode, SignalPath};
 
 /// A mode whose residue is below this part of the largest one is neither varied nor resolved.
 const VISIBLE: f64 = 1e-4;

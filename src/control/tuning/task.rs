@@ -11,7 +11,7 @@ use super::requirement::Requirements;
 use super::search::Effort;
 use super::unmodelled::UnmodelledBound;
 use crate::config::Config;
-use crate::model::plant::{self, ModalModel, Mode, PlantError, PlantSettings, SignalPath};
+use bench_plant::{ModalModel, Mode, PlantError, PlantSettings, SignalPath};
 
 /// What is designed, and how.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ impl NamedPlant {
     pub fn of(name: &str, settings: &PlantSettings) -> Result<NamedPlant, PlantError> {
         Ok(NamedPlant {
             name: name.into(),
-            modes: ModalModel::of(&plant::build(settings)?)?.modes,
+            modes: ModalModel::of(&bench_plant::build(settings)?)?.modes,
         })
     }
 }

@@ -15,7 +15,7 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::unmodelled::interpolated;
-use crate::model::plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{LoopPlant, Mode, SignalPath};
 
 /// Radius of the disc that contains 95 % of a circular normal distribution, in standard deviations of one component.
 pub const DISC_SIGMAS_95: f64 = 2.447_746_830_680_816;

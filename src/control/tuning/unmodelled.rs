@@ -1,9 +1,9 @@
 //! Bound of modes that the plant's model lacks: their magnitudes add, their phases are unknown.
 
-use crate::config::UnmodelledMode;
 use crate::control::features::alias;
-use crate::model::plant::{LoopPlant, Mode, SignalPath};
 use bench_base::units::rad_s;
+use bench_plant::UnmodelledMode;
+use bench_plant::{LoopPlant, Mode, SignalPath};
 
 /// Points of the table per decade.
 const PER_DECADE: f64 = 300.0;

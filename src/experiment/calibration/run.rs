@@ -12,12 +12,12 @@ use crate::experiment::prediction::{extremes, predicted_extremes};
 use crate::experiment::run_summary::RunSummary;
 use crate::experiment::runner::{Runner, close};
 use crate::experiment::signals::abandon_on_signal;
-use crate::model::plant::{self, ModalModel, PlantError};
 use crate::recording::Recording;
 use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 use bench_base::timestamp;
+use bench_plant::{ModalModel, PlantError};
 
 /// A calibration and its runs.
 #[derive(Clone, Debug)]
@@ -233,7 +233,7 @@ fn set_delay(chain: &mut ChainCalibration, analysis: Option<Analysis>) {
 
 /// The static compliance of the model, from current to displacement.
 fn compliance_m_per_a(config: &Config) -> Result<f64, ExperimentError> {
-    let modes = ModalModel::of(&plant::build(&config.plant)?)?.modes;
+    let modes = ModalModel::of(&bench_plant::build(&config.plant)?)?.modes;
     if modes.iter().any(|mode| mode.omega_rad_s == 0.0) {
         let what = "a static compliance, which `bench calibrate` measures,";
         return Err(PlantError::FreeBody(what).into());

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use crate::experiment::error::ExperimentError;
-use crate::model::plant::PlantError;
 use bench_base::checkpoint::{FileAction, FileError};
+use bench_plant::PlantError;
 
 /// A campaign that was refused or that failed.
 #[derive(Debug, thiserror::Error)]

@@ -10,8 +10,8 @@ use super::recommend::{Recommendation, Tolerances, recommend};
 use super::region::Region;
 use crate::config::{Config, Sr4dofSettings};
 use crate::identify::verdict::Cnmp;
-use crate::model::plant::PlantError;
-use crate::model::zeros::cnmp_map;
+use bench_plant::PlantError;
+use bench_plant::zeros::cnmp_map;
 
 /// Offsets are searched this far on both sides of the asymmetries of the grid, and the region of the model equally far.
 const SEARCH_RANGE: f64 = 0.1;

@@ -10,8 +10,8 @@ use super::error::CampaignError;
 use super::load::{Load, StageModel};
 use super::rest_position::RestPosition;
 use crate::config::{PlantSettings, Sr4dofSettings};
-use crate::model::plant::{self, ModalModel, Mode, Sign};
 use bench_base::decimal::Decimal;
+use bench_plant::{ModalModel, Mode, Sign};
 
 /// A difference of more standard deviations is not noise; noise alone exceeds it once in two million cases.
 const SIGMAS: f64 = 5.0;
@@ -167,7 +167,7 @@ impl StageModel<'_> {
 }
 
 fn modes(stage: &Sr4dofSettings) -> Result<Vec<Mode>, CampaignError> {
-    let plant = plant::build(&PlantSettings::Sr4dof(stage.clone()))?;
+    let plant = bench_plant::build(&PlantSettings::Sr4dof(stage.clone()))?;
     Ok(ModalModel::of(&plant)?.modes)
 }
 

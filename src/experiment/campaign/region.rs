@@ -1,8 +1,8 @@
 //! The region of operating points and asymmetries in which the model with damping has CNMP zeros.
 
 use crate::config::{PlantSettings, Sr4dofSettings};
-use crate::model::plant::{self, PlantError};
-use crate::model::zeros::{cnmp_pairs, damped_zeros};
+use bench_plant::PlantError;
+use bench_plant::zeros::{cnmp_pairs, damped_zeros};
 
 /// Step of the search over the asymmetries; a narrower band may be missed.
 const STEP: f64 = 0.002;
@@ -54,7 +54,7 @@ impl Region {
 
 /// Whether the zeros with damping of SR4DoF include a CNMP pair.
 fn has_pairs(stage: &Sr4dofSettings, point: f64, asymmetry: f64) -> Result<bool, PlantError> {
-    let plant = plant::build(&PlantSettings::Sr4dof(Sr4dofSettings {
+    let plant = bench_plant::build(&PlantSettings::Sr4dof(Sr4dofSettings {
         operating_point_m: point * stage.beam_length_m,
         mass_asymmetry: asymmetry,
         ..stage.clone()

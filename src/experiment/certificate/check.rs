@@ -9,8 +9,8 @@ use super::signs::{SignAgreement, SignCheck};
 use crate::config::Config;
 use crate::control::ControllerText;
 use crate::experiment::plan_error::PlanError;
-use crate::model::plant::{self, ModalModel};
 use bench_base::decimal::Decimal;
+use bench_plant::ModalModel;
 
 /// Relative difference of two equal numbers after a conversion of units.
 const ROUNDING: f64 = 1e-9;
@@ -217,7 +217,7 @@ fn load(certificate: &Certificate, config: &Config) -> [Checked; 2] {
 }
 
 fn signs(certificate: &Certificate, config: &Config) -> Result<Checked, PlanError> {
-    let model = ModalModel::of(&plant::build(&config.plant)?)?;
+    let model = ModalModel::of(&bench_plant::build(&config.plant)?)?;
     let modes: Vec<_> = certificate.modes.iter().map(Into::into).collect();
     let band_hz = (certificate.frf.from_hz, certificate.frf.to_hz);
     let check = SignCheck::of(&modes, &model, band_hz);

@@ -20,9 +20,9 @@ use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::response_points::points;
 use crate::experiment::stage_check::RestAfterCheck;
-use crate::model::plant::SignalPath;
 use crate::rig::calibration::Calibration;
 use bench_base::decimal::Decimal;
+use bench_plant::SignalPath;
 
 /// The evidence with which a loop closes. The names in JSON must not change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::identify::SIGMAS_95;
 use crate::identify::modal::FittedMode;
-use crate::model::plant::{ModalModel, Sign};
+use bench_plant::{ModalModel, Sign};
 
 /// Modes above this multiple of the highest mode of the model are not compared.
 const HIGHEST: f64 = 1.2;

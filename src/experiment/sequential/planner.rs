@@ -16,7 +16,7 @@ use crate::experiment::run::Run;
 use crate::experiment::run_summary::RunSummary;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
-use crate::model::plant::{self, ModalModel};
+use bench_plant::ModalModel;
 
 /// The sequence ends early, because nothing can be decided, after this number of shots or more.
 const MIN_LOOKS: usize = 2;
@@ -66,7 +66,7 @@ impl<'a> SequentialExperiment<'a> {
         planned: &PlannedShot,
         run: &mut Run,
     ) -> Result<(SequentialExperiment<'a>, ShotSummary), ExperimentError> {
-        let modal = ModalModel::of(&plant::build(&base.plant)?)?;
+        let modal = ModalModel::of(&bench_plant::build(&base.plant)?)?;
         let mut evidence = Evidence::default();
         evidence.add(&run.path, &planned.config)?;
         let first = FirstShot {

@@ -5,8 +5,8 @@ use serde::Serialize;
 use crate::config::Config;
 use crate::excitation::{AmplitudePoint, ExcitationKind, Sweep};
 use crate::experiment::error::ExperimentError;
-use crate::model::plant::{self, ModalModel};
 use bench_base::units::hz;
+use bench_plant::ModalModel;
 
 /// Length of the first shot in periods of the lowest mode.
 const FIRST_PERIODS: f64 = 90.0;
@@ -36,7 +36,7 @@ impl Shot {
     /// # Errors
     /// When the model of the plant cannot be built.
     pub(super) fn first(config: &Config) -> Result<Shot, ExperimentError> {
-        let modal = ModalModel::of(&plant::build(&config.plant)?)?;
+        let modal = ModalModel::of(&bench_plant::build(&config.plant)?)?;
         let modes_hz = modal.modes.iter().map(|mode| hz(mode.omega_rad_s));
         let modes_hz = modes_hz.filter(|hz| *hz > 0.0);
         let (first_hz, last_hz) = modes_hz.fold((f64::INFINITY, 0.0f64), |(low, high), hz| {

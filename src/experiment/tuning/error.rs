@@ -4,7 +4,7 @@ use super::disturbance::DisturbanceError;
 use crate::control::ControllerError;
 use crate::experiment::measured_frf::FrfError;
 use crate::identify::modal::FitError;
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 
 /// Measured responses that cannot be used for a design.
 #[derive(Debug, thiserror::Error)]

@@ -14,8 +14,8 @@ use crate::experiment::response_points::points;
 use crate::identify::Estimate;
 use crate::identify::modal::FittedMode;
 use crate::identify::verdict::Cnmp;
-use crate::model::plant::SignalPath;
 use bench_base::units::hz;
+use bench_plant::SignalPath;
 
 /// Part of half the sampling rate up to which the tolerance above the band is computed: C has zeros at its end.
 const HIGHEST: f64 = 0.98;

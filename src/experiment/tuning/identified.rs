@@ -7,7 +7,7 @@ use super::distinct::{check_distinct, check_modes};
 use super::error::TuneSourceError;
 use super::mode_fit::{best_fit, groups};
 use super::source::FrfSource;
-use crate::config::{Config, UnmodelledMode};
+use crate::config::Config;
 use crate::control::measured::{MeasuredLoop, check_gaps};
 use crate::control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
 use crate::experiment::analysis::{VerdictScope, judge};
@@ -16,8 +16,9 @@ use crate::experiment::measured_frf::{FrfError, check_rate, judge_excess};
 use crate::experiment::response_points::points;
 use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
 use crate::identify::verdict::Verdict;
-use crate::model::plant::{LoopPlant, Mode, SignalPath};
 use bench_base::units::{hz, rad_s};
+use bench_plant::UnmodelledMode;
+use bench_plant::{LoopPlant, Mode, SignalPath};
 
 /// The verdict on CNMP zeros covers the band up to this multiple of the highest mode that is used with its sign.
 const LAST_MODE: f64 = 1.2;

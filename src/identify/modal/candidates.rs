@@ -6,7 +6,7 @@ use super::measurement_chain::{Delays, unit_phasor};
 use super::parameters::ModalParameters;
 use super::solution::{Problem, Solution};
 use crate::identify::FrfDatum;
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// Damping ratios of a candidate.
 const DAMPING_RATIOS: [f64; 4] = [0.002, 0.006, 0.02, 0.06];

@@ -6,7 +6,7 @@
 use super::parameters::ModalParameters;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// Neighbouring modes belong to one cluster if their distance is below this multiple of the sum of their half-widths zeta w.
 const REACH: f64 = 4.0;

@@ -4,8 +4,8 @@ use nalgebra::{Complex, DVector};
 
 use crate::config::Config;
 use crate::identify::FrfDatum;
-use crate::model::plant::{LoopPlant, Mode, PathResponse, SignalPath};
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
+use bench_plant::{LoopPlant, Mode, PathResponse, SignalPath};
 
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
 const FAR_RAD_S: f64 = 1e6;

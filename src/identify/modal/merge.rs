@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::parameters::ModalParameters;
 use crate::identify::FrfDatum;
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// Width of merged data as a ratio of their distance d from the nearest pole. The mean of 1/(s - p) over -+h and that at two
 /// frequencies with the same spread differ by (1/5 - 1/9) (h/d)^4: 1e-8.

@@ -5,8 +5,8 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::clusters::cancelling;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
-use crate::model::plant::Sign;
-use crate::model::zeros::ModalTerm;
+use bench_plant::Sign;
+use bench_plant::zeros::ModalTerm;
 
 /// The modes that fit a response.
 #[derive(Clone, Debug, PartialEq)]

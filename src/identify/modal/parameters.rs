@@ -2,7 +2,7 @@
 
 use nalgebra::DVector;
 
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// Largest change of ln w in a step.
 const MAX_FREQUENCY_STEP: f64 = 0.02;

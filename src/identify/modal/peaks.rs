@@ -4,7 +4,7 @@ use super::candidates::{TRIALS, delays_s};
 use super::parameters::ModalParameters;
 use super::solution::{Problem, Solution, node_responses};
 use crate::identify::FrfDatum;
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// A peak is the largest velocity within this ratio of its frequency.
 const REACH: f64 = 0.03;

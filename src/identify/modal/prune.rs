@@ -4,7 +4,7 @@ use super::clusters::with_fewer_in_clusters;
 use super::parameters::{ModalParameters, Parameter};
 use super::refine::refine;
 use super::solution::{Problem, Solution};
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// Start of the one mode that replaces all below the data: frequency as a ratio of the lowest, and damping ratio.
 const BELOW_BAND: (f64, f64) = (0.3, 0.4);

@@ -11,7 +11,7 @@ use nalgebra::{Complex, DVector};
 use super::measurement_chain::MeasurementChain;
 use super::modal_fit::ModalFit;
 use super::parameters::Parameter;
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// dG/dtheta of the mechanics at any s; zero for the delay, which the mechanics do not have.
 pub(crate) fn mechanics_derivative(

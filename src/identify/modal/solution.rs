@@ -11,7 +11,7 @@ use super::measurement_chain::{MeasurementChain, NodeResponse, Nodes, log_deriva
 use super::normal_equations::{NormalEquations, WeightedColumns};
 use super::parameters::{ModalParameters, Parameter};
 use crate::identify::FrfDatum;
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// The data of a fit and the chain through which they were measured.
 #[derive(Clone, Copy)]

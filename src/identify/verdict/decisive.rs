@@ -12,8 +12,8 @@
 
 use super::input::VerdictInput;
 use crate::identify::modal::{ModalParameters, Parameter};
-use crate::model::plant::PlantError;
-use crate::model::zeros::{ModalSum, ZeroKind};
+use bench_plant::PlantError;
+use bench_plant::zeros::{ModalSum, ZeroKind};
 
 /// The first mode of the verdict, by its index, whose sign is uncertain and changes the number of CNMP pairs.
 ///

@@ -14,7 +14,7 @@ use super::input::{Certainty, VerdictInput};
 use super::zeros::{derivatives, zeros};
 use super::{UncertainZero, has_certain_side};
 use crate::identify::modal::{ModalFit, Parameter};
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 
 /// A quantity whose sign is not certain, and on which the verdict depends.
 #[derive(Clone, Debug)]

@@ -38,8 +38,8 @@ use sign_groups::signs_of;
 
 use crate::identify::FrfDatum;
 use crate::identify::modal::FittedMode;
-use crate::model::plant::{PlantError, Sign};
-use crate::model::zeros::ZeroKind;
+use bench_plant::zeros::ZeroKind;
+use bench_plant::{PlantError, Sign};
 
 /// A CNMP pair that the phase does not confirm, because the response around it is noise, lies this many standard deviations off the
 /// axis: a fit is then extrapolated, and errors of the model count as well as noise.

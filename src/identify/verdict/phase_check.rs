@@ -8,8 +8,8 @@ use super::phase_drop::{PhaseCurve, PhaseDrop, Roots, phase_drop};
 use super::zeros::UncertainZero;
 use crate::identify::FrfDatum;
 use crate::identify::modal::{FittedMode, merged};
-use crate::model::plant::PlantError;
-use crate::model::zeros::ModalSum;
+use bench_plant::PlantError;
+use bench_plant::zeros::ModalSum;
 
 /// A response is significant above this multiple of the power of its noise: its phase has a standard deviation of 9 degrees.
 const SIGNIFICANT_POWER: f64 = 20.0;

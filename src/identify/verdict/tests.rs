@@ -9,7 +9,7 @@ use nalgebra::Complex;
 
 use super::{Certainty, Cnmp, Verdict};
 use crate::identify::modal::Parameter;
-use crate::model::zeros::{ModalTerm, ZeroKind};
+use bench_plant::zeros::{ModalTerm, ZeroKind};
 use stage::{Case, DAMPING_RAD_S, PAIR_RAD_S, Stage, UP_TO_RAD_S, all_pass_lag_deg, hertz, pair};
 
 /// Errors of the Bode integral over data 1 rad/s apart, in degrees: between the data around a zero near the axis, the area under

@@ -12,8 +12,8 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::identify::Estimate;
 use crate::identify::modal::{ModalFit, by_denominator, mechanics_derivative};
-use crate::model::plant::PlantError;
-use crate::model::zeros::{ModalSum, ModalTerm, ZeroKind};
+use bench_plant::PlantError;
+use bench_plant::zeros::{ModalSum, ModalTerm, ZeroKind};
 
 /// A zero with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
-use crate::model::plant::{self, ModalModel, PlantError, PlantSettings, Structure};
-use crate::model::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
+use bench_plant::zeros::{cnmp_pairs, damped_zeros, undamped_zeros};
+use bench_plant::{ModalModel, PlantError, PlantSettings, Structure};
 
 /// CNMP pairs of one draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,9 +51,9 @@ impl<'a> Counter<'a> {
 
     fn pairs(&self, plant: &PlantSettings) -> Result<Count, PlantError> {
         if !self.damped {
-            return undamped_count(&plant::undamped(plant));
+            return undamped_count(&bench_plant::undamped(plant));
         }
-        let structure = plant::build(plant)?;
+        let structure = bench_plant::build(plant)?;
         let damped_pairs = cnmp_pairs(&damped_zeros(&structure)?) as u32;
         Ok(Count {
             damped_pairs: Some(damped_pairs),

@@ -16,8 +16,8 @@
 //! constant.
 //! [`Remainder`] quantifies how far each assumption holds.
 
-use crate::model::plant::PlantError;
-use crate::model::zeros::{ModalSum, ModalTerm, Zero};
+use bench_plant::PlantError;
+use bench_plant::zeros::{ModalSum, ModalTerm, Zero};
 
 /// Two modes, and the others as a double integrator.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,7 +23,7 @@
 use serde::Serialize;
 
 use super::{CloseModes, Meeting};
-use crate::model::zeros::{Zero, ZeroKind};
+use bench_plant::zeros::{Zero, ZeroKind};
 
 /// A condition at one value of the setting.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

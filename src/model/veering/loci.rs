@@ -15,7 +15,7 @@
 use serde::Serialize;
 
 use super::ModesAt;
-use crate::model::plant::{PlantError, Structure};
+use bench_plant::{PlantError, Structure};
 
 /// Steps below this ratio of the range are not halved any more.
 const SMALLEST_STEP: f64 = 1e-12;

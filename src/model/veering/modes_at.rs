@@ -3,9 +3,9 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::CloseModes;
-use crate::model::plant::{ModalModel, Mode, PlantError, Structure};
-use crate::model::zeros::ModalTerm;
 use bench_base::numeric::assign;
+use bench_plant::zeros::ModalTerm;
+use bench_plant::{ModalModel, Mode, PlantError, Structure};
 
 /// Eigenvalues have an error of some 1e-15 of the largest: two that differ by less than this ratio of it are equal.
 const EQUAL_RATIO: f64 = 1e-12;

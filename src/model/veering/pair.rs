@@ -1,7 +1,7 @@
 //! The choice of two modes.
 
 use super::{Loci, Meeting};
-use crate::model::plant::{PlantError, Structure};
+use bench_plant::{PlantError, Structure};
 
 /// The reason why there is no pair of close modes, or no veering point, with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

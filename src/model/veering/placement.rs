@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::conditions::c4_1;
 use super::trajectory::Ports;
 use super::{Meeting, ModesAt, QuadrantDiagram, QuadrantSummary, Sample, ZeroConfiguration};
-use crate::model::plant::{PlantError, Port, PortWeights};
-use crate::model::zeros::cnmp_pairs;
+use bench_plant::zeros::cnmp_pairs;
+use bench_plant::{PlantError, Port, PortWeights};
 
 /// Placements with less than this ratio of the present aR are not recommended: the probe hardly measures the controlled motion.
 pub const MIN_REMAINDER_RATIO: f64 = 0.1;

@@ -8,8 +8,8 @@ use rand_pcg::Pcg64;
 use super::conditions::{c4_1, c4_2, c4_3, c4_4, c4_4y};
 use super::propositions::{Interval, Prediction, Proposition, Side, p4_1};
 use super::{CloseModes, Loci, Meeting, Sample, Trajectory, ZeroConfiguration, as_configured};
-use crate::model::plant::{PlantError, Structure};
-use crate::model::zeros::{ModalTerm, ZeroCounts};
+use bench_plant::zeros::{ModalTerm, ZeroCounts};
+use bench_plant::{PlantError, Structure};
 
 /// Random numbers, the same in every run.
 struct RandomNumbers(Pcg64);

@@ -4,8 +4,8 @@ use nalgebra::DVector;
 use serde::Serialize;
 
 use super::{CloseModes, Loci, Meeting, ModesAt};
-use crate::model::plant::{PlantError, Structure};
-use crate::model::zeros::{ModalTerm, Zero, ZeroKind, undamped_zeros};
+use bench_plant::zeros::{ModalTerm, Zero, ZeroKind, undamped_zeros};
+use bench_plant::{PlantError, Structure};
 
 /// Bisections between two values: a step of the grid over 2^44 is below the rounding of a value.
 const BISECTIONS: usize = 44;

@@ -3,11 +3,11 @@
 use nalgebra::Complex;
 
 use super::{colour, setting_label, setting_number};
-use crate::model::zeros::Locus;
 use crate::report::ReportError;
 use crate::report::chart::colours::{GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::spread;
+use bench_plant::zeros::Locus;
 
 const PLANE_HEIGHT: f64 = 420.0;
 const PARTS_HEIGHT: f64 = 260.0;

@@ -1,12 +1,12 @@
 //! The response of the plant to a step of force, and the part of each mode.
 
 use super::colour;
-use crate::model::zeros::{StepFeatures, StepResponse};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::frequency_text;
 use bench_base::numeric::linspace;
+use bench_plant::zeros::{StepFeatures, StepResponse};
 
 const HEIGHT: f64 = 420.0;
 const MICRO: f64 = 1e6;

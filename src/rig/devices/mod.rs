@@ -21,8 +21,8 @@ use bench_hal::serial::{Note, SerialProbe, StatisticsHandle};
 use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 
 use crate::config::{AmplifierDevice, Config, ProbeDevice};
-use crate::model::plant::PlantError;
 use crate::rig::simulated::SimulatedRig;
+use bench_plant::PlantError;
 
 use deferred::{ComputingDelayError, OutputTiming};
 

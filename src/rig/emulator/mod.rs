@@ -27,7 +27,7 @@ use bench_hal::can::bus::{BusError, NodeInUse, PortError};
 use bench_hal::serial::SerialError;
 use serde::Serialize;
 
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 
 pub use amplifier::AmplifierServer;
 pub use emulated_bench::{EmulatedDevices, Emulator, Summary};

@@ -1,11 +1,12 @@
 //! The linear model of the simulated stage, with what the configured model does not contain.
 
-use crate::config::{PlantSettings, SimSettings, UnmodelledMode};
-use crate::model::plant::{self, ModalModel, Mode, PlantError};
+use crate::config::{PlantSettings, SimSettings};
+use bench_plant::UnmodelledMode;
+use bench_plant::{ModalModel, Mode, PlantError};
 
 /// The modes of the linear rig: those of the plant's model, and the unmodelled ones.
 pub fn modes(plant: &PlantSettings, sim: &SimSettings) -> Result<Vec<Mode>, PlantError> {
-    let mut modes = ModalModel::of(&plant::build(&actual_plant(plant, sim))?)?.modes;
+    let mut modes = ModalModel::of(&bench_plant::build(&actual_plant(plant, sim))?)?.modes;
     for mode in &mut modes {
         mode.omega_rad_s *= sim.frequency_ratio;
     }

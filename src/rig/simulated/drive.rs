@@ -1,6 +1,6 @@
 //! The drive of the simulated stage: current loop and motor.
 
-use crate::model::plant::{DiscretePlant, Mode};
+use bench_plant::{DiscretePlant, Mode};
 
 /// Amplifier and motor.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,8 @@
 use nalgebra::{Matrix2, Vector2};
 
 use super::noise::Gaussian;
-use crate::config::FloorLine;
-use crate::model::plant::matrix_exponential;
+use bench_plant::FloorLine;
+use bench_plant::matrix_exponential;
 
 /// One line of the acceleration.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use super::stage::Stage;
 use super::trajectory::{Interval, Trajectory};
 use crate::config::Config;
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 
 /// Length of a step. It is a third of a radian of the fastest mode at 284 Hz; the cubic between two steps then has a relative
 /// error of 4e-5. Near the stop the stage uses finer steps.

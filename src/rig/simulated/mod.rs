@@ -21,7 +21,7 @@ use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProb
 use std::task::Poll;
 
 use crate::config::Config;
-use crate::model::plant::PlantError;
+use bench_plant::PlantError;
 use probe::Probe;
 use stage::Stage;
 use trajectory::Trajectory;

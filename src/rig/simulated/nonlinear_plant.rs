@@ -2,9 +2,7 @@
 
 use super::drive::Drive;
 use crate::config::PlantSettings;
-use crate::model::plant::{
-    Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build,
-};
+use bench_plant::{Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build};
 
 /// Largest phase of the fastest mode per step, in radians. The relative error of the phase is then (0.02)^4/120 = 1.3e-9, and
 /// that of the amplitude (0.02)^5/144 = 2e-11 per radian, with a damping ratio of 1e-3.

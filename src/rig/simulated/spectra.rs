@@ -17,9 +17,10 @@ use std::f64::consts::PI;
 use nalgebra::Complex;
 
 use super::modes;
-use crate::config::{Config, FloorLine};
-use crate::model::plant::{Mode, PlantError};
+use crate::config::Config;
 use bench_base::units::rad_s;
+use bench_plant::FloorLine;
+use bench_plant::{Mode, PlantError};
 
 /// One-sided spectra of the simulated rig at rest, in m^2/Hz at the probe.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@ use super::floor::Line;
 use super::noise::Gaussian;
 use super::nonlinear_plant::NonlinearPlant;
 use crate::config::{Config, Geometry, SimSettings};
-use crate::model::plant::{DiscretePlant, Disturbance, Mode, PlantError, PlantState};
+use bench_plant::{DiscretePlant, Disturbance, Mode, PlantError, PlantState};
 
 /// Largest step during contact with the stop. The contact frequency with the smallest effective mass is
 /// sqrt(1e7 N/m / 0.4 kg) = 5000 rad/s, so a step is 0.1 rad.

@@ -5,8 +5,8 @@ use bench::control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings
 use bench::experiment::MeasuredFrf;
 use bench::experiment::tuning::FrfSource;
 use bench::identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
-use bench::model::plant::{LoopPlant, Mode};
 use bench::rig::simulated;
+use bench_plant::{LoopPlant, Mode};
 use nalgebra::Complex;
 
 use crate::stage::Dice;

@@ -2,8 +2,8 @@
 use bench::config::{Config, Source, load};
 use bench::experiment::{Analysis, Plan};
 use bench::identify::modal::FittedMode;
-use bench::model::plant::{self, ModalModel};
-use bench::model::zeros::{cnmp_pairs, damped_zeros};
+use bench_plant::ModalModel;
+use bench_plant::zeros::{cnmp_pairs, damped_zeros};
 
 use crate::simulated;
 
@@ -26,7 +26,7 @@ pub fn analysed(config: &Config, assumed: &Config) -> Analysis {
 
 /// CNMP pairs of the model with damping.
 pub fn truth(config: &Config) -> usize {
-    cnmp_pairs(&damped_zeros(&plant::build(&config.plant).expect("a model")).expect("zeros"))
+    cnmp_pairs(&damped_zeros(&bench_plant::build(&config.plant).expect("a model")).expect("zeros"))
 }
 
 /// w (rad/s), zeta and residue (1/kg) of a mode.
@@ -34,7 +34,8 @@ pub type Truth = [f64; 3];
 
 /// The modes of the model, slowest first.
 pub fn model(config: &Config) -> Vec<Truth> {
-    let modal = ModalModel::of(&plant::build(&config.plant).expect("a model")).expect("modes");
+    let modal =
+        ModalModel::of(&bench_plant::build(&config.plant).expect("a model")).expect("modes");
     modal
         .modes
         .iter()

@@ -1,6 +1,6 @@
 //! Frequency responses in closed form, with noise of known power.
 use bench::identify::FrfDatum;
-use bench::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 use nalgebra::Complex;
 
 /// Approximately normal deviates of mean 0 and variance 1: sums of twelve uniform deviates.

@@ -4,12 +4,12 @@ use super::super::content::signed;
 use super::super::model::{ModeOf, Model, even, geometric};
 use super::super::plane::{Part, changes, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
-use bench::model::zeros::{
+use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
+use bench::report::{Chart, Pen, Symbol};
+use bench_plant::zeros::{
     Crossing, Locus, LocusPlane, ModalTerm, critical_damping, touching_damping,
     two_mode_break_points,
 };
-use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Symbol};
 
 const KEY_V: &str = "plant.modes.v.residue_per_kg";
 const KEY_R: &str = "plant.modes.R.residue_per_kg";

@@ -7,9 +7,9 @@ use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
 use bench::control::{self, ControllerText, continuous_response};
-use bench::model::zeros::{Crossing, Locus, LocusPlane, ModalSum};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
+use bench_plant::zeros::{Crossing, Locus, LocusPlane, ModalSum};
 
 const KEY: &str = "plant.modes.R.residue_per_kg";
 
@@ -434,7 +434,7 @@ pub(in super::super) fn fig_3_13(_: &Runs) -> Result<Content, FigureError> {
                 &format!("phase drop, {name}"),
                 drop,
                 0,
-                bench::model::zeros::phase_drop_deg(&equal_pair(size)?.undamped_zeros()?),
+                bench_plant::zeros::phase_drop_deg(&equal_pair(size)?.undamped_zeros()?),
                 "deg",
             ))
             .command(

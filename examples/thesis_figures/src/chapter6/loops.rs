@@ -5,7 +5,7 @@ use nalgebra::Complex;
 use super::super::FigureError;
 use super::super::model::Model;
 use bench::control::{ClosedLoop, ControllerText};
-use bench::model::plant::{LoopPlant, ModalModel};
+use bench_plant::{LoopPlant, ModalModel};
 
 /// The loop of a plant with a controller: a name of the program's own, or a file's name and its text.
 pub(crate) fn closed_loop(
@@ -22,7 +22,7 @@ pub(crate) fn closed_loop(
         None => ControllerText::find(name)?,
     };
     let design = controller.design(config.servo.rate_hz)?;
-    let modes = ModalModel::of(&bench::model::plant::build(&config.plant)?)?.modes;
+    let modes = ModalModel::of(&bench_plant::build(&config.plant)?)?.modes;
     let plant = LoopPlant::new(&config, &modes);
     let force_constant_n_per_a = config.motor.force_constant_n_per_a;
     Ok(ClosedLoop::new(

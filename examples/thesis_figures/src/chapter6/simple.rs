@@ -9,9 +9,9 @@ use super::loops::{closed, closed_loop, open, step};
 use nalgebra::Complex;
 
 use bench::control::{self, ClosedLoop, ControllerText, Margins};
-use bench::model::zeros::sign_sequence;
 use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale};
+use bench_plant::zeros::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";
 const COLOURS: [Colour; 4] = [BLUE, VERMILION, GREEN, PURPLE];

@@ -8,7 +8,7 @@ use crate::identify::verdict::sign_groups::signs_of;
 use crate::identify::verdict::{
     Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate,
 };
-use crate::model::zeros::ZeroKind;
+use bench_plant::zeros::ZeroKind;
 
 const OPPOSITE: [f64; 2] = [1.0, -1.0];
 

@@ -14,7 +14,7 @@ use nalgebra::{Complex, DMatrix};
 use crate::identify::FrfDatum;
 use crate::identify::modal::{MeasurementChain, ModalFit, ModalParameters, Parameter};
 use crate::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
-use crate::model::zeros::ModalTerm;
+use bench_plant::zeros::ModalTerm;
 
 /// c in rad/s: damping ratios of about 1 % at 100 rad/s.
 pub(super) const DAMPING_RAD_S: f64 = 2.0;

@@ -5,7 +5,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use super::stage::{Case, DAMPING_RAD_S, Stage, index, pair};
 use crate::identify::modal::{ModalFit, ModalParameters, Parameter};
 use crate::identify::verdict::zeros::{UncertainZero, derivatives, zeros};
-use crate::model::zeros::{ModalTerm, ZeroKind};
+use bench_plant::zeros::{ModalTerm, ZeroKind};
 
 /// Steps of w1, zeta1, r1, w2, zeta2, r2, R and tau: about 1e-5 of the distance of the modes, so that the error of a central
 /// difference, its square, is 1e-9. The zeros move by 1e-3 rad/s and are computed to some 1e-11 rad/s.

@@ -2,7 +2,7 @@
 
 /// The beams of a mechanism, all equal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Beam {
+pub struct Beam {
     /// L.
     pub length_m: f64,
     /// H, out of plane.

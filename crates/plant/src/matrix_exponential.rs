@@ -8,9 +8,7 @@ const TERMS: u32 = 13;
 /// exp(A) by scaling and squaring: the Taylor series of A/2^s, squared s times.
 ///
 /// nalgebra's own exponential needs its `std` feature, whose products are rounded differently on different processors.
-pub(crate) fn matrix_exponential<const N: usize>(
-    matrix: &SMatrix<f64, N, N>,
-) -> SMatrix<f64, N, N> {
+pub fn matrix_exponential<const N: usize>(matrix: &SMatrix<f64, N, N>) -> SMatrix<f64, N, N> {
     let squarings = squarings(norm(matrix));
     let scaled = matrix * libm::exp2(-f64::from(squarings));
     // Horner: I + A (I + A/2 (I + A/3 (...))).

@@ -13,8 +13,8 @@
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::{Serialize, Serializer};
 
-use crate::model::plant::linear_algebra::{orthogonal_complement, pencil_roots};
-use crate::model::plant::{PlantError, Structure};
+use crate::linear_algebra::{orthogonal_complement, pencil_roots};
+use crate::{PlantError, Structure};
 
 /// Kinds of zeros (Fig 3-1).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -151,12 +151,21 @@ pub fn phase_drop_deg(zeros: &[Zero]) -> f64 {
 /// Zeros of the structure without its damping, lowest frequency first.
 ///
 /// ```
-/// use bench::config::{Source, load};
-/// use bench::model::{plant, zeros};
+/// use bench_plant::{PlantSettings, build, zeros};
 ///
-/// let config = load(&Source::default())?;
-/// let structure = plant::build(&config.plant)?;
-/// assert_eq!(zeros::cnmp_pairs(&zeros::undamped_zeros(&structure)?), 1);
+/// // Equal residues +, -, +: with S = s^2 the numerator is S^2 + 2 b S + (a b - a c + b c), whose discriminant
+/// // 4 (b - a) (b - c) is negative: the zeros are complex.
+/// let settings: PlantSettings = toml::from_str(
+///     r#"
+///     model = "modal"
+///     [modes]
+///     first = { omega_rad_s = 180.0, residue_per_kg = 1.0 }
+///     second = { omega_rad_s = 200.0, residue_per_kg = -1.0 }
+///     third = { omega_rad_s = 300.0, residue_per_kg = 1.0 }
+///     "#,
+/// )?;
+/// let zeros_of_stage = zeros::undamped_zeros(&build(&settings)?)?;
+/// assert_eq!(zeros::cnmp_pairs(&zeros_of_stage), 1);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn undamped_zeros(structure: &Structure) -> Result<Vec<Zero>, PlantError> {

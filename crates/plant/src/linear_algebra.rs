@@ -56,7 +56,7 @@ fn ascending(values: &DVector<f64>) -> Vec<usize> {
 /// The finite numbers u for which `constant` + u `linear` is singular.
 ///
 /// They are computed as 1/mu from the eigenvalues mu of -constant^-1 linear, or directly where `constant` is singular.
-pub(crate) fn pencil_roots(
+pub fn pencil_roots(
     constant: &DMatrix<f64>,
     linear: &DMatrix<f64>,
 ) -> Result<Vec<Complex<f64>>, PlantError> {
@@ -84,7 +84,7 @@ fn finite_reciprocals(values: &[Complex<f64>]) -> Vec<Complex<f64>> {
 
 /// The eigenvalues of a square matrix, those of another matrix that differs from it by the tolerance of the iteration at most. `None`
 /// if an entry is not finite or the iteration does not end.
-pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
+pub fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.is_empty() {
         return Some(Vec::new());
     }
@@ -99,7 +99,7 @@ pub(crate) fn eigenvalues(matrix: &DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
 
 /// An orthonormal basis of the vectors orthogonal to `vector`, n x (n - 1): the last columns of the Householder reflection
 /// that turns `vector` into the first axis.
-pub(crate) fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
+pub fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
     let n = vector.len();
     let norm = vector.norm();
     let mut v = vector.clone();

@@ -33,7 +33,7 @@ const BENDING: Matrix4<f64> = Matrix4::new(
 
 /// The mechanism.
 #[derive(Clone, Debug)]
-pub(crate) struct QuadraticSr4dof {
+pub struct QuadraticSr4dof {
     slope: f64,
     shortening_per_m: f64,
     /// m2 to m5.
@@ -47,7 +47,7 @@ pub(crate) struct QuadraticSr4dof {
 
 /// Position and velocity of the mechanism.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct QuadraticState {
+pub struct QuadraticState {
     /// z in metres.
     pub place: Vector4<f64>,
     /// z' in metres per second.
@@ -66,7 +66,7 @@ impl QuadraticState {
 
 /// Loads beside the actuator's force, held over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Disturbance {
+pub struct Disturbance {
     /// Force on stage 1 in X, at the probe, in newtons.
     pub probe_n: f64,
     /// The floor's acceleration in X in m/s^2.
@@ -236,19 +236,12 @@ impl QuadraticSr4dof {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
-    use crate::model::plant::build;
+    use crate::build;
+    use crate::test_profile::plant_of_profile;
     use nalgebra::DVector;
 
     fn settings(sets: &[&str]) -> Sr4dofSettings {
-        let sets = sets.iter().map(|set| set.to_string()).collect();
-        match load(&Source {
-            sets,
-            ..Source::default()
-        })
-        .unwrap()
-        .plant
-        {
+        match plant_of_profile("stage", sets) {
             PlantSettings::Sr4dof(s) => s,
             other => panic!("{other:?}"),
         }

@@ -181,7 +181,7 @@ fn nearer(to: f64, [a, b]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::zeros::{ModalSum, ZeroCounts};
+    use crate::zeros::{ModalSum, ZeroCounts};
     use proptest::prelude::*;
 
     /// The largest real part of a complex zero of Eq. (3-15) over all sizes of the residues (golden section about the

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::bounds::{Bound, Demand};
 use super::kinds::{Zero, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 use super::sequence::{dominant_sequence, sign_sequence};
-use crate::model::plant::{ModalModel, Mode, PlantError, PlantSettings, Sign, build};
+use crate::{ModalModel, Mode, PlantError, PlantSettings, Sign, build};
 use bench_base::units::hz;
 
 /// One mode.

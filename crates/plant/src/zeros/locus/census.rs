@@ -5,7 +5,7 @@ use std::fmt;
 use nalgebra::Complex;
 
 use super::matching::Point;
-use crate::model::zeros::kinds::{Zero, ZeroCounts, ZeroKind, is_real};
+use crate::zeros::kinds::{Zero, ZeroCounts, ZeroKind, is_real};
 
 /// The zeros that are followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

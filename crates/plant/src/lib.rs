@@ -4,7 +4,7 @@
 //!  settings -> Structure (M, C, K, vectors) -> modes (ModalModel) -> simulation, FRF, margins
 //!                          |                            |
 //!                          v                            v
-//!                       zeros (model::zeros)         loci that veer or cross (model::veering)
+//!                       zeros (zeros)                loci that veer or cross, tolerances (of the crates above)
 //! ```
 //!
 //! | `plant.model` | file | source |
@@ -25,7 +25,7 @@ mod coordinate;
 mod damping;
 mod discrete;
 mod error;
-pub(crate) mod linear_algebra;
+pub mod linear_algebra;
 mod loop_plant;
 mod lumped;
 mod matrix_exponential;
@@ -35,7 +35,11 @@ mod port;
 mod quadratic;
 mod sr4dof;
 mod structure;
+#[cfg(test)]
+mod test_profile;
+mod unmodelled;
 mod xy;
+pub mod zeros;
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -48,13 +52,14 @@ pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
 pub use error::PlantError;
 pub use loop_plant::{LoopPlant, LoopPlantState, PathResponse, SignalPath};
 pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
-pub(crate) use matrix_exponential::matrix_exponential;
+pub use matrix_exponential::matrix_exponential;
 pub use modal::{ModalSettings, ModeSettings};
 pub use modes::{ModalModel, Mode, Sign};
 pub use port::{Port, PortWeights};
-pub(crate) use quadratic::{Disturbance, QuadraticSr4dof, QuadraticState};
+pub use quadratic::{Disturbance, QuadraticSr4dof, QuadraticState};
 pub use sr4dof::Sr4dofSettings;
 pub use structure::Structure;
+pub use unmodelled::{FloorLine, UnmodelledMode};
 pub use xy::{SecondaryMassDeviation, XyLayout, XySettings};
 
 use bench_base::finding::Finding;
@@ -133,7 +138,7 @@ macro_rules! plant_models {
 
             /// Settings of the same model from a table without its name. The general way, by the name, copies the whole
             /// table and takes six times as long.
-            pub(crate) fn with_table(
+            pub fn with_table(
                 &self,
                 table: &serde_json::Value,
             ) -> serde_json::Result<PlantSettings> {
@@ -200,14 +205,14 @@ impl PlantSettings {
     }
 
     /// Errors in the relations between settings, each of which is within its range; without those of the damping.
-    pub(crate) fn check(&self) -> Vec<Finding> {
+    pub fn check(&self) -> Vec<Finding> {
         let mut findings: Vec<Finding> = self.check_operating_point().into_iter().collect();
         findings.extend(self.as_model().check());
         findings
     }
 
     /// The error in measured damping ratios that do not determine a positive damping.
-    pub(crate) fn check_damping(&self) -> Option<Finding> {
+    pub fn check_damping(&self) -> Option<Finding> {
         let settings = self.as_model().damping_settings();
         settings.and_then(DampingSettings::check)
     }
@@ -244,7 +249,7 @@ pub fn ports(settings: &PlantSettings) -> Vec<Port> {
 #[cfg(test)]
 mod tests {
     use super::{build, ports};
-    use crate::config::{Source, load};
+    use crate::test_profile::plant_of_profile;
     use nalgebra::DMatrix;
 
     /// Each stage's mass moves along its ports: together they are the mass matrix.
@@ -254,12 +259,8 @@ mod tests {
             ("chapter2", ["1", "2", "3", "4", "5"]),
             ("xy", ["ms", "X", "Y", "s", "g"]),
         ] {
-            let config = load(&Source {
-                config: Some(profile.into()),
-                ..Source::default()
-            })
-            .unwrap();
-            let plant = serde_json::to_value(&config.plant).unwrap();
+            let settings = plant_of_profile(profile, &[]);
+            let plant = serde_json::to_value(&settings).unwrap();
             let key = |key: &str| plant[key].as_f64().unwrap();
             let mass_kg = |name: &str| {
                 let stage = name.trim_start_matches(['x', 'y']).trim_start_matches('_');
@@ -274,9 +275,9 @@ mod tests {
                     _ => key("intermediate_stage_mass_kg"),
                 }
             };
-            let structure = build(&config.plant).unwrap();
+            let structure = build(&settings).unwrap();
             let n = structure.mass.nrows();
-            let sum = ports(&config.plant)
+            let sum = ports(&settings)
                 .iter()
                 .fold(DMatrix::zeros(n, n), |sum, port| {
                     sum + mass_kg(&port.name) * &port.row * port.row.transpose()

@@ -13,7 +13,7 @@
 use std::fmt;
 
 use super::{ModalSum, ModalTerm, ZeroKind};
-use crate::model::plant::{ModalModel, PlantError, Sign};
+use crate::{ModalModel, PlantError, Sign};
 
 /// The signs of the modes that can be observed, lowest frequency first: `+-+`.
 pub fn sign_sequence(modal: &ModalModel) -> String {

@@ -7,7 +7,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Zero;
 use super::kinds::{self, System};
-use crate::model::plant::{ModalModel, Mode, PlantError, Sign};
+use crate::{ModalModel, Mode, PlantError, Sign};
 
 /// One mode by frequency, damping and residue.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,14 +56,14 @@ impl From<&Mode> for ModalTerm {
 /// The sum, lowest frequency first.
 ///
 /// ```
-/// use bench::model::zeros::{ModalSum, ModalTerm, ZeroCounts};
+/// use bench_plant::zeros::{ModalSum, ModalTerm, ZeroCounts};
 ///
 /// // Eq. (3-9) with a0 = 5: two close modes of opposite signs beside a double integrator.
 /// let terms = [(0.0, 1.0), (10.0, -5.0), (11.0, 5.0)];
 /// let terms = terms.map(|(omega, residue)| ModalTerm::undamped(omega, residue));
 /// let sum = ModalSum::new(terms.to_vec(), 0.0)?;
 /// assert_eq!(ZeroCounts::of(&sum.undamped_zeros()?).to_string(), "CMP-CNMP");
-/// # Ok::<(), bench::model::plant::PlantError>(())
+/// # Ok::<(), bench_plant::PlantError>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalSum {

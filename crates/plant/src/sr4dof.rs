@@ -67,7 +67,8 @@ pub struct Sr4dofSettings {
 }
 
 impl Sr4dofSettings {
-    pub(crate) fn beam(&self) -> Beam {
+    /// The beams of the parallelograms.
+    pub fn beam(&self) -> Beam {
         Beam {
             length_m: self.beam_length_m,
             height_m: self.beam_height_m,
@@ -101,7 +102,7 @@ impl Sr4dofSettings {
     }
 
     /// m1 to m5.
-    pub(crate) fn masses_kg(&self) -> [f64; 5] {
+    pub fn masses_kg(&self) -> [f64; 5] {
         let m3 = self.secondary_stage_mass_kg;
         let m2 = m3 * (1.0 + self.mass_asymmetry);
         let m4 = self.intermediate_stage_mass_kg;
@@ -162,8 +163,9 @@ impl PlantModel for Sr4dofSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{PlantSettings, Source, load};
-    use crate::model::plant::coordinate::Coordinate;
+    use crate::PlantSettings;
+    use crate::coordinate::Coordinate;
+    use crate::test_profile::plant_of_profile;
     use nalgebra::{DMatrix, Matrix4};
     use proptest::prelude::*;
 
@@ -261,7 +263,7 @@ mod tests {
         fn constraints_reproduce_the_printed_matrices(
             point in -0.15..0.15f64, asymmetry in -0.5..0.5f64, m1 in 0.01..2.0f64, m3 in 0.001..0.5f64, m4 in 0.01..2.0f64, k4 in 1.0..1e5f64,
         ) {
-            let PlantSettings::Sr4dof(mut s) = load(&Source::default()).unwrap().plant else { panic!("the default plant") };
+            let PlantSettings::Sr4dof(mut s) = plant_of_profile("stage", &[]) else { panic!("the default plant") };
             s.operating_point_m = point * s.beam_length_m;
             (s.mass_asymmetry, s.motion_stage_mass_kg, s.secondary_stage_mass_kg) = (asymmetry, m1, m3);
             (s.intermediate_stage_mass_kg, s.spring_stiffness_n_per_m) = (m4, k4);

@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::census::{Census, LocusPlane, Sample};
-use crate::model::zeros::kinds::{is_real, rectangular};
+use crate::zeros::kinds::{is_real, rectangular};
 
 /// The place where the kinds change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

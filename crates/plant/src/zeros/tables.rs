@@ -18,7 +18,7 @@
 use serde::Serialize;
 
 use super::{ModalSum, Sequence, ZeroCounts, sign_sequence};
-use crate::model::plant::{ModalModel, PlantError};
+use crate::{ModalModel, PlantError};
 
 /// The resonances between which a pair of MMP zeros lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

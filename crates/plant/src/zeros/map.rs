@@ -16,7 +16,7 @@ use std::ops::{Add, Mul, Sub};
 use std::thread::ScopedJoinHandle;
 
 use super::{cnmp_pairs, undamped_zeros};
-use crate::model::plant::{PlantError, PlantSettings, Sr4dofSettings, undamped};
+use crate::{PlantError, PlantSettings, Sr4dofSettings, undamped};
 
 /// The sign of the discriminant is decisive above this ratio to the sum of the sizes of its terms ([`Bounded`]).
 ///
@@ -229,18 +229,13 @@ fn discriminant([d, c, b, a]: [Bounded; 4]) -> Bounded {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{PlantSettings, Source, load};
+    use crate::PlantSettings;
+    use crate::test_profile::plant_of_profile;
     use bench_base::numeric::linspace;
     use rand_core::Rng;
 
     fn chapter2(sets: &[&str]) -> Sr4dofSettings {
-        let sets = sets.iter().map(|set| set.to_string()).collect();
-        let source = Source {
-            config: Some("chapter2".into()),
-            sets,
-            ..Source::default()
-        };
-        let PlantSettings::Sr4dof(settings) = load(&source).unwrap().plant else {
+        let PlantSettings::Sr4dof(settings) = plant_of_profile("chapter2", sets) else {
             panic!("not SR4DoF")
         };
         settings

@@ -285,7 +285,7 @@ fn one_less_cosine(term: &ModalTerm, time_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::zeros::ZeroCounts;
+    use crate::zeros::ZeroCounts;
 
     fn sum(parts: &[(f64, f64, f64)]) -> ModalSum {
         let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &_| ModalTerm {

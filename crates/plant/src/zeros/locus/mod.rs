@@ -59,8 +59,8 @@ impl Locus {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::plant::PlantError;
-    use crate::model::zeros::{ModalSum, ModalTerm};
+    use crate::PlantError;
+    use crate::zeros::{ModalSum, ModalTerm};
     use bench_base::numeric::linspace;
 
     fn grid(from: f64, to: f64, count: usize) -> Vec<f64> {

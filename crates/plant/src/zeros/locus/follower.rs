@@ -3,7 +3,7 @@
 use super::census::{LocusPlane, Sample};
 use super::changes::{KindChange, change};
 use super::matching::{Point, assigned, is_clear, padded};
-use crate::model::zeros::kinds::{Zero, is_real};
+use crate::zeros::kinds::{Zero, is_real};
 
 /// Halvings of a grid step until the assignment is clear.
 const DEPTH: u32 = 12;
