@@ -4,9 +4,9 @@
 
 use bench::config::{Source, load};
 use bench::control::{ControlLaw, LawInput};
-use bench::excitation::Reference;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program, ProgramInput};
+use bench_excitation::Reference;
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 use bench_plant::{ModalModel, build};
 

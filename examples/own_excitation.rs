@@ -3,11 +3,11 @@
 //! `cargo run --example own_excitation`
 
 use bench::config::{Config, Source, load};
-use bench::excitation::{Excitation, Extremes};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Excite, Program, ProgramInput};
+use bench_excitation::{Excitation, Extremes};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 
 /// Pulses of alternating sign, each 1 ms long, their size halved from pulse to pulse.

@@ -58,7 +58,6 @@ pub mod config;
 pub mod control;
 pub mod daemon;
 pub mod doctor;
-pub mod excitation;
 pub mod experiment;
 pub mod export;
 pub mod identify;

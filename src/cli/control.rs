@@ -13,13 +13,13 @@ use super::plan_output;
 use super::run_options::{close, exit};
 use crate::config::{Purpose, warnings};
 use crate::control::{ClosedLoop, Margins, listed_poles};
-use crate::excitation::Extremes;
 use crate::experiment::certificate::{Evidence, require_evidence};
 use crate::experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
 };
 use crate::report::MagnitudeAxis;
+use bench_excitation::Extremes;
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;

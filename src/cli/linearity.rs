@@ -19,7 +19,6 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, run_text};
 use super::table::{labelled, table, wrap};
 use crate::config::{Config, OptionSetting, Purpose};
-use crate::excitation::Extremes;
 use crate::experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
@@ -30,6 +29,7 @@ use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Ratio;
+use bench_excitation::Extremes;
 
 /// Odd lines, one of each group of four omitted.
 const LINES: [(&str, &str); 2] = [

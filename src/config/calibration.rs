@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::excitation::StaircaseSteps;
+use bench_excitation::StaircaseSteps;
 
 /// The static steps of `bench calibrate`, and its chirp that measures the delay.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

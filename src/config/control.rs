@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::command::{FeedforwardSettings, PrefilterSettings, ShaperSettings};
-use crate::excitation::ReferenceSettings;
+use bench_excitation::ReferenceSettings;
 
 /// The closed loop of `bench control`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

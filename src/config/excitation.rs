@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::excitation::ExcitationKind;
+use bench_excitation::ExcitationKind;
 
 /// The choice of the excitation of `bench chirp`. Band, rest times, fades and amplitude over frequency of all kinds
 /// are in `[chirp]`.

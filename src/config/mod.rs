@@ -38,7 +38,7 @@ mod signal_path;
 mod sim;
 mod warnings;
 
-pub use crate::excitation::{
+pub use bench_excitation::{
     AmplitudePoint, ChirpSettings, ExcitationKind, Lines, MultisineSettings, PrbsSettings,
     ReferenceSettings, Spacing, SteppedSineSettings, Sweep, TravelPoint,
 };

@@ -14,9 +14,7 @@ use super::interlock::InterlockSettings;
 use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;
-use crate::excitation::{
-    ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings,
-};
+use bench_excitation::{ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings};
 
 /// All settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -11,8 +11,8 @@ use super::features;
 use super::law::{ControlDesign, LawInput, LinearLaw};
 use super::margins::{Known, Margins, grid, margins};
 use super::state_space::StateSpace;
-use crate::excitation::command::LoopCommand;
 use bench_base::units::UM_PER_M;
+use bench_excitation::command::LoopCommand;
 use bench_plant::{LoopPlant, Mode};
 
 /// A closed loop, for the computation of its responses, poles, margins and step.

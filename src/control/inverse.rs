@@ -16,8 +16,8 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
 
-use crate::excitation::command::{CommandFilter, CommandFilterError, Taps};
-use crate::excitation::fourier;
+use bench_excitation::command::{CommandFilter, CommandFilterError, Taps};
+use bench_excitation::fourier;
 use bench_plant::LoopPlant;
 
 /// Attenuation of F beyond its stop frequency in decibels; its ripple below `bandwidth_hz` is 10^(-60/20) = 0.1 %.

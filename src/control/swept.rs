@@ -10,8 +10,8 @@
 
 use super::ClosedLoop;
 use crate::config::{ChirpSettings, TravelPoint};
-use crate::excitation::AmplitudeCurve;
 use bench_base::units::rad_s;
+use bench_excitation::AmplitudeCurve;
 
 /// Number of points over the band; a configuration allows up to 64.
 const POINTS: usize = 48;

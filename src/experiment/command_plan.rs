@@ -10,7 +10,7 @@ use crate::config::{
     VibrationSettings,
 };
 use crate::control::{ClosedLoop, ControllerText, inverse_filter};
-use crate::excitation::command::{CommandFilter, ImpulseShaper, Taps, Vibration, low_pass_taps};
+use bench_excitation::command::{CommandFilter, ImpulseShaper, Taps, Vibration, low_pass_taps};
 
 /// A mode that answers a step with less than this ratio of its height is not shaped.
 const LEAST_STEP_RATIO: f64 = 0.01;

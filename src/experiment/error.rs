@@ -11,10 +11,10 @@ use super::run_error::RunError;
 use super::stage_check::StageCheckError;
 use crate::config::ConfigError;
 use crate::control::ControllerError;
-use crate::excitation::ExcitationError;
 use crate::recording::RecordingError;
 use crate::rig::calibration::CalibrationError;
 use crate::rig::devices::DevicesError;
+use bench_excitation::ExcitationError;
 use bench_plant::PlantError;
 
 /// An experiment that was refused or that failed.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::motor_forecast::MotorSummary;
 use crate::config::Config;
-use crate::excitation::{AmplitudePoint, Extremes};
+use bench_excitation::{AmplitudePoint, Extremes};
 
 /// The plan of an excitation, predicted by the model.
 #[derive(Clone, Debug, Serialize)]

@@ -7,9 +7,9 @@ use super::loop_check::Stage;
 use super::plan_error::PlanError;
 use crate::config::{self, Config};
 use crate::control::ControllerText;
-use crate::excitation::ReferenceContext;
 use crate::rig::calibration::{CalibrationError, KnownDevices, load_calibration};
 use crate::rig::devices::{SIMULATED, probe};
+use bench_excitation::ReferenceContext;
 
 /// Refuses a configuration whose controller, reference or calibration cannot be used. Returns what needs attention.
 pub fn check_named_files(config: &Config) -> Result<Vec<String>, ExperimentError> {

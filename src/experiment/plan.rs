@@ -17,11 +17,11 @@ use super::stage_check::RestAfterCheck;
 use super::swept_reference;
 use crate::config::{CampaignSettings, Config, PlantSettings, whole};
 use crate::control::ControllerText;
-use crate::excitation::command::CommandFilter;
-use crate::excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, Correction};
 use crate::rt::program::{Control, Excite, Program};
+use bench_excitation::command::CommandFilter;
+use bench_excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
 use bench_plant::ModalModel;
 
 /// Name of the attachment with the controller.

@@ -3,8 +3,8 @@
 use super::certificate::CertificateError;
 use crate::config::ConfigError;
 use crate::control::{ControllerError, MinimumTimeError};
-use crate::excitation::command::CommandFilterError;
-use crate::excitation::{ExcitationError, ReferenceError};
+use bench_excitation::command::CommandFilterError;
+use bench_excitation::{ExcitationError, ReferenceError};
 use bench_plant::PlantError;
 
 /// A run that cannot be planned.

@@ -2,8 +2,8 @@
 
 use super::error::ExperimentError;
 use crate::config::Config;
-use crate::excitation::{Excitation, Extremes};
 use crate::rig::simulated;
+use bench_excitation::{Excitation, Extremes};
 use bench_plant::DiscretePlant;
 
 /// The model of the rig: plant with all its modes, amplifier and hold.

@@ -6,8 +6,8 @@ use super::plan_error::PlanError;
 use super::swept_reference::closed_loop;
 use crate::config::Config;
 use crate::control::{ClosedLoop, ControllerText};
-use crate::excitation::command::{CommandFilter, CommandSource, FilteredCommand, Unfiltered};
-use crate::excitation::{Extremes, Limits, ReferenceContext};
+use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand, Unfiltered};
+use bench_excitation::{Extremes, Limits, ReferenceContext};
 
 /// Largest number of predicted ticks: 400 s at 5 kHz. Beyond it only the interlocks check the current.
 const PREDICTED_TICKS: u64 = 2_000_000;

@@ -3,8 +3,8 @@
 use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
 use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
-use crate::excitation::{Extremes, ReferenceContext, SweptReference};
 use crate::rig::simulated;
+use bench_excitation::{Extremes, ReferenceContext, SweptReference};
 use bench_plant::LoopPlant;
 
 /// The configuration with the amplitudes of a swept reference, and the predicted extremes of the run, both by the model of the

@@ -5,8 +5,8 @@
 
 use super::tuning::Factors;
 use crate::control::{ControlLaw, LawInput};
-use crate::excitation::command::{CommandSource, LoopCommand, Unfiltered};
-use crate::excitation::{Excitation, Reference};
+use bench_excitation::command::{CommandSource, LoopCommand, Unfiltered};
+use bench_excitation::{Excitation, Reference};
 
 /// Input of a program in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

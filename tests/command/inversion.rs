@@ -1,6 +1,6 @@
 //! Feedforward with preview beside ZPETC, for a stage with CNMP zeros, in an independent simulation.
 
-use bench::excitation::command::Taps;
+use bench_excitation::command::Taps;
 use serde_json::{Value, json};
 
 use crate::command::program::{Bench, near, number};

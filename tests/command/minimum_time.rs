@@ -10,7 +10,7 @@ const POINT_M: f64 = 0.0038;
 const KIND: &str = "control.shaper.kind=minimum_time";
 const HEIGHT_M: f64 = 50e-6;
 
-fn taps(taps: &bench::excitation::command::Taps) -> Value {
+fn taps(taps: &bench_excitation::command::Taps) -> Value {
     let taps = taps.as_slice().iter();
     taps.map(|tap| json!([tap.delay_ticks, tap.weight]))
         .collect()

@@ -3,12 +3,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bench::config::Config;
-use bench::excitation::{Chirp, Excitation};
 use bench::experiment::{Plan, analyse};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::simulated::{self, LiveStage};
 use bench::rt::arming::State;
 use bench::rt::record::{LoopMessage, TickRecord, flag};
+use bench_excitation::{Chirp, Excitation};
 use bench_hal::Validity;
 use bench_plant::Mode;
 

@@ -3,11 +3,11 @@ use std::cell::Cell;
 use std::path::Path;
 
 use bench::config::{Config, ExcitationKind, Source, load};
-use bench::excitation::AmplitudePoint;
 use bench::experiment::{
     ExperimentError, MotorHandling, Plan, Run, RunSummary, Runner, Setup, close,
 };
 use bench::rig::motor::{Moment, MotorMemory};
+use bench_excitation::AmplitudePoint;
 
 /// Continuous current of the motor: 26 N over 11.12 N/A.
 pub const LIMIT_A: f64 = 26.0 / 11.12;

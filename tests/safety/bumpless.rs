@@ -3,12 +3,12 @@ use std::ops::Range;
 
 use bench::config::{Config, ReferenceSettings};
 use bench::control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
-use bench::excitation::{HoldReference, Reference, ReferenceContext};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::servo::Request;
+use bench_excitation::{HoldReference, Reference, ReferenceContext};
 
 use crate::safety::faulty_rig::{Fault, FaultyRig};
 use crate::safety::rig::{Bench, stage};

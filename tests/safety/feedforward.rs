@@ -1,11 +1,11 @@
 //! The feedforward current: the interlocks judge the sum, the factor of the reference and the ramp at the end apply to it.
 use bench::control::{ControlLaw, LawInput};
-use bench::excitation::command::{CommandSource, LoopCommand};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
 use bench::rt::tuning::{Factors, Tune};
+use bench_excitation::command::{CommandSource, LoopCommand};
 
 use crate::safety::rig::{Bench, stage};
 

@@ -6,7 +6,6 @@ use bench::config::{
     AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
     whole,
 };
-use bench::excitation::{SineReference, StepReference};
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::calibration::Correction;
@@ -15,6 +14,7 @@ use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
+use bench_excitation::{SineReference, StepReference};
 use bench_hal::Validity;
 
 use crate::safety::calibrated::calibration;

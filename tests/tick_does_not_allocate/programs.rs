@@ -3,12 +3,12 @@ use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
 };
 use bench::control::{ControlDesign, ControllerText};
-use bench::excitation::command::{CommandFilter, FilteredCommand, Taps};
-use bench::excitation::{
+use bench::rt::program::{Control, Excite, Program};
+use bench_excitation::command::{CommandFilter, FilteredCommand, Taps};
+use bench_excitation::{
     Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
     StepReference, SweptReference, ZeroCurrent,
 };
-use bench::rt::program::{Control, Excite, Program};
 
 /// Name of the program that commands zero current.
 pub const NO_CURRENT: &str = "no current";

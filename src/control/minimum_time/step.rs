@@ -3,7 +3,7 @@
 use super::limits::{StepLimits, StepTiming};
 use super::programme::Programme;
 use super::responses::StepPlant;
-use crate::excitation::command::{Tap, Taps};
+use bench_excitation::command::{Tap, Taps};
 
 /// The fastest step.
 #[derive(Clone, Debug, PartialEq)]

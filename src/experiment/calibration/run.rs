@@ -4,7 +4,6 @@ use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
 use crate::config::{Config, ExcitationKind};
-use crate::excitation::{Extremes, Staircase};
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
@@ -17,6 +16,7 @@ use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 use bench_base::timestamp;
+use bench_excitation::{Extremes, Staircase};
 use bench_plant::{ModalModel, PlantError};
 
 /// A calibration and its runs.

@@ -8,8 +8,8 @@ use super::prediction::predicted_extremes;
 use super::run::Run;
 use super::runner::Runner;
 use crate::config::{Config, validate};
-use crate::excitation::Extremes;
 use crate::identify::modal::FittedMode;
+use bench_excitation::Extremes;
 
 pub use mode_shifts::{ModeOverAmplitude, is_within, modes_over_amplitude};
 

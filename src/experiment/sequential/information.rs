@@ -12,9 +12,9 @@
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
 use super::shot::Shot;
-use crate::excitation::AmplitudeCurve;
 use crate::identify::FrfDatum;
 use crate::identify::modal::{MeasurementChain, ModalFit, merged};
+use bench_excitation::AmplitudeCurve;
 
 /// Number of parts of the band, equal in ln f.
 const CELLS: usize = 16;

@@ -9,13 +9,13 @@ use super::next_shot::{NextShot, next_shot};
 use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::config::Config;
-use crate::excitation::AmplitudeCurve;
 use crate::experiment::analysis::{Analysis, VerdictScope};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::run::Run;
 use crate::experiment::run_summary::RunSummary;
 use crate::identify::modal::MeasurementChain;
 use crate::identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
+use bench_excitation::AmplitudeCurve;
 use bench_plant::ModalModel;
 
 /// The sequence ends early, because nothing can be decided, after this number of shots or more.

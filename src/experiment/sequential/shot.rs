@@ -3,9 +3,9 @@
 use serde::Serialize;
 
 use crate::config::Config;
-use crate::excitation::{AmplitudePoint, ExcitationKind, Sweep};
 use crate::experiment::error::ExperimentError;
 use bench_base::units::hz;
+use bench_excitation::{AmplitudePoint, ExcitationKind, Sweep};
 use bench_plant::ModalModel;
 
 /// Length of the first shot in periods of the lowest mode.

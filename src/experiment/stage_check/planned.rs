@@ -3,7 +3,6 @@
 use super::comparison::StageCheck;
 use super::error::StageCheckError;
 use super::shot::Shot;
-use crate::excitation::StageCheckSignal;
 use crate::experiment::analysis::run_signals;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::loop_check::closed_loop_of;
@@ -11,6 +10,7 @@ use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::prediction::extremes;
 use crate::recording::Recording;
+use bench_excitation::StageCheckSignal;
 
 /// The check of the stage before a closed loop.
 #[derive(Clone, Debug)]

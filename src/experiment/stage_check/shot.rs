@@ -11,9 +11,9 @@ use nalgebra::Complex;
 
 use crate::config::Config;
 use crate::control::ClosedLoop;
-use crate::excitation::{StageCheckSettings, Tone};
 use crate::experiment::certificate::{CertifiedMode, LoadedCertificate};
 use crate::identify::Frf;
+use bench_excitation::{StageCheckSettings, Tone};
 
 /// Static travel of the step as a ratio of the soft limit.
 const STEP_RATIO: f64 = 0.01;

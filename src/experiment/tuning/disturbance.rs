@@ -9,7 +9,6 @@
 
 use crate::control::ControllerText;
 use crate::control::tuning::DisturbanceSpectrum;
-use crate::excitation::ReferenceSettings;
 use crate::experiment::closed_signals::ClosedSignals;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
@@ -20,6 +19,7 @@ use crate::experiment::plan_error::PlanError;
 use crate::experiment::tracking::steady_tick;
 use crate::recording::{Recording, RecordingError};
 use bench_base::units::rad_s;
+use bench_excitation::ReferenceSettings;
 
 /// Least length of the steady state in seconds: ten segments of the spectrum, which give each band to about 30 %.
 const LEAST_STEADY_S: f64 = 10.0;

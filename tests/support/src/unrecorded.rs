@@ -1,8 +1,8 @@
 //! The default excitation on the simulated stage, without loop and recording.
 use bench::config::Config;
-use bench::excitation::{Chirp, Excitation};
 use bench::identify::Signals;
 use bench::rig::simulated::SimulatedRig;
+use bench_excitation::{Chirp, Excitation};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 
 /// Commands and readings of the chirp of a configuration.
