@@ -10,6 +10,10 @@ check:
 test:
     cargo test
 
+# Unit tests and examples of one crate of crates/, for example: just crate plant
+crate name:
+    cargo test -p bench-{{name}}
+
 # Claims about many seeds: minutes of processor time
 statistics:
     cargo test --features statistical --test statistical

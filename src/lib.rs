@@ -10,11 +10,11 @@
 //! | the interlocks and the arming state machine | [`rt::interlock`], [`rt::arming`] |
 //! | the fast and the slow controller | `bench-config/controllers/`, built by [`control`] |
 //! | margins of a loop | [`control::ClosedLoop`] |
-//! | modes, residues and zeros of a model | [`model::plant`], [`model::zeros`] |
-//! | Tables 3-1 to 3-4 of the thesis | `model/zeros/tables.rs`, `model/zeros/sequence.rs` |
+//! | modes, residues and zeros of a model | [`bench_plant`], [`bench_plant::zeros`] |
+//! | Tables 3-1 to 3-4 of the thesis | `crates/plant/src/zeros/tables.rs`, `sequence.rs` |
 //! | two close modes: veering, conditions and propositions of Chapter 4 | [`model::veering`] |
 //! | tolerances: the probability of CNMP zeros | [`model::study`] |
-//! | excitations, references, and their prediction | [`excitation`] |
+//! | excitations, references, and their prediction | [`bench_excitation`] |
 //! | the simulated stage | [`rig::simulated`] |
 //! | real devices, their emulators, calibration | [`rig::devices`], [`rig::emulator`], [`rig::calibration`] |
 //! | estimation of a frequency response | [`identify`] |

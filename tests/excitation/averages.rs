@@ -1,7 +1,7 @@
 //! N repetitions of a chirp, or N times the periods of a multisine, reduce the error by sqrt(N).
 use bench::experiment::Analysis;
 
-use bench_excitation::rig::{SILENT, analysed, config, of_kind};
+use crate::excitation::rig::{SILENT, analysed, config, of_kind};
 
 const SEEDS: u64 = 12;
 

@@ -7,8 +7,8 @@ use bench::recording::Recording;
 use nalgebra::Complex;
 use serde_json::json;
 
-use bench_excitation::rig::{KINDS, SILENT, analysed, of_kind, recorded};
-use bench_excitation::truth;
+use crate::excitation::rig::{KINDS, SILENT, analysed, of_kind, recorded};
+use crate::excitation::truth;
 
 /// The response of the rig, computed by Python, at the frequencies of the analysis.
 fn true_response(config: &Config, analysis: &Analysis) -> Option<Vec<Complex<f64>>> {

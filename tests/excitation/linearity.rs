@@ -4,8 +4,8 @@ use bench::identify::linearity::Cause;
 use bench::identify::modal::FittedMode;
 use serde_json::Value;
 
-use bench_excitation::program::{Bench, number};
-use bench_excitation::rig::{analysed, of_kind};
+use crate::excitation::program::{Bench, number};
+use crate::excitation::rig::{analysed, of_kind};
 
 /// Odd lines from 5 to 200 Hz, with a line spacing of 1/8 Hz, one of four omitted; 8 periods are compared.
 const OMITTED_LINES: [&str; 5] = [

@@ -1,8 +1,8 @@
 //! `--plan` and `--shape`: predicted values match the run, and plans that would trip are rejected.
 use serde_json::Value;
 
-use bench_excitation::program::{Bench, number};
-use bench_excitation::rig::{self, travel_m};
+use crate::excitation::program::{Bench, number};
+use crate::excitation::rig::{self, travel_m};
 
 const HERE: &str = "--set loop.rate_hz=1000 --set chirp.stop_hz=400";
 

@@ -5,7 +5,7 @@ use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::{Analysis, Plan};
 use bench::recording::Recording;
 
-use bench_excitation::simulated;
+use crate::excitation::simulated;
 
 /// 1 kHz, up to 400 Hz.
 const HERE: [&str; 2] = ["loop.rate_hz=1000", "chirp.stop_hz=400.0"];

@@ -1,7 +1,7 @@
 //! Analysis of the recording of an incomplete run: the results state that it is incomplete.
 use serde_json::Value;
 
-use bench_excitation::program::Bench;
+use crate::excitation::program::Bench;
 
 /// The model predicts a travel of 460 um, and the soft limit is 500 um. Rare peaks of the probe noise reach some 100 um, so that
 /// the run trips.
