@@ -1,7 +1,8 @@
 //! Which controller: an option of `bench control` and `bench margins`.
 
 use super::help::with_setting;
-use crate::config::{OptionSetting, profiles};
+use crate::config::OptionSetting;
+use crate::control::CONTROLLERS;
 use bench_settings::files::names;
 
 /// Which controller.
@@ -33,7 +34,7 @@ impl ControllerChoice {
 }
 
 fn controller_help() -> String {
-    let names = names(profiles::CONTROLLERS);
+    let names = names(CONTROLLERS);
     let text = format!(
         "A controller by name ({names}), or a TOML file with a `title` and [[section]] tables, one for each factor of C(s) (gain, integrator, zero_pole, pole, pole_pair, biquad, coefficients: docs/own-stage.md lists their keys), or one of the tables [tf], [zpk], [ss] and [law]"
     );

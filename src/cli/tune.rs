@@ -17,7 +17,7 @@ use super::tune_values::{
 use crate::config::{Config, OptionSetting, Purpose};
 use crate::control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
-    Requirements, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+    Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
 };
 use crate::experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
@@ -170,7 +170,7 @@ fn task(args: &Args, frfs: &[IdentifiedFrf], config: &Config) -> Result<DesignTa
     Ok(match frfs.is_empty() {
         true => {
             let plants = model_plants(&model_options(args), config, &[])?;
-            let task = DesignTask::new(config, &plants, options)?;
+            let task = DesignTask::new(&RigModel::from(config), &plants, options)?;
             match &args.disturbance {
                 Some(file) => with_recorded_disturbance(task, file)?,
                 None => task,

@@ -11,9 +11,6 @@ pub const DEFAULT: &str = "stage";
 /// All embedded profiles. To add one, add its file and its name here.
 pub const PROFILES: &[EmbeddedFile] = bench_settings::embedded_files!("": "stage", "chapter2", "xy", "three-mass", "four-mass", "lab", "stage-step", "stage-tracking");
 
-/// All embedded controllers. To add one, add its file and its name here.
-pub const CONTROLLERS: &[EmbeddedFile] = bench_settings::embedded_files!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass", "stage-disturbance", "lab-disturbance");
-
 /// Whether an embedded profile or one of the user has this name.
 pub fn is_known(name: &str) -> bool {
     find(PROFILES, name).is_some() || own(name, "").is_some()

@@ -4,7 +4,7 @@ use super::import_error::ImportError;
 use super::section::SectionError;
 use super::transfer::TransferError;
 use super::unstable::{MAX_INTEGRATORS, WHY_TWO};
-use crate::config::ConfigError;
+use bench_settings::ConfigError;
 
 /// A controller that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -11,7 +11,10 @@ use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
 };
 use super::unstable::MAX_INTEGRATORS;
-use crate::config::profiles;
+use bench_settings::EmbeddedFile;
+
+/// All embedded controllers. To add one, add its file and its name here.
+pub const CONTROLLERS: &[EmbeddedFile] = bench_settings::embedded_files!("controllers/": "fast", "slow", "lab", "xy", "three-mass", "four-mass", "stage-disturbance", "lab-disturbance");
 
 /// A controller file with a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -135,7 +138,7 @@ impl ControllerText {
     pub fn find(name: &str) -> Result<Self, ControllerError> {
         Ok(ControllerText {
             name: name.into(),
-            text: bench_settings::text_of(name, profiles::CONTROLLERS, "controller")?,
+            text: bench_settings::text_of(name, CONTROLLERS, "controller")?,
         })
     }
 

@@ -176,12 +176,16 @@ fn negligible<'a>(weights: impl Iterator<Item = &'a f64>, limit: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
     use bench_plant::{Mode, SignalPath};
 
     fn plant(modes: &[Mode]) -> LoopPlant {
-        let config = load(&Source::default()).expect("embedded");
-        LoopPlant::of(&SignalPath::from(&config), modes)
+        let path = SignalPath {
+            period_s: 2e-4,
+            amplifier_bandwidth_hz: 1000.0,
+            force_constant_n_per_a: 11.12,
+            delays_s: vec![2e-4],
+        };
+        LoopPlant::of(&path, modes)
     }
 
     fn mode(omega_rad_s: f64, residue_per_kg: f64) -> Mode {

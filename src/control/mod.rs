@@ -48,7 +48,7 @@ pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use error::ControllerError;
-pub use file::{ControllerFile, ControllerText, LawFile, SectionSettings};
+pub use file::{CONTROLLERS, ControllerFile, ControllerText, LawFile, SectionSettings};
 pub use import::{ImportOptions, Imported, NumericArray, Value, Variables, import, read_variables};
 pub use import_error::{FormatError, ImportError};
 pub use inverse::{InverseFilter, inverse_filter};

@@ -9,9 +9,8 @@
 //! bandwidth a slow loop hardly follows, and both limits would allow metres: the amplitude of the reference is limited too.
 
 use super::ClosedLoop;
-use crate::config::{ChirpSettings, TravelPoint};
 use bench_base::units::rad_s;
-use bench_excitation::AmplitudeCurve;
+use bench_excitation::{AmplitudeCurve, ChirpSettings, TravelPoint};
 
 /// Number of points over the band; a configuration allows up to 64.
 const POINTS: usize = 48;

@@ -2,8 +2,8 @@
 
 use bench::config::{Config, Source, load};
 use bench::control::tuning::{
-    Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, Tolerances,
-    TuneError, design,
+    Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, RigModel,
+    Tolerances, TuneError, design,
 };
 use bench_base::progress::Progress;
 use rand_core::Rng;
@@ -68,7 +68,7 @@ fn designed(config: &Config) -> Result<Design, TuneError> {
         },
         seed: 1,
     };
-    let task = DesignTask::new(config, &[plant], options).unwrap();
+    let task = DesignTask::new(&RigModel::from(config), &[plant], options).unwrap();
     design(&task, &Progress::default())
 }
 

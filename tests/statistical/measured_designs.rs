@@ -5,7 +5,7 @@
 use bench::config::Config;
 use bench::control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MeasuredPlant, NamedPlant, Requirements,
-    Tolerances, design,
+    RigModel, Tolerances, design,
 };
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
 use bench_base::progress::Progress;
@@ -48,7 +48,7 @@ fn by_model() -> Design {
         NamedPlant::of(&format!("{percent} % of L"), &config.plant).expect("a plant")
     });
     let plants: Vec<NamedPlant> = plants.collect();
-    let task = DesignTask::new(&configs[0], &plants, options()).expect("plants");
+    let task = DesignTask::new(&RigModel::from(&configs[0]), &plants, options()).expect("plants");
     design(&task, &Progress::default()).expect("a design")
 }
 

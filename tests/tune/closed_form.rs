@@ -1,7 +1,7 @@
 //! Designs whose best value is known from a scan of a closed form.
 
 use bench::control::tuning::{
-    DesignOptions, DesignTask, Effort, Goal, NamedPlant, Tolerances, design,
+    DesignOptions, DesignTask, Effort, Goal, NamedPlant, RigModel, Tolerances, design,
 };
 use bench_base::progress::Progress;
 use bench_plant::Mode;
@@ -80,7 +80,7 @@ fn integrator_for_a_static_plant_with_delay_has_the_best_slope_bandwidth_of_a_sc
         effort: Effort::default(),
         seed: 1,
     };
-    let task = DesignTask::new(&config, &[stiff_plant()], options).unwrap();
+    let task = DesignTask::new(&RigModel::from(&config), &[stiff_plant()], options).unwrap();
     let found = design(&task, &Progress::default()).unwrap();
     let expected = best_slope_bandwidth_rad_s(config.servo.period_s());
     // The scan's gains are 0.4 % apart near the best one; the search has a reserve of 0.1 % and stops at strides of 0.05 %.

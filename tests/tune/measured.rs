@@ -3,7 +3,7 @@
 use bench::config::Config;
 use bench::control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
-    MeasuredPlant, NamedPlant, Tolerances, design, evaluate,
+    MeasuredPlant, NamedPlant, RigModel, Tolerances, design, evaluate,
 };
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench::rig::simulated;
@@ -79,7 +79,7 @@ fn design_from_two_responses_has_its_margin_on_the_true_plants_and_the_value_of_
         .iter()
         .map(|config| NamedPlant::of("model", &config.plant).unwrap());
     let named: Vec<NamedPlant> = named.collect();
-    let task = DesignTask::new(&configs[0], &named, options(4)).unwrap();
+    let task = DesignTask::new(&RigModel::from(&configs[0]), &named, options(4)).unwrap();
     let by_model = design(&task, &Progress::default()).unwrap();
     let ratio = found.attained / by_model.attained;
     assert!((0.95..1.05).contains(&ratio), "{ratio}");

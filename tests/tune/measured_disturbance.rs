@@ -1,6 +1,6 @@
 //! The disturbance of a recorded closed loop that held its position.
 
-use bench::control::tuning::{DesignOptions, DesignTask, NamedPlant};
+use bench::control::tuning::{DesignOptions, DesignTask, NamedPlant, RigModel};
 use bench::experiment::tuning::recorded_disturbance;
 use bench::recording::Recording;
 use bench_test_support::program::Bench;
@@ -32,7 +32,7 @@ fn variance_of_a_recorded_disturbance_is_that_of_the_floor() {
     let config = config(&[]);
     let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
     let options: DesignOptions = options(requirements(bench::control::tuning::Goal::Rms));
-    let task = DesignTask::new(&config, &[plant], options).unwrap();
+    let task = DesignTask::new(&RigModel::from(&config), &[plant], options).unwrap();
     let disturbance = &task.disturbance;
     let recording = Recording::open(&bench.path(&file)).unwrap();
     let noise_rms_m = disturbance.noise_rms_m;

@@ -3,7 +3,7 @@
 use bench::config::{Config, Source, load};
 use bench::control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MarginDisc, NamedPlant, Requirements,
-    SensitivityLimit, Tolerances, TuneError, design,
+    RigModel, SensitivityLimit, Tolerances, TuneError, design,
 };
 use bench_base::progress::Progress;
 
@@ -27,7 +27,7 @@ pub fn requirements(goal: Goal) -> Requirements {
 /// A design of order 4 for the configured operating point with its tolerances, with little effort.
 pub fn task(config: &Config, requirements: Requirements) -> DesignTask {
     let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
-    DesignTask::new(config, &[plant], options(requirements)).unwrap()
+    DesignTask::new(&RigModel::from(config), &[plant], options(requirements)).unwrap()
 }
 
 pub fn options(requirements: Requirements) -> DesignOptions {
@@ -54,8 +54,12 @@ pub fn options(requirements: Requirements) -> DesignOptions {
 fn refused(profile: &str, sets: &[&str]) -> String {
     let config = config_of(profile, sets);
     let plant = NamedPlant::of("the plant", &config.plant).unwrap();
-    let task =
-        DesignTask::new(&config, &[plant], options(requirements(Goal::Disturbance))).unwrap();
+    let task = DesignTask::new(
+        &RigModel::from(&config),
+        &[plant],
+        options(requirements(Goal::Disturbance)),
+    )
+    .unwrap();
     design(&task, &Progress::default()).unwrap_err().to_string()
 }
 
@@ -185,7 +189,7 @@ fn gain_tolerance_adds_two_plants_that_keep_the_margin() {
     let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
     let mut options = options(requirements(Goal::Disturbance));
     options.tolerances.gain_ratio = 0.1;
-    let task = DesignTask::new(&config, &[plant], options).unwrap();
+    let task = DesignTask::new(&RigModel::from(&config), &[plant], options).unwrap();
     let found = design(&task, &Progress::default()).unwrap();
     assert_eq!(found.figures.len(), 8);
     let names: Vec<&str> = found.figures.iter().map(|f| f.plant.as_str()).collect();
@@ -229,7 +233,7 @@ fn finds_a_controller_for_a_stage_with_little_damping() {
     let config = config_of("chapter2", &[]);
     let plant = NamedPlant::of("5 % of L", &config.plant).unwrap();
     let options = options(requirements(Goal::Disturbance));
-    let task = DesignTask::new(&config, &[plant], options).unwrap();
+    let task = DesignTask::new(&RigModel::from(&config), &[plant], options).unwrap();
     let found = design(&task, &Progress::default()).unwrap();
     assert!(found.misses_margin(0.5).is_none(), "{:?}", found.figures);
     assert!(found.figures.iter().all(|figures| figures.stable));

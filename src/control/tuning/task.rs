@@ -1,4 +1,4 @@
-//! A design task from the settings of a bench.
+//! A design task from the model of a rig.
 
 use super::cascade::ParameterLimits;
 use super::design::DesignTask;
@@ -10,8 +10,9 @@ use super::plant::{DesignPlant, Tolerances};
 use super::requirement::Requirements;
 use super::search::Effort;
 use super::unmodelled::UnmodelledBound;
-use crate::config::Config;
-use bench_plant::{ModalModel, Mode, PlantError, PlantSettings, SignalPath};
+use bench_plant::{
+    FloorLine, ModalModel, Mode, PlantError, PlantSettings, SignalPath, UnmodelledMode,
+};
 
 /// What is designed, and how.
 #[derive(Clone, Debug)]
@@ -28,6 +29,21 @@ pub struct DesignOptions {
     pub effort: Effort,
     /// Seed of the search.
     pub seed: u64,
+}
+
+/// What a design knows of the rig besides its modes.
+#[derive(Clone, Debug)]
+pub struct RigModel {
+    /// From the command to the reading.
+    pub path: SignalPath,
+    /// Modes that the model of the plant lacks.
+    pub unmodelled: Vec<UnmodelledMode>,
+    /// Motion of the floor.
+    pub floor: Vec<FloorLine>,
+    /// Noise of the probe, standard deviation.
+    pub probe_noise_rms_m: f64,
+    /// Step of the probe's readings.
+    pub probe_step_m: f64,
 }
 
 /// A plant of a design by its name, for example its operating point.
@@ -60,27 +76,26 @@ const POLE_RANGE: f64 = 6000.0 / (std::f64::consts::PI * 5000.0);
 const LOWEST_RATIO: f64 = 5e-3;
 
 impl DesignTask {
-    /// The task for some plants at the signal path, with disturbances and unmodelled modes, of a configuration.
+    /// The task for some plants at the signal path, with disturbances and unmodelled modes, of a rig.
     ///
     /// # Errors
     /// There is no plant.
     pub fn new(
-        config: &Config,
+        rig: &RigModel,
         plants: &[NamedPlant],
         options: DesignOptions,
     ) -> Result<DesignTask, TuneError> {
-        let path = SignalPath::from(config);
+        let path = &rig.path;
         let first = plants.first().ok_or(TuneError::NoPlant)?;
-        let unmodelled = &config.sim.unmodelled;
         let varied = plants.iter().flat_map(|plant| {
             let (name, modes) = (&plant.name, &plant.modes);
-            DesignPlant::with_tolerances(name, &path, modes, &options.tolerances)
+            DesignPlant::with_tolerances(name, path, modes, &options.tolerances)
         });
         Ok(DesignTask {
             plants: varied.collect(),
-            bound: UnmodelledBound::of(&path, unmodelled, options.unmodelled_ratio),
-            disturbance: disturbance(config),
-            limits: limits(&path, &first.modes),
+            bound: UnmodelledBound::of(path, &rig.unmodelled, options.unmodelled_ratio),
+            disturbance: disturbance(rig),
+            limits: limits(path, &first.modes),
             requirements: options.requirements,
             order: options.order,
             effort: options.effort,
@@ -127,13 +142,10 @@ impl DesignTask {
 }
 
 /// Lines of the floor, and noise and quantisation of the probe: a step q has the variance q^2/12.
-fn disturbance(config: &Config) -> Disturbance {
-    let (noise_m, step_m) = (
-        config.sim.probe_noise_rms_m,
-        config.sim.probe_quantisation_m,
-    );
+fn disturbance(rig: &RigModel) -> Disturbance {
+    let (noise_m, step_m) = (rig.probe_noise_rms_m, rig.probe_step_m);
     Disturbance {
-        position: PositionDisturbance::Floor(config.sim.floor.clone()),
+        position: PositionDisturbance::Floor(rig.floor.clone()),
         noise_rms_m: (noise_m * noise_m + step_m * step_m / 12.0).sqrt(),
     }
 }
