@@ -8,8 +8,8 @@
 //! |---|---|
 //! | the loop on one screen | [`rt::servo`] |
 //! | the interlocks and the arming state machine | [`rt::interlock`], [`rt::arming`] |
-//! | the fast and the slow controller | `bench-config/controllers/`, built by [`control`] |
-//! | margins of a loop | [`control::ClosedLoop`] |
+//! | the fast and the slow controller | `bench-config/controllers/`, built by [`bench_control`] |
+//! | margins of a loop | [`bench_control::ClosedLoop`] |
 //! | modes, residues and zeros of a model | [`bench_plant`], [`bench_plant::zeros`] |
 //! | Tables 3-1 to 3-4 of the thesis | `crates/plant/src/zeros/tables.rs`, `sequence.rs` |
 //! | two close modes: veering, conditions and propositions of Chapter 4 | [`model::veering`] |
@@ -55,7 +55,6 @@
 
 pub mod cli;
 pub mod config;
-pub mod control;
 pub mod daemon;
 pub mod doctor;
 pub mod experiment;

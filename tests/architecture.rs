@@ -7,10 +7,9 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 12] = [
     "config",
     "model",
-    "control",
     "rig",
     "rt",
     "recording",

@@ -13,7 +13,6 @@ use super::output::warn;
 use super::run_options::run_text;
 use super::table::{labelled, table};
 use crate::config::Config;
-use crate::control::{Margins, Pole, StepMetrics};
 use crate::experiment::certificate::{Agreement, Condition, Evidence};
 use crate::experiment::stage_check::RestAfterCheck;
 use crate::experiment::{
@@ -26,6 +25,7 @@ use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
 };
 use bench_base::decimal::Decimal;
+use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
 
 /// The JSON object of the command.

@@ -10,12 +10,12 @@ use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::table::labelled;
-use crate::control::{
+use bench_base::atomic_file::write_atomic;
+use bench_base::quantity::{OfFrequency, si};
+use bench_control::{
     Agreement, Cascade, Domain, GainUnit, ImportOptions, Imported, Roots, Section, TransferTable,
     import,
 };
-use bench_base::atomic_file::write_atomic;
-use bench_base::quantity::{OfFrequency, si};
 
 /// What to do with a controller.
 #[derive(Clone, Debug, clap::Args)]

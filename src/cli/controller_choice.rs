@@ -2,7 +2,7 @@
 
 use super::help::with_setting;
 use crate::config::OptionSetting;
-use crate::control::CONTROLLERS;
+use bench_control::CONTROLLERS;
 use bench_settings::files::names;
 
 /// Which controller.

@@ -4,7 +4,6 @@ use clap::error::ContextKind;
 use serde::Serialize;
 
 use super::outcome::Outcome;
-use crate::control::tuning::TuneError;
 use crate::experiment::campaign::CampaignError;
 use crate::experiment::tuning::TuneSourceError;
 use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
@@ -12,6 +11,7 @@ use crate::identify::IdentifyError;
 use crate::identify::external_csv::ExternalCsvError;
 use crate::model::study::StudyError;
 use bench_base::remedy;
+use bench_control::tuning::TuneError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]

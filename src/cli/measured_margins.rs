@@ -9,16 +9,16 @@ use super::error::CliError;
 use super::output::warn;
 use super::table::wrap;
 use crate::config::Config;
-use crate::control::ClosedLoop;
-use crate::control::measured::{
-    LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
-};
 use crate::experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use crate::identify::Estimate;
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
 use crate::report::{crossing_count, place};
 use bench_base::units::{UM_PER_M, hz};
+use bench_control::ClosedLoop;
+use bench_control::measured::{
+    LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
+};
 
 /// The margins with a measured plant, and the files of the loop.
 #[derive(Debug, Serialize)]

@@ -15,10 +15,6 @@ use super::tune_values::{
     GoalName, factor, gain_margin, margin, phase_margin_deg, positive, sensitivity_limit,
 };
 use crate::config::{Config, OptionSetting, Purpose};
-use crate::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
-    Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
-};
 use crate::experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
     recorded_disturbance,
@@ -29,6 +25,10 @@ use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, si};
 use bench_base::units::UM_PER_M;
+use bench_control::tuning::{
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
+    Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+};
 use bench_plant::SignalPath;
 
 /// What is designed, and for which plants.

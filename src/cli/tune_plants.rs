@@ -3,8 +3,8 @@
 use super::error::CliError;
 use super::options::BenchOptions;
 use crate::config::{Config, OptionSetting, Purpose};
-use crate::control::tuning::NamedPlant;
 use bench_base::quantity::{OperatingPoint, QuantityError};
+use bench_control::tuning::NamedPlant;
 
 /// Name of the plant of a model without operating points.
 const ONLY_PLANT: &str = "the plant";

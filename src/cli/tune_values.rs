@@ -5,8 +5,8 @@ use std::str::FromStr;
 
 use clap::ValueEnum;
 
-use crate::control::tuning::{Goal, SensitivityLimit};
 use bench_base::quantity::AngularFrequency;
+use bench_control::tuning::{Goal, SensitivityLimit};
 
 /// The goal as typed.
 #[derive(Clone, Copy, Debug, ValueEnum)]

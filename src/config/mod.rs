@@ -32,6 +32,7 @@ mod purpose;
 mod relations;
 mod renamed;
 mod rig;
+mod rig_model;
 mod servo;
 mod settings;
 mod signal_path;

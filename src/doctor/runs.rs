@@ -2,12 +2,12 @@
 
 use super::finding::{Finding, Subject};
 use crate::config::{self, Config};
-use crate::control::Margins;
 use crate::experiment::certificate::require_evidence;
 use crate::experiment::{
     ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
 };
 use crate::rig::devices;
+use bench_control::Margins;
 use bench_excitation::Excitation;
 
 /// The results of the checks of the commands.

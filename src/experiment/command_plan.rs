@@ -9,7 +9,7 @@ use crate::config::{
     Config, FeedforwardSettings, MinimumTimeSettings, PrefilterSettings, ShaperSettings,
     VibrationSettings,
 };
-use crate::control::{ClosedLoop, ControllerText, inverse_filter};
+use bench_control::{ClosedLoop, ControllerText, inverse_filter};
 use bench_excitation::command::{CommandFilter, ImpulseShaper, Taps, Vibration, low_pass_taps};
 
 /// A mode that answers a step with less than this ratio of its height is not shaped.

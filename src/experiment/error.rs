@@ -10,10 +10,10 @@ use super::plan_error::PlanError;
 use super::run_error::RunError;
 use super::stage_check::StageCheckError;
 use crate::config::ConfigError;
-use crate::control::ControllerError;
 use crate::recording::RecordingError;
 use crate::rig::calibration::CalibrationError;
 use crate::rig::devices::DevicesError;
+use bench_control::ControllerError;
 use bench_excitation::ExcitationError;
 use bench_plant::PlantError;
 

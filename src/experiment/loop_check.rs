@@ -4,8 +4,8 @@ use std::fmt;
 
 use super::plan_error::PlanError;
 use crate::config::Config;
-use crate::control::{ClosedLoop, ControllerText, Margins};
 use crate::rig::devices;
+use bench_control::{ClosedLoop, ControllerText, Margins};
 use bench_plant::{LoopPlant, ModalModel};
 
 /// A loop that is refused: too small a margin, or unstable.

@@ -3,8 +3,8 @@
 use super::loop_check::closed_loop_of;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
-use crate::control::ControllerText;
 use crate::rt::residual::{LoopPrediction, ResidualBound, Residuals};
+use bench_control::ControllerText;
 use bench_plant::{LoopPlant, ModalModel};
 
 /// The monitor of a run, by the model of the configuration; `None` if the settings switch it off, and for the static steps of a

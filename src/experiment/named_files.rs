@@ -6,9 +6,9 @@ use super::error::ExperimentError;
 use super::loop_check::Stage;
 use super::plan_error::PlanError;
 use crate::config::{self, Config};
-use crate::control::ControllerText;
 use crate::rig::calibration::{CalibrationError, KnownDevices, load_calibration};
 use crate::rig::devices::{SIMULATED, probe};
+use bench_control::ControllerText;
 use bench_excitation::ReferenceContext;
 
 /// Refuses a configuration whose controller, reference or calibration cannot be used. Returns what needs attention.

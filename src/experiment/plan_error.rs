@@ -2,7 +2,7 @@
 
 use super::certificate::CertificateError;
 use crate::config::ConfigError;
-use crate::control::{ControllerError, MinimumTimeError};
+use bench_control::{ControllerError, MinimumTimeError};
 use bench_excitation::command::CommandFilterError;
 use bench_excitation::{ExcitationError, ReferenceError};
 use bench_plant::PlantError;

@@ -2,11 +2,11 @@
 
 use super::plan_error::PlanError;
 use crate::config::{Config, MinimumTimeSettings, PlantSettings, SimSettings};
-use crate::control::{
+use crate::rig::simulated;
+use bench_control::{
     ClosedLoop, ControllerText, MinimumTime, SETTLING_BAND, StepLimits, StepPlant, StepTiming,
     minimum_time,
 };
-use crate::rig::simulated;
 use bench_plant::LoopPlant;
 
 /// Time in seconds after the last change of the reference over which the error is limited.

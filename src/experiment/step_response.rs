@@ -4,9 +4,9 @@ use super::error::ExperimentError;
 use super::loop_check::closed_loop_of;
 use super::plan::Plan;
 use super::tracking::{TrackingMetrics, tracking_metrics};
-use crate::control::{ClosedLoop, StepMetrics, step_metrics};
 use crate::recording::Recording;
 use crate::rt::record::flag;
+use bench_control::{ClosedLoop, StepMetrics, step_metrics};
 use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand};
 use bench_excitation::{Reference, StepOfReference};
 

@@ -2,8 +2,8 @@
 
 use super::plan_error::PlanError;
 use crate::config::{Config, ReferenceSettings, validate};
-use crate::control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use crate::rig::simulated;
+use bench_control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use bench_excitation::{Extremes, ReferenceContext, SweptReference};
 use bench_plant::LoopPlant;
 

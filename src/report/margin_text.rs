@@ -1,8 +1,8 @@
 //! The margins of a loop as text, each with the frequency at which it is reached.
 
 use super::number::{angular_frequency, plain};
-use crate::control::Margins;
 use bench_base::units::hz;
+use bench_control::Margins;
 
 /// Names and values of the margins of a stable loop; `None` where there is no such crossing.
 pub fn margin_rows(margins: &Margins) -> Vec<(&'static str, Option<String>)> {

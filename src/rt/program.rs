@@ -4,7 +4,7 @@
 //! the signals of [`ProgramInput`] alone, so that a recording can be replayed.
 
 use super::tuning::Factors;
-use crate::control::{ControlLaw, LawInput};
+use bench_control::{ControlLaw, LawInput};
 use bench_excitation::command::{CommandSource, LoopCommand, Unfiltered};
 use bench_excitation::{Excitation, Reference};
 

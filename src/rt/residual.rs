@@ -32,8 +32,8 @@
 use super::arming::Trip;
 use super::program::Decision;
 use crate::config::CLOSED_SHARE_FACTOR;
-use crate::control::{ControlLaw, LawInput};
 use bench_base::numeric::is_within;
+use bench_control::{ControlLaw, LawInput};
 use bench_plant::{LoopPlant, LoopPlantState, Mode};
 
 /// Factor of the share where the reference replaces the prediction, because the law is not linear.

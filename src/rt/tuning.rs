@@ -3,7 +3,7 @@
 //! k(n) = k_to + (k_from - k_to) s(n / N), n = 1 ... N,
 //!
 //! with the ramp s of [`settling`](super::settling). The reference factor scales the reference relative to the rest position. The gain
-//! factor scales the error that the control law receives ([`LawInput::with_gain`](crate::control::LawInput::with_gain)); an
+//! factor scales the error that the control law receives ([`LawInput::with_gain`](bench_control::LawInput::with_gain)); an
 //! integrator keeps its state.
 
 use super::settling::ramp;

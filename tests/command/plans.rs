@@ -1,7 +1,7 @@
 //! Planned filters against an independent simulation.
 
-use bench::control::ClosedLoop;
 use bench::experiment::closed_loop;
+use bench_control::ClosedLoop;
 use nalgebra::Complex;
 
 use crate::command::{config, plan};

@@ -1,6 +1,6 @@
 //! The response of the sections against 60 digits (mpmath) and python-control.
 
-use bench::control::{ControllerText, continuous_response};
+use bench_control::{ControllerText, continuous_response};
 use bench_test_support::python;
 use nalgebra::Complex;
 
@@ -50,7 +50,7 @@ impl Point {
 
 /// C in amperes per micrometre as the loop uses it.
 fn response(text: &ControllerText, point: &Point) -> Result<Complex<f64>, String> {
-    let failed = |e: bench::control::ControllerError| e.to_string();
+    let failed = |e: bench_control::ControllerError| e.to_string();
     if point.rate_hz == 0.0 {
         let sections = text.sections(5000.0).map_err(failed)?;
         let s = Complex::new(0.0, point.omega_rad_s);

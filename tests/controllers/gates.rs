@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use bench::control::{GainUnit, ImportOptions, Imported, import};
+use bench_control::{GainUnit, ImportOptions, Imported, import};
 use bench_test_support::python;
 use nalgebra::Complex;
 

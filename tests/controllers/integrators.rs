@@ -1,8 +1,8 @@
 //! Controllers with two integrators: the loop follows a ramp without error.
 
 use bench::config::{Purpose, Source, load};
-use bench::control::ClosedLoop;
 use bench::experiment::closed_loop;
+use bench_control::ClosedLoop;
 
 use crate::controllers::program::Bench;
 

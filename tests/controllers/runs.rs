@@ -1,6 +1,6 @@
 //! A discrete controller in the loop: sample by sample, margins, recording and replay.
 
-use bench::control::{ControllerText, LawInput};
+use bench_control::{ControllerText, LawInput};
 use bench_test_support::python;
 use serde_json::{Value, json};
 

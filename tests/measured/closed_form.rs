@@ -1,7 +1,7 @@
 //! An integrator with delay, sampled as an FRF: L = k exp(-j w d)/(j w).
 
-use bench::control::measured::{LoopPeaks, MeasuredLoop, MeasuredMargins};
 use bench_base::estimate::Estimate;
+use bench_control::measured::{LoopPeaks, MeasuredLoop, MeasuredMargins};
 use nalgebra::Complex;
 
 use crate::measured::sampled::points;

@@ -1,13 +1,13 @@
 //! The margins of a closed-loop record use the same interpolation and intervals.
 
-use bench::control::measured::{MeasuredLoop, MeasuredMargins};
 use bench::identify::EstimatorSettings;
 use bench::identify::joint;
 use bench_base::units::rad_s;
+use bench_control::measured::{MeasuredLoop, MeasuredMargins};
 use bench_test_support::feedback_loop;
 use nalgebra::Complex;
 
-use bench::control::measured::ResponsePoint;
+use bench_control::measured::ResponsePoint;
 
 /// A simulated loop of a resonance and a PI controller with known L.
 #[test]

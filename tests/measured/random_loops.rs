@@ -11,7 +11,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use bench::control::{ClosedLoop, ControllerText, Margins, Section};
+use bench_control::{ClosedLoop, ControllerText, Margins, Section};
 use bench_plant::{LoopPlant, Mode, SignalPath};
 use bench_test_support::seeds::over_seeds;
 use nalgebra::{Complex, DVector};

@@ -1,10 +1,10 @@
 //! FRFs that do not belong to the loop, or do not contain its margins, are refused with a remedy.
 
 use bench::config::Config;
-use bench::control::ClosedLoop;
 use bench::experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
 use bench::identify::Frf;
 use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_control::ClosedLoop;
 
 use crate::measured::program::Bench;
 use crate::measured::sampled::{config, frf};

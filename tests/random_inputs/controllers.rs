@@ -1,6 +1,6 @@
 //! Controllers in files of other programs. `controllers/make.py` writes the valid ones.
 
-use bench::control::{Domain, GainUnit, ImportOptions, import};
+use bench_control::{Domain, GainUnit, ImportOptions, import};
 
 use crate::random_inputs::damage::check_damaged;
 

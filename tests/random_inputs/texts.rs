@@ -3,8 +3,8 @@
 use std::time::SystemTime;
 
 use bench::config::{Config, Source, load, whole};
-use bench::control::{ControllerText, LawInput};
 use bench::rig::calibration::{KnownDevices, load_calibration};
+use bench_control::{ControllerText, LawInput};
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};
 

@@ -2,12 +2,12 @@
 use std::ops::Range;
 
 use bench::config::{Config, ReferenceSettings};
-use bench::control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::servo::Request;
+use bench_control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
 use bench_excitation::{HoldReference, Reference, ReferenceContext};
 
 use crate::safety::faulty_rig::{Fault, FaultyRig};

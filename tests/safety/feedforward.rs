@@ -1,10 +1,10 @@
 //! The feedforward current: the interlocks judge the sum, the factor of the reference and the ramp at the end apply to it.
-use bench::control::{ControlLaw, LawInput};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::{Control, Program, ProgramInput};
 use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
 use bench::rt::tuning::{Factors, Tune};
+use bench_control::{ControlLaw, LawInput};
 use bench_excitation::command::{CommandSource, LoopCommand};
 
 use crate::safety::rig::{Bench, stage};

@@ -3,7 +3,6 @@ use std::f64::consts::TAU;
 use std::sync::mpsc::Sender;
 
 use bench::config::{Config, ReferenceSettings};
-use bench::control::{ControlLaw, LawInput};
 use bench::experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
@@ -12,6 +11,7 @@ use bench::rt::record::{EventKind, Refusal, RequestKind, TickRecord};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench::rt::tuning::{Factors, Tune, TuneError};
+use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
 
 use crate::safety::rig::{Bench, StillRig, endless, stage};

@@ -1,11 +1,11 @@
 //! `bench tune` for stages that were not used when it was written.
 
 use bench::config::{Config, Source, load};
-use bench::control::tuning::{
+use bench_base::progress::Progress;
+use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, RigModel,
     Tolerances, TuneError, design,
 };
-use bench_base::progress::Progress;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 

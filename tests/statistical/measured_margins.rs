@@ -1,10 +1,10 @@
 //! Coverage of the 95 % intervals of margins from measured responses.
 
 use bench::config::{Config, Source, load};
-use bench::control::{ClosedLoop, ControllerText};
 use bench::experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
 use bench::identify::{Estimate, response};
 use bench::rig::simulated;
+use bench_control::{ClosedLoop, ControllerText};
 use bench_plant::LoopPlant;
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::unrecorded;

@@ -2,8 +2,8 @@
 use bench::config::{
     AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
 };
-use bench::control::{ControlDesign, ControllerText};
 use bench::rt::program::{Control, Excite, Program};
+use bench_control::{ControlDesign, ControllerText};
 use bench_excitation::command::{CommandFilter, FilteredCommand, Taps};
 use bench_excitation::{
     Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,

@@ -1,9 +1,9 @@
 //! Designs whose best value is known from a scan of a closed form.
 
-use bench::control::tuning::{
+use bench_base::progress::Progress;
+use bench_control::tuning::{
     DesignOptions, DesignTask, Effort, Goal, NamedPlant, RigModel, Tolerances, design,
 };
-use bench_base::progress::Progress;
 use bench_plant::Mode;
 use nalgebra::{Complex, DVector};
 

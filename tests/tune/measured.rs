@@ -1,13 +1,13 @@
 //! Designs from measured responses: on the true plant they have what they promise.
 
 use bench::config::Config;
-use bench::control::tuning::{
-    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
-    MeasuredPlant, NamedPlant, RigModel, Tolerances, design, evaluate,
-};
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench::rig::simulated;
 use bench_base::progress::Progress;
+use bench_control::tuning::{
+    Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
+    MeasuredPlant, NamedPlant, RigModel, Tolerances, design, evaluate,
+};
 use bench_plant::UnmodelledMode;
 use bench_plant::{Mode, SignalPath};
 use bench_test_support::chirp_source::{config_at, sampled, true_loop};

@@ -1,8 +1,8 @@
 //! The disturbance of a recorded closed loop that held its position.
 
-use bench::control::tuning::{DesignOptions, DesignTask, NamedPlant, RigModel};
 use bench::experiment::tuning::recorded_disturbance;
 use bench::recording::Recording;
+use bench_control::tuning::{DesignOptions, DesignTask, NamedPlant, RigModel};
 use bench_test_support::program::Bench;
 
 use crate::tune::stage::{config, options, requirements};
@@ -31,7 +31,7 @@ fn variance_of_a_recorded_disturbance_is_that_of_the_floor() {
     let file = held(&bench, "60s");
     let config = config(&[]);
     let plant = NamedPlant::of("8 % of L", &config.plant).unwrap();
-    let options: DesignOptions = options(requirements(bench::control::tuning::Goal::Rms));
+    let options: DesignOptions = options(requirements(bench_control::tuning::Goal::Rms));
     let task = DesignTask::new(&RigModel::from(&config), &[plant], options).unwrap();
     let disturbance = &task.disturbance;
     let recording = Recording::open(&bench.path(&file)).unwrap();

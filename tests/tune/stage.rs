@@ -1,11 +1,11 @@
 //! Designs for the stage of the thesis, small enough for every test run.
 
 use bench::config::{Config, Source, load};
-use bench::control::tuning::{
+use bench_base::progress::Progress;
+use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MarginDisc, NamedPlant, Requirements,
     RigModel, SensitivityLimit, Tolerances, TuneError, design,
 };
-use bench_base::progress::Progress;
 
 pub fn config(sets: &[&str]) -> Config {
     config_of("stage", sets)

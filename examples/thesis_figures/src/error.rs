@@ -1,11 +1,11 @@
 //! Errors of figures.
 
 use bench::config::ConfigError;
-use bench::control::ControllerError;
 use bench::experiment::{AnalysisError, RunError};
 use bench::recording::RecordingError;
 use bench::report::ReportError;
 use bench::rig::devices::DevicesError;
+use bench_control::ControllerError;
 use bench_plant::PlantError;
 
 /// Why a figure could not be made.

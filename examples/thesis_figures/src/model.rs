@@ -4,7 +4,6 @@ use nalgebra::Complex;
 
 use super::FigureError;
 use bench::config::{Config, PlantSettings, Source, load};
-use bench::control;
 use bench_plant::zeros::{ModalSum, Zero};
 use bench_plant::{ModalModel, Structure};
 
@@ -181,7 +180,7 @@ pub(crate) fn frequencies(
         .chain(dips)
         .map(|(w, zeta)| (w, zeta.max(1e-4)))
         .collect();
-    Ok(control::grid(low_rad_s, high_rad_s, &features))
+    Ok(bench_control::grid(low_rad_s, high_rad_s, &features))
 }
 
 /// G(jw) at such frequencies.

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::error::CertificateError;
-use crate::control::{ClosedLoop, Margins};
+use bench_control::{ClosedLoop, Margins};
 
 /// The response must reach from this fraction of the lowest crossing of |L| = 1 ...
 const BELOW_CROSSING: f64 = 0.5;

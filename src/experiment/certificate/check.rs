@@ -7,9 +7,9 @@ use super::error::CertificateError;
 use super::file::{Certificate, CertifiedLoad, Digests, sha256};
 use super::signs::{SignAgreement, SignCheck};
 use crate::config::Config;
-use crate::control::ControllerText;
 use crate::experiment::plan_error::PlanError;
 use bench_base::decimal::Decimal;
+use bench_control::ControllerText;
 use bench_plant::ModalModel;
 
 /// Relative difference of two equal numbers after a conversion of units.

@@ -10,8 +10,6 @@ use super::check::{Connected, Today, conditions};
 use super::condition::{Checked, Condition, Subject};
 use super::error::{CertificateDefects, CertificateError};
 use super::file::LoadedCertificate;
-use crate::control::measured::{LowerMargin, MeasuredLoop, Stability};
-use crate::control::{ClosedLoop, ControllerText};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::loop_check::{Stage, closed_loop_of};
 use crate::experiment::measured_frf::FrfError;
@@ -22,6 +20,8 @@ use crate::experiment::response_points::points;
 use crate::experiment::stage_check::RestAfterCheck;
 use crate::rig::calibration::Calibration;
 use bench_base::decimal::Decimal;
+use bench_control::measured::{LowerMargin, MeasuredLoop, Stability};
+use bench_control::{ClosedLoop, ControllerText};
 use bench_plant::SignalPath;
 
 /// The evidence with which a loop closes. The names in JSON must not change.

@@ -7,13 +7,13 @@ use super::file::{
     CertifiedVerdict, Digests, FORMAT, sha256,
 };
 use crate::config::Config;
-use crate::control::ControllerText;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::plan::{CALIBRATION, KIND, RunKind};
 use crate::experiment::plan_error::PlanError;
 use crate::identify::Frf;
 use crate::recording::Recording;
+use bench_control::ControllerText;
 
 /// The file of a frequency response.
 #[derive(Clone, Copy, Debug)]

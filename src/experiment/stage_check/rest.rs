@@ -14,8 +14,8 @@ use serde::Serialize;
 
 use super::shot::Shot;
 use crate::config::Config;
-use crate::control::ClosedLoop;
 use crate::experiment::certificate::LoadedCertificate;
+use bench_control::ClosedLoop;
 
 /// Part of the absolute bound of the residual monitor that is left to the vibration.
 const BOUND_PART: f64 = 0.1;

@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use crate::config::Config;
-use crate::control::ClosedLoop;
 use crate::experiment::certificate::{CertifiedMode, LoadedCertificate};
 use crate::identify::Frf;
+use bench_control::ClosedLoop;
 use bench_excitation::{StageCheckSettings, Tone};
 
 /// Static travel of the step as a ratio of the soft limit.

@@ -4,10 +4,10 @@ use serde::Serialize;
 
 use super::evidence::FrfEvidence;
 use crate::config::Config;
-use crate::control::tuning::{
+use bench_control::tuning::{
     Binding, ConvexBound, Design, DesignTask, Goal, PlantFigures, Requirements,
 };
-use crate::control::{ControllerFile, SectionSettings};
+use bench_control::{ControllerFile, SectionSettings};
 
 /// A design as the JSON object of `bench tune`. The names must not change.
 #[derive(Clone, Debug, Serialize)]

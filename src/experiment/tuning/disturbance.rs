@@ -7,8 +7,6 @@
 //! S_ee is the spectrum of the recorded error (reference minus reading), L the loop by the model of the recording, S_nn that of the
 //! probe's noise. Where the noise is larger than the disturbance, S_dd is 0.
 
-use crate::control::ControllerText;
-use crate::control::tuning::DisturbanceSpectrum;
 use crate::experiment::closed_signals::ClosedSignals;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
@@ -19,6 +17,8 @@ use crate::experiment::plan_error::PlanError;
 use crate::experiment::tracking::steady_tick;
 use crate::recording::{Recording, RecordingError};
 use bench_base::units::rad_s;
+use bench_control::ControllerText;
+use bench_control::tuning::DisturbanceSpectrum;
 use bench_excitation::ReferenceSettings;
 
 /// Least length of the steady state in seconds: ten segments of the spectrum, which give each band to about 30 %.

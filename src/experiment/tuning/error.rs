@@ -1,9 +1,9 @@
 //! Why measured responses cannot be used for a design.
 
 use super::disturbance::DisturbanceError;
-use crate::control::ControllerError;
 use crate::experiment::measured_frf::FrfError;
 use crate::identify::modal::FitError;
+use bench_control::ControllerError;
 use bench_plant::PlantError;
 
 /// Measured responses that cannot be used for a design.

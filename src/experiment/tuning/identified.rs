@@ -8,8 +8,6 @@ use super::error::TuneSourceError;
 use super::mode_fit::{best_fit, groups};
 use super::source::FrfSource;
 use crate::config::Config;
-use crate::control::measured::{MeasuredLoop, check_gaps};
-use crate::control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
 use crate::experiment::analysis::{VerdictScope, judge};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::measured_frf::{FrfError, check_rate, judge_excess};
@@ -17,6 +15,8 @@ use crate::experiment::response_points::points;
 use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
 use crate::identify::verdict::Verdict;
 use bench_base::units::{hz, rad_s};
+use bench_control::measured::{MeasuredLoop, check_gaps};
+use bench_control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
 use bench_plant::UnmodelledMode;
 use bench_plant::{LoopPlant, Mode, SignalPath};
 

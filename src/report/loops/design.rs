@@ -3,11 +3,11 @@
 use nalgebra::Complex;
 
 use super::plane::{CRITICAL, circle, plane, with_critical_point, with_unit_circle};
-use crate::control::tuning::{Goal, LoopCurve, Requirements};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, INK, SKY, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, sheet_svg};
 use bench_base::units::{UM_PER_M, hz};
+use bench_control::tuning::{Goal, LoopCurve, Requirements};
 
 /// Heights of the charts of L, S and K S in pixels.
 const HEIGHTS: [f64; 3] = [230.0, 260.0, 230.0];

@@ -3,7 +3,6 @@
 use nalgebra::Complex;
 
 use super::page::with_interval;
-use crate::control::measured::MeasuredMargins;
 use crate::identify::Frf;
 use crate::report::labels::frequency_text;
 use crate::report::{
@@ -11,6 +10,7 @@ use crate::report::{
     measured_nyquist_svg, measured_sensitivity_svg,
 };
 use bench_base::units::hz;
+use bench_control::measured::MeasuredMargins;
 
 /// A measured loop beside that of the model.
 pub(super) struct MeasuredLoop<'a> {

@@ -6,7 +6,6 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::RecordReport;
-use crate::control;
 use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use crate::identify::verdict::{self, UncertainZero};
 use crate::report::html::{picture, section};
@@ -222,7 +221,7 @@ fn fine_grid_hz(report: &RecordReport<'_>) -> Vec<f64> {
     };
     let mut features = report.fit.map_or(Vec::new(), features_of);
     features.extend(report.model.iter().flat_map(|model| model.resonances()));
-    let grid_rad_s = control::grid(TAU * low_hz, TAU * high_hz, &features);
+    let grid_rad_s = bench_control::grid(TAU * low_hz, TAU * high_hz, &features);
     let mut grid_hz: Vec<f64> = grid_rad_s.into_iter().map(|w| w / TAU).collect();
     // Two neighbours can be equal after the division by 2 pi.
     grid_hz.dedup();

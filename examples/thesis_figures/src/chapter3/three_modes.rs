@@ -6,9 +6,9 @@ use super::super::model::{ModeOf, Model, geometric, kinds, response};
 use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
-use bench::control::{self, ControllerText, continuous_response};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale, Symbol};
+use bench_control::{ControllerText, continuous_response};
 use bench_plant::zeros::{Crossing, Locus, LocusPlane, ModalSum};
 
 const KEY: &str = "plant.modes.R.residue_per_kg";
@@ -520,7 +520,7 @@ impl Loop {
         let name = self.file.into();
         let sections = ControllerText { name, text }.sections(5000.0)?;
         let features = [10.0, 12.0, 11.0, 13.0].map(|w| (w, ZETA_3_14));
-        let frequencies = control::grid(1.5, 200.0, &features).into_iter();
+        let frequencies = bench_control::grid(1.5, 200.0, &features).into_iter();
         let points = frequencies.map(|w| {
             let s = nalgebra::Complex::new(0.0, w);
             (w, sum.response(s) * continuous_response(&sections, s))

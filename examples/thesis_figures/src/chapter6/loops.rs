@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::super::FigureError;
 use super::super::model::Model;
-use bench::control::{ClosedLoop, ControllerText};
+use bench_control::{ClosedLoop, ControllerText};
 use bench_plant::{LoopPlant, ModalModel};
 
 /// The loop of a plant with a controller: a name of the program's own, or a file's name and its text.

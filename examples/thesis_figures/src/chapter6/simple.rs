@@ -8,9 +8,9 @@ use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, step};
 use nalgebra::Complex;
 
-use bench::control::{self, ClosedLoop, ControllerText, Margins};
 use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale};
+use bench_control::{ClosedLoop, ControllerText, Margins};
 use bench_plant::zeros::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";
@@ -323,7 +323,7 @@ fn bode_of_notch() -> Result<(Chart, Chart), FigureError> {
         text: format!("title = \"notch\"\n{}", notch()),
     };
     let notch = notch.sections(5000.0)?;
-    let frequencies = control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)]).into_iter();
+    let frequencies = bench_control::grid(1.0, 100.0, &[(11.0, 0.01), (11.0, 0.4)]).into_iter();
     let points = frequencies.map(|w| (w, notch[0].response(Complex::new(0.0, w))));
     let curve = Curve::new("", Pen::solid(BLUE), points.collect());
     Ok(bode("(a) Notch of Eq. (6-4)", W, "Magnitude (1)", &[curve]))

@@ -8,9 +8,9 @@ use super::super::measured::{ClosedLoopRun, ThesisController};
 use super::super::model::{Model, kinds, response};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
-use bench::control::{ControllerText, Margins, continuous_response, step_metrics};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
+use bench_control::{ControllerText, Margins, continuous_response, step_metrics};
 use bench_plant::zeros::{cnmp_pairs, sign_sequence, undamped_zeros};
 
 const W: &str = "Frequency (rad/s)";

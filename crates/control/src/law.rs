@@ -1,0 +1,95 @@
+//! The interface of control laws: the loop runs a [`ControlLaw`]; margins and stability need its [`LinearLaw`].
+
+use nalgebra::Complex;
+
+use super::Section;
+use super::state_space::StateSpace;
+
+/// Input of a control law in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LawInput {
+    /// Reference r in metres, in the coordinate of the probe.
+    pub reference_m: f64,
+    /// Measured position y in metres, in the coordinate of the probe.
+    pub position_m: f64,
+    /// Current in amperes that the amplifier actually gave for the previous tick: after the interlocks, quantised and
+    /// limited. An observer must use this value, not its own request.
+    pub applied_a: f64,
+}
+
+impl LawInput {
+    /// The input with which a law gives `gain` times the loop gain: y' = r - gain (r - y). A law of the error alone receives gain
+    /// times the error; the input of a law at rest, r = y, does not change.
+    pub fn with_gain(self, gain: f64) -> LawInput {
+        if gain == 1.0 {
+            return self; // without rounding
+        }
+        LawInput {
+            position_m: self.reference_m - gain * (self.reference_m - self.position_m),
+            ..self
+        }
+    }
+}
+
+/// A control law in the loop: one command per tick.
+///
+/// Sign convention: positive current moves the stage in the positive direction, so that u = C (r - y) has a positive gain.
+/// `update` runs in the tick: it must not allocate, lock, print or wait. A request that is not finite trips the interlocks.
+///
+/// ```
+/// use bench_control::{ControlLaw, LawInput};
+///
+/// /// u = K (r - y), K in A/m.
+/// struct Proportional(f64);
+///
+/// impl ControlLaw for Proportional {
+///     fn reset(&mut self, _rest_m: f64) {}
+///     fn update(&mut self, input: &LawInput) -> f64 {
+///         self.0 * (input.reference_m - input.position_m)
+///     }
+/// }
+///
+/// let input = LawInput { reference_m: 2e-6, position_m: -1e-6, applied_a: 0.0 };
+/// assert_eq!(Proportional(1e4).update(&input), 1e4 * 3e-6);
+/// ```
+pub trait ControlLaw: Send {
+    /// Discards the state. The stage rests at `rest_m` with zero current, and the loop closes in this tick. Runs in
+    /// the tick: must not allocate or block.
+    fn reset(&mut self, rest_m: f64);
+
+    /// The request in amperes. Runs in the tick: must not allocate or block.
+    fn update(&mut self, input: &LawInput) -> f64;
+
+    /// The law as a linear system, if it is one. Stability and margins are computed from it; a law without it is **not
+    /// checked** before it runs, and only the interlocks protect the stage.
+    fn linear(&self) -> Option<Box<dyn LinearLaw>> {
+        None
+    }
+}
+
+/// The feedback path of a linear law, u = -C(z) y at zero reference, if the applied current equals the requested one.
+pub trait LinearLaw: Send + Sync {
+    /// x+ = A x + B e, u = C x + D e with e = -y in metres and u in amperes.
+    fn state_space(&self) -> StateSpace;
+
+    /// C(z) in amperes per metre.
+    fn response(&self, z: Complex<f64>) -> Complex<f64> {
+        self.state_space().response(z)
+    }
+
+    /// Roots in the z plane near which C(z) changes quickly: all poles, and the zeros if they are known.
+    fn roots(&self) -> Vec<Complex<f64>> {
+        self.state_space().poles().unwrap_or_default()
+    }
+}
+
+/// Settings of a control law, from which a law at rest is made for a loop. Immutable.
+pub trait ControlDesign: Send {
+    /// A law at rest for a loop of this period.
+    fn law(&self, period_s: f64) -> Box<dyn ControlLaw>;
+
+    /// The continuous sections of the law, if it was designed as a cascade of them.
+    fn sections(&self) -> Option<&[Section]> {
+        None
+    }
+}
