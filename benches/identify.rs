@@ -5,9 +5,9 @@
 use bench_test_support::unrecorded;
 
 use bench::config::{Config, Source, load};
-use bench::identify::modal::{MeasurementChain, fit};
-use bench::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
-use bench::identify::{Estimator, EstimatorSettings, FrfDatum, local, welch};
+use bench_identify::modal::{MeasurementChain, fit};
+use bench_identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
+use bench_identify::{Estimator, EstimatorSettings, FrfDatum, local, welch};
 use criterion::{Criterion, criterion_group, criterion_main};
 
 /// Samples of a segment.

@@ -17,9 +17,9 @@
 //! | excitations, references, and their prediction | [`bench_excitation`] |
 //! | the simulated stage | [`rig::simulated`] |
 //! | real devices, their emulators, calibration | [`rig::devices`], [`rig::emulator`], [`rig::calibration`] |
-//! | estimation of a frequency response | [`identify`] |
-//! | modal fit and model order | [`identify::modal`] |
-//! | the decision about CNMP zeros | [`identify::verdict`] |
+//! | estimation of a frequency response | [`bench_identify`] |
+//! | modal fit and model order | [`bench_identify::modal`] |
+//! | the decision about CNMP zeros | [`bench_identify::verdict`] |
 //! | one run: plan, run, analyse, replay | [`experiment`] |
 //! | short chirps until the verdict is certain | [`experiment::sequential`] |
 //! | a grid of chirps | [`experiment::campaign`] |
@@ -59,7 +59,6 @@ pub mod daemon;
 pub mod doctor;
 pub mod experiment;
 pub mod export;
-pub mod identify;
 pub mod model;
 pub mod recording;
 pub mod report;

@@ -7,13 +7,12 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 11] = [
     "config",
     "model",
     "rig",
     "rt",
     "recording",
-    "identify",
     "export",
     "experiment",
     "report",

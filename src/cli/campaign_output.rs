@@ -8,8 +8,8 @@ use super::run_options::description_text;
 use super::table::{labelled, table, wrap};
 use crate::experiment::Description;
 use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
-use crate::identify::verdict::Cnmp;
 use bench_base::decimal::Decimal;
+use bench_identify::verdict::Cnmp;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

@@ -4,10 +4,10 @@ use super::table::{labelled, table, wrap};
 use crate::experiment::run_comparison::{
     Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
-use crate::identify::Estimate;
-use crate::identify::verdict::Cnmp;
 use crate::report::number::interval;
 use bench_base::decimal::Decimal;
+use bench_identify::Estimate;
+use bench_identify::verdict::Cnmp;
 
 /// Tables of the differences, and what they mean.
 pub(super) fn text(comparison: &Comparison, page: Option<&str>) -> String {

@@ -19,7 +19,6 @@ use crate::experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
 };
-use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
 use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
@@ -27,6 +26,7 @@ use crate::report::run_pages::{
 use bench_base::decimal::Decimal;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
+use bench_identify::SIGMAS_95;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

@@ -12,18 +12,18 @@ use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
 use crate::experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
-use crate::identify::external_csv::{self, Columns, Sampling};
-use crate::identify::frf_csv;
-use crate::identify::linearity::Linearity;
-use crate::identify::modal::InputPath;
-use crate::identify::periodic::Repetition;
-use crate::identify::settling::settling_periods;
-use crate::identify::{IdentifyError, Signals};
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
 };
 use bench_base::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
+use bench_identify::external_csv::{self, Columns, Sampling};
+use bench_identify::frf_csv;
+use bench_identify::linearity::Linearity;
+use bench_identify::modal::InputPath;
+use bench_identify::periodic::Repetition;
+use bench_identify::settling::settling_periods;
+use bench_identify::{IdentifyError, Signals};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
 /// a thousand times larger.

@@ -23,13 +23,13 @@ use crate::experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
 use crate::experiment::{self, Run, RunSummary, Runner};
-use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use crate::report::MagnitudeAxis;
 use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Ratio;
 use bench_excitation::Extremes;
+use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 
 /// Odd lines, one of each group of four omitted.
 const LINES: [(&str, &str); 2] = [

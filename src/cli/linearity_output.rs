@@ -1,7 +1,7 @@
 //! Noise and nonlinear distortion of a multisine, as text.
 
 use super::table::{labelled, table};
-use crate::identify::linearity::{BandLinearity, Linearity};
+use bench_identify::linearity::{BandLinearity, Linearity};
 
 /// The line of `bench chirp`.
 pub(super) fn line(linearity: &Linearity) -> String {

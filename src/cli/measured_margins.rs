@@ -10,7 +10,6 @@ use super::output::warn;
 use super::table::wrap;
 use crate::config::Config;
 use crate::experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
-use crate::identify::Estimate;
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
 use crate::report::{crossing_count, place};
@@ -19,6 +18,7 @@ use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
 };
+use bench_identify::Estimate;
 
 /// The margins with a measured plant, and the files of the loop.
 #[derive(Debug, Serialize)]

@@ -9,11 +9,11 @@ use super::table::{table, wrap};
 use crate::config::Config;
 use crate::experiment::campaign::recorded_points;
 use crate::experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
-use crate::identify::verdict::Cnmp;
 use bench_base::progress::Progress;
 use bench_base::units::UM_PER_M;
 use bench_control::measured::Stability;
 use bench_control::tuning::{Goal, MeasuredPlant};
+use bench_identify::verdict::Cnmp;
 
 /// Where the plants come from.
 #[derive(Clone, Debug, clap::Args)]

@@ -18,12 +18,12 @@ use crate::experiment::sequential::{
     first_shot_config, until_decided,
 };
 use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
-use crate::identify::verdict::MAX_LOOKS;
 use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
+use bench_identify::verdict::MAX_LOOKS;
 
 /// Options of a sequential experiment.
 #[derive(Clone, Debug, clap::Args)]
@@ -220,7 +220,7 @@ fn end_text(end: SequenceEnd, motion_s: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::verdict::Cnmp;
+    use bench_identify::verdict::Cnmp;
 
     fn shot(overruns: u64, lost_records: u64) -> ShotSummary {
         ShotSummary {

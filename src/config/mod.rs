@@ -21,7 +21,6 @@ mod cross_checks;
 mod devices;
 mod differences;
 mod excitation;
-mod identify;
 mod interlock;
 mod load;
 mod monitor_checks;
@@ -43,6 +42,9 @@ pub use bench_excitation::{
     AmplitudePoint, ChirpSettings, ExcitationKind, Lines, MultisineSettings, PrbsSettings,
     ReferenceSettings, Spacing, SteppedSineSettings, Sweep, TravelPoint,
 };
+pub use bench_identify::{
+    Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint,
+};
 pub use bench_settings::ConfigError;
 pub use calibration::*;
 pub use campaign::*;
@@ -51,7 +53,6 @@ pub use control::*;
 pub use devices::*;
 pub use differences::{SettingDifference, changed_settings, differences};
 pub use excitation::*;
-pub use identify::*;
 pub use interlock::*;
 pub(crate) use load::validate;
 pub use load::{Source, load, whole};

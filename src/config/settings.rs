@@ -9,12 +9,12 @@ use super::calibration::{CalibrateSettings, CalibrationSettings};
 use super::campaign::CampaignSettings;
 use super::control::ControlSettings;
 use super::excitation::{ExcitationSettings, ShapeSettings};
-use super::identify::IdentifySettings;
 use super::interlock::InterlockSettings;
 use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;
 use bench_excitation::{ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings};
+use bench_identify::IdentifySettings;
 
 /// All settings of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -8,9 +8,9 @@ use std::str::FromStr;
 use super::error::ExperimentError;
 use super::prediction::extremes;
 use crate::config::Config;
-use crate::identify::frf_csv;
 use bench_base::units::{hz, rad_s};
 use bench_excitation::{CurrentLimit, shaped_amplitude};
+use bench_identify::frf_csv;
 use bench_plant::{LoopPlant, ModalModel};
 
 /// Frequencies at which the model is evaluated, beside those of its modes: 0.2 % apart over four decades.

@@ -15,12 +15,12 @@ use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
 use super::signal_builder::{RunSignals, SignalBuilder};
 use crate::config::Config;
-use crate::identify::delay::excess_delay;
-use crate::identify::linearity::Linearity;
-use crate::identify::modal::{self, FitError, MeasurementChain, ModalFit};
-use crate::identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
-use crate::identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use crate::recording::Recording;
+use bench_identify::delay::excess_delay;
+use bench_identify::linearity::Linearity;
+use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
+use bench_identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
+use bench_identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use bench_plant::{ModalModel, Mode, Sign};
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.

@@ -1,10 +1,10 @@
 //! Why a recording cannot be analysed.
 
 use super::plan_error::PlanError;
-use crate::identify::IdentifyError;
 use crate::recording::RecordingError;
 use bench_control::ControllerError;
 use bench_control::measured::MeasuredLoopError;
+use bench_identify::IdentifyError;
 use bench_plant::PlantError;
 
 /// Why a recording gives no frequency response.

@@ -9,9 +9,9 @@ use super::plan_error::PlanError;
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::response_points::margins_of_loop;
 use crate::config::{Config, ReferenceSettings};
-use crate::identify::joint::{self, JointEstimate, LoopSignals};
 use crate::recording::Recording;
 use bench_control::ClosedLoop;
+use bench_identify::joint::{self, JointEstimate, LoopSignals};
 
 /// Estimates plant and loop by the instrumental-variable method, with the reference as the instrument.
 pub(super) fn estimate_loop(

@@ -5,12 +5,12 @@ use serde::Serialize;
 use super::analysis::{VerdictScope, judge, response_band_hz};
 use super::analysis_error::AnalysisError;
 use super::plausibility::{describes, hint, implausible};
-use crate::identify::harmonics::{InputSignal, harmonics};
-use crate::identify::linearity::Linearity;
-use crate::identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::verdict::Verdict;
-use crate::identify::{
+use bench_identify::harmonics::{InputSignal, harmonics};
+use bench_identify::linearity::Linearity;
+use bench_identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use bench_identify::periodic::{self, Periods, Repetition};
+use bench_identify::verdict::Verdict;
+use bench_identify::{
     EstimatorSettings, Frf, FrfDatum, Signals, distortion_ratio, excited_band_hz, frf_data, local,
     record_check, with_distortion,
 };

@@ -13,13 +13,13 @@ use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use super::read_run::{ReadSignals, open_with_signals};
 use crate::config::Config;
-use crate::identify::delay::excess_delay;
-use crate::identify::frf_csv::{self, FrfCsvError};
-use crate::identify::{Estimate, Frf, FrfDatum};
 use crate::recording::{Recording, RecordingError};
 use bench_base::units::{hz, rad_s};
 use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredLoopError;
+use bench_identify::delay::excess_delay;
+use bench_identify::frf_csv::{self, FrfCsvError};
+use bench_identify::{Estimate, Frf, FrfDatum};
 use bench_plant::LoopPlant;
 
 /// The phases are compared with the model up to this multiple of its highest mode.

@@ -8,13 +8,13 @@ use serde::Serialize;
 use super::measured_frf::{FrfError, MeasuredFrf, check_frf};
 use super::response_points::{points, roll_off, variance};
 use crate::config::Config;
-use crate::identify::{Frf, FrfPoint};
 use bench_base::units::rad_s;
 use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredLoop, MeasuredMargins, NyquistCount, OutsideBand, Stability, check_gaps,
     least_damping_ratio,
 };
+use bench_identify::{Frf, FrfPoint};
 use bench_plant::SignalPath;
 
 /// Margins of a measured loop: with 95 % intervals within the band of the FRF, with bounds by the model outside of it.

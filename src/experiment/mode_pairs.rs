@@ -1,6 +1,6 @@
 //! Which modes of two runs are the same mode of the stage.
 
-use crate::identify::modal::{Estimate, FittedMode};
+use bench_identify::modal::{Estimate, FittedMode};
 
 /// Two modes are the same if they differ by no more than this ratio of their frequency, and by no more than half the distance to
 /// the next mode.

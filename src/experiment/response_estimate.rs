@@ -2,10 +2,10 @@
 
 use nalgebra::Complex;
 
-use crate::identify::linearity::Linearity;
-use crate::identify::{Frf, FrfDatum};
 use bench_control::Margins;
 use bench_control::measured::MeasuredMargins;
+use bench_identify::linearity::Linearity;
+use bench_identify::{Frf, FrfDatum};
 
 /// The measured responses of a closed loop, and those of the model at the same frequencies.
 #[derive(Clone, Debug)]

@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 
-use crate::identify::Frf;
 use bench_base::units::rad_s;
 use bench_control::measured::{MeasuredLoop, MeasuredLoopError, MeasuredMargins, ResponsePoint};
+use bench_identify::Frf;
 use bench_plant::SignalPath;
 
 /// The margins of a measured L, without a model.

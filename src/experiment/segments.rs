@@ -7,11 +7,11 @@
 //! | periodic | each line from the periods after those for settling, and the noise from their scatter; if lines are omitted, odd distortion is added to the noise |
 //! | stepped sine | each sine from its own periods, and the noise from their scatter |
 
-use crate::identify::harmonics::{InputSignal, harmonics};
-use crate::identify::linearity::Linearity;
-use crate::identify::periodic::{self, Periods, Repetition};
-use crate::identify::{Frf, FrfDatum, IdentifyError, NoiseParts, PowerDatum, Signals, repeated};
 use bench_excitation::{Pattern, Window};
+use bench_identify::harmonics::{InputSignal, harmonics};
+use bench_identify::linearity::Linearity;
+use bench_identify::periodic::{self, Periods, Repetition};
+use bench_identify::{Frf, FrfDatum, IdentifyError, NoiseParts, PowerDatum, Signals, repeated};
 
 /// Number of lines on either side from which the noise is estimated for a fit.
 const NEIGHBOURS: usize = 4;

@@ -15,10 +15,10 @@ use super::response::Response;
 use super::rows::{self, Rows};
 use super::sections::Sections;
 use super::{ExportError, SIGNALS, Signal, Value};
-use crate::identify::Frf;
 use crate::recording::Recording;
 use crate::rt::record::TickRecord;
 use bench_base::units::rad_s;
+use bench_identify::Frf;
 
 /// Types of data elements.
 const INT8: u32 = 1;

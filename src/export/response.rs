@@ -1,6 +1,6 @@
 //! A measured frequency response with what files state beside it.
 
-use crate::identify::Frf;
+use bench_identify::Frf;
 
 /// A measured frequency response, and what files state beside it.
 #[derive(Clone, Copy, Debug)]

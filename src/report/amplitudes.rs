@@ -5,8 +5,8 @@ use super::chart::colours::{BLUE, Colour, GREY, VERMILION};
 use super::chart::{Chart, Mark, Pen, Row, Scale, SeriesPoint, sheet_svg};
 use super::labels::frequency_text;
 use crate::experiment::linearity::ModeOverAmplitude;
-use crate::identify::linearity::{BandLinearity, Linearity};
-use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use bench_identify::linearity::{BandLinearity, Linearity};
+use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 
 const HEIGHT: f64 = 270.0;
 const PERCENT: f64 = 100.0;

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::chart::{Chart, Mark, Row, Scale, SeriesPoint, sheet_svg};
 use super::magnitude::{MagnitudeAxis, MagnitudeScale};
 use super::trace::{self, Line, Trace};
-use crate::identify::Unit;
+use bench_identify::Unit;
 
 /// Heights of the panels for magnitude, phase and coherence in pixels.
 pub(super) const MAGNITUDE_HEIGHT: f64 = 320.0;
@@ -27,7 +27,7 @@ const MIN_DEGREES: f64 = 180.0;
 /// this would be a guess: see [`has_ambiguous_phase`](super::has_ambiguous_phase).
 ///
 /// ```
-/// use bench::identify::Unit;
+/// use bench_identify::Unit;
 /// use bench::report::{Trace, bode_svg};
 /// use nalgebra::Complex;
 ///

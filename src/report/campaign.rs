@@ -5,8 +5,8 @@ use super::error::ReportError;
 use colours::{BLUE, Colour, GREEN, INK, PAPER, VERMILION};
 
 use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
-use crate::identify::verdict::Cnmp;
 use bench_base::decimal::Decimal;
+use bench_identify::verdict::Cnmp;
 use bench_plant::PlantError;
 use bench_plant::zeros::cnmp_map;
 

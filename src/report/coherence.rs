@@ -4,7 +4,7 @@ use super::ReportError;
 use super::chart::colours::BLUE;
 use super::chart::{Chart, Pen, Row, Scale, sheet_svg};
 use super::trace::{self, Trace, has_gap_before};
-use crate::identify::Frf;
+use bench_identify::Frf;
 
 const HEIGHT: f64 = 250.0;
 

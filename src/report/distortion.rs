@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::chart::colours::{BLUE, GREEN, GREY, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use crate::identify::harmonics::{Harmonics, LineLevel};
+use bench_identify::harmonics::{Harmonics, LineLevel};
 
 /// Largest number of points of an averaged line.
 const COLUMNS: f64 = 120.0;

@@ -10,7 +10,7 @@ use super::chart::colours::{BLUE, VERMILION};
 use super::chart::{Chart, Mark, Pen, SeriesPoint};
 use super::magnitude::{MagnitudeAxis, MagnitudeScale};
 use super::trace::{self, Trace, has_gap_before};
-use crate::identify::{Frf, Unit};
+use bench_identify::{Frf, Unit};
 
 const RESIDUAL_HEIGHT: f64 = 190.0;
 /// The size of a circular error whose components have the standard deviation 1 has a Rayleigh distribution: its quantiles

@@ -1,7 +1,7 @@
 //! The axis of magnitudes: logarithmic, or in decibels.
 
 use super::chart::{Scale, SeriesPoint};
-use crate::identify::Unit;
+use bench_identify::Unit;
 
 /// Spacing and numbers of the axis of a magnitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -8,7 +8,7 @@ use super::chart::{Chart, Row, Scale, Symbol, sheet_svg};
 use super::ellipse::{self, SIGMAS_95_PLANE};
 use super::labels::{ResponsePoint, frequency_text, spread};
 use super::trace::{self, BAND_SIGMAS, Line, Trace};
-use crate::identify::{Frf, Unit};
+use bench_identify::{Frf, Unit};
 
 /// Largest number of circles.
 const CIRCLES: usize = 90;

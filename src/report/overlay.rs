@@ -5,7 +5,7 @@ use super::bode::sheet;
 use super::chart::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Stroke, sheet_svg};
 use super::trace::{self, Trace};
-use crate::identify::{Frf, Unit};
+use bench_identify::{Frf, Unit};
 
 /// Colours and strokes: their numbers have no common divisor, so that twelve curves differ.
 const COLOURS: [Colour; 4] = [BLUE, VERMILION, GREEN, PURPLE];

@@ -9,7 +9,7 @@ use super::chart::colours::{BLUE, Colour, GREY, INK, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use super::ellipse::{Ellipse, SIGMAS_95_PLANE};
 use super::{ReportError, number};
-use crate::identify::modal::SIGMAS_95;
+use bench_identify::modal::SIGMAS_95;
 
 /// Largest number of enlarged zeros: those nearest to the imaginary axis in sigmas.
 const ENLARGED: usize = 3;

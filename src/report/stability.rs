@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::chart::colours::{BLUE, Colour, GREY, ORANGE, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
-use crate::identify::{Frf, Unit};
+use bench_identify::{Frf, Unit};
 
 /// Largest relative changes of the frequency and of the damping of a mode that persists.
 const FREQUENCY_CHANGE: f64 = 0.01;

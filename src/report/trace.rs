@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use super::chart::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, SKY, VERMILION};
 use super::{Pen, ReportError, SeriesPoint, Stroke, phase};
-use crate::identify::{Frf, wrapped_phase_rad};
+use bench_identify::{Frf, wrapped_phase_rad};
 
 /// Half-width of the band in sigmas; smaller magnitudes are drawn faint.
 pub(super) const BAND_SIGMAS: f64 = 2.0;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use bench::config::{Source, load};
 use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
-use bench::identify::verdict::Cnmp;
+use bench_identify::verdict::Cnmp;
 use serde_json::Value;
 
 use crate::campaign::program::{Bench, NO_DAEMON};

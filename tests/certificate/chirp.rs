@@ -3,11 +3,11 @@ use std::process::Command;
 
 use bench::experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
 use bench::experiment::{self, Plan, analyse};
-use bench::identify::modal::FittedMode;
-use bench::identify::{Estimate, SIGMAS_95};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_identify::modal::FittedMode;
+use bench_identify::{Estimate, SIGMAS_95};
 use bench_plant::{ModalModel, build};
 use serde_json::Value;
 

@@ -1,9 +1,9 @@
 //! Multisine, binary sequence and stepped sine each give the response of the rig and its modes.
 use bench::config::Config;
 use bench::experiment::{Analysis, replay};
-use bench::identify::modal::FittedMode;
-use bench::identify::verdict::Cnmp;
 use bench::recording::Recording;
+use bench_identify::modal::FittedMode;
+use bench_identify::verdict::Cnmp;
 use nalgebra::Complex;
 use serde_json::json;
 

@@ -1,7 +1,7 @@
 //! Noise and geometric nonlinearity are distinguished by the omitted lines of a multisine and by several amplitudes.
 use bench::experiment::Analysis;
-use bench::identify::linearity::Cause;
-use bench::identify::modal::FittedMode;
+use bench_identify::linearity::Cause;
+use bench_identify::modal::FittedMode;
 use serde_json::Value;
 
 use crate::excitation::program::{Bench, number};

@@ -1,7 +1,7 @@
 //! Frequency responses.
 
 use bench::experiment::{Plan, open_with_signals, recorded_frf};
-use bench::identify::Frf;
+use bench_identify::Frf;
 use bench_test_support::program::Bench;
 use bench_test_support::truth;
 use serde_json::json;

@@ -1,7 +1,7 @@
 //! Averages over periods: exact without noise, and with correct standard deviations.
-use bench::identify::IdentifyError;
-use bench::identify::periodic::{Repetition, estimate};
-use bench::identify::settling::settling_periods;
+use bench_identify::IdentifyError;
+use bench_identify::periodic::{Repetition, estimate};
+use bench_identify::settling::settling_periods;
 
 use crate::external::python;
 use crate::external::signals::{PERIOD, multisine, response};

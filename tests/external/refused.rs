@@ -1,5 +1,5 @@
 //! Records that cannot be analysed are rejected with the place of the error; unreliable ones give an undecided verdict.
-use bench::identify::Signals;
+use bench_identify::Signals;
 
 use crate::external::program::{Answer, Bench};
 use crate::external::signals::{csv, multisine, normal};

@@ -1,7 +1,7 @@
 //! Signals in closed form: the response of a sum of modes to a multisine, with drift and noise.
 use std::f64::consts::TAU;
 
-use bench::identify::Signals;
+use bench_identify::Signals;
 use nalgebra::Complex;
 
 /// Samples per period, and per second.

@@ -1,5 +1,5 @@
 //! A record without repetition that begins and ends at rest, like every run of the bench.
-use bench::identify::Signals;
+use bench_identify::Signals;
 
 use crate::external::program::{Bench, near, number};
 use crate::external::signals::{STAGE, csv};

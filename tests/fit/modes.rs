@@ -1,6 +1,6 @@
 //! Number, frequencies and signs of the fitted modes.
-use bench::identify::FrfDatum;
-use bench::identify::modal::{FitError, MeasurementChain, fit};
+use bench_identify::FrfDatum;
+use bench_identify::modal::{FitError, MeasurementChain, fit};
 use nalgebra::Complex;
 
 use crate::fit::synthetic::{frf_data, stage, term};
@@ -24,7 +24,7 @@ fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
         let modes = fit.modes();
         assert_eq!(modes.len(), 3, "{ratio}: {modes:?}");
         for (mode, truth) in modes.iter().zip(truth) {
-            let in_sigmas = |estimate: bench::identify::modal::Estimate, truth: f64| {
+            let in_sigmas = |estimate: bench_identify::modal::Estimate, truth: f64| {
                 (estimate.value - truth).abs() / estimate.sigma
             };
             // The probability that one of nine normally distributed errors exceeds 5 sigma is 1 in 200,000.

@@ -1,6 +1,6 @@
 //! Response and poles of a fit with given parameters, against closed forms.
 
-use bench::identify::modal::{MeasurementChain, ModalFit, ModalParameters};
+use bench_identify::modal::{MeasurementChain, ModalFit, ModalParameters};
 use bench_plant::zeros::ModalTerm;
 use nalgebra::{Complex, DMatrix};
 

@@ -3,11 +3,11 @@ use std::f64::consts::TAU;
 
 use bench::config::{Config, ReferenceSettings, Source, load};
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
-use bench::identify::verdict::Cnmp;
 use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
 use bench_excitation::SweptReference;
+use bench_identify::verdict::Cnmp;
 use bench_plant::LoopPlant;
 
 use crate::fit::identified::analysed;

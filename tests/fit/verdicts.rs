@@ -1,7 +1,7 @@
 //! Verdicts: unknown delay, undefined numbers, missing modes, and zeros on the imaginary axis.
-use bench::identify::FrfDatum;
-use bench::identify::modal::{MeasurementChain, ModalFit, fit};
-use bench::identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
+use bench_identify::FrfDatum;
+use bench_identify::modal::{MeasurementChain, ModalFit, fit};
+use bench_identify::verdict::{Certainty, Cnmp, Verdict, VerdictInput, verdict};
 use bench_plant::ModalModel;
 use nalgebra::Complex;
 

@@ -1,6 +1,6 @@
 //! Bias of the local estimator on the stage.
 
-use bench::identify::{EstimatorSettings, Frf, LocalModel, Signals, local};
+use bench_identify::{EstimatorSettings, Frf, LocalModel, Signals, local};
 
 use crate::identify::stage::{self, SampledPlant};
 

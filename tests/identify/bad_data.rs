@@ -1,6 +1,6 @@
 //! Signals and settings that cannot be used are rejected with value, limit and remedy.
 
-use bench::identify::{Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
+use bench_identify::{Estimator, EstimatorSettings, Frf, IdentifyError, Signals, local, welch};
 use proptest::prelude::*;
 
 /// Signals that any estimator can process.

@@ -1,6 +1,6 @@
 //! Effects of the local model, the resolution and the frequency grid.
 
-use bench::identify::{EstimatorSettings, Frf, LocalModel, ResolutionPoint, Signals, local};
+use bench_identify::{EstimatorSettings, Frf, LocalModel, ResolutionPoint, Signals, local};
 
 use crate::identify::stage::{self, Dice, RATE_HZ, SampledPlant};
 

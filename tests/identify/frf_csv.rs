@@ -1,8 +1,8 @@
 //! The CSV file of a frequency response.
 
-use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
-use bench::identify::{EstimatorSettings, Frf, FrfPoint, local};
 use bench_base::atomic_file::write_atomic;
+use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_identify::{EstimatorSettings, Frf, FrfPoint, local};
 use nalgebra::Complex;
 
 use crate::identify::stage;

@@ -3,9 +3,9 @@
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
-use bench::identify::Signals;
-use bench::identify::harmonics::{Harmonics, InputSignal, LineLevel, harmonics, noise_probability};
-use bench::identify::periodic::Repetition;
+use bench_identify::Signals;
+use bench_identify::harmonics::{Harmonics, InputSignal, LineLevel, harmonics, noise_probability};
+use bench_identify::periodic::Repetition;
 use realfft::RealFftPlanner;
 
 const PERIOD: usize = 500;

@@ -1,7 +1,7 @@
 //! Identification in closed loop, on a loop simulated independently of the library.
 
-use bench::identify::joint::estimate;
-use bench::identify::{EstimatorSettings, Frf, local};
+use bench_identify::joint::estimate;
+use bench_identify::{EstimatorSettings, Frf, local};
 use bench_test_support::feedback_loop::{BAND_HZ, loop_gain, plant, run};
 use nalgebra::Complex;
 

@@ -1,6 +1,6 @@
 //! Sigma and coherence with noise, and frequencies without input.
 
-use bench::identify::{EstimatorSettings, Frf, PHASE_SIGMA_LIMIT_RAD, Signals, local};
+use bench_identify::{EstimatorSettings, Frf, PHASE_SIGMA_LIMIT_RAD, Signals, local};
 
 use crate::identify::stage::{self, Dice, RATE_HZ};
 

@@ -1,6 +1,6 @@
 //! Repetitions of one chirp, each at rest at its ends.
 
-use bench::identify::{EstimatorSettings, Frf, Signals, local, repeated};
+use bench_identify::{EstimatorSettings, Frf, Signals, local, repeated};
 
 use crate::identify::stage::{self, Dice, RATE_HZ, SampledPlant};
 

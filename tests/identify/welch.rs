@@ -1,6 +1,6 @@
 //! Welch's estimator against scipy.
 
-use bench::identify::{Estimator, Signals, welch};
+use bench_identify::{Estimator, Signals, welch};
 use nalgebra::Complex;
 
 use crate::identify::python;

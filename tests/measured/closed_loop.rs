@@ -1,9 +1,9 @@
 //! The margins of a closed-loop record use the same interpolation and intervals.
 
-use bench::identify::EstimatorSettings;
-use bench::identify::joint;
 use bench_base::units::rad_s;
 use bench_control::measured::{MeasuredLoop, MeasuredMargins};
+use bench_identify::EstimatorSettings;
+use bench_identify::joint;
 use bench_test_support::feedback_loop;
 use nalgebra::Complex;
 

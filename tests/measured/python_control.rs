@@ -1,7 +1,7 @@
 //! The margins of the same data by python-control.
 
 use bench::experiment::closed_loop;
-use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use serde_json::{Value, json};
 
 use crate::measured::program::{Bench, near, number};

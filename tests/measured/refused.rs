@@ -2,9 +2,9 @@
 
 use bench::config::Config;
 use bench::experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
-use bench::identify::Frf;
-use bench::identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench_control::ClosedLoop;
+use bench_identify::Frf;
+use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
 use crate::measured::program::Bench;
 use crate::measured::sampled::{config, frf};
@@ -42,7 +42,7 @@ fn without(frf: &Frf, (low_hz, high_hz): (f64, f64)) -> Frf {
     for k in 0..frf.len() {
         let f = frf.frequency_hz[k];
         if f < low_hz || f > high_hz {
-            rest.push(bench::identify::FrfPoint {
+            rest.push(bench_identify::FrfPoint {
                 frequency_hz: f,
                 response: frf.response[k],
                 coherence: 1.0,

@@ -1,10 +1,10 @@
 //! The response of a model as if it were measured.
 
 use bench::config::{Config, Source, load};
-use bench::identify::{Frf, FrfPoint};
 use bench_base::units::{hz, rad_s};
 use bench_control::ClosedLoop;
 use bench_control::measured::ResponsePoint;
+use bench_identify::{Frf, FrfPoint};
 use nalgebra::Complex;
 
 /// The default configuration with some settings.

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use bench::config::{Config, Source, load};
 use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
-use bench::identify::verdict::Cnmp;
 use bench::model::study::{Block, Plan, Shard, StudyFile};
 use bench::rig::motor::{Moment, MotorMemory};
+use bench_identify::verdict::Cnmp;
 
 use crate::random_inputs::damage::check_damaged;
 

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use bench::identify::external_csv::{self, Columns, Sampling};
-use bench::identify::frf_csv;
+use bench_identify::external_csv::{self, Columns, Sampling};
+use bench_identify::frf_csv;
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};
 

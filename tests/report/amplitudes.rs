@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 
 use bench::config::{Source, load};
 use bench::experiment::linearity::{ModeOverAmplitude, compare_modes};
-use bench::identify::modal::{Estimate, FittedMode};
 use bench::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench::report::{AmplitudeOverview, ReportError, amplitudes_svg};
+use bench_identify::modal::{Estimate, FittedMode};
 
 use crate::report::svg;
 

@@ -6,8 +6,8 @@
 
 use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::{Analysis, Plan};
-use bench::identify::Estimate;
-use bench::identify::verdict::zeros;
+use bench_identify::Estimate;
+use bench_identify::verdict::zeros;
 use bench_plant::zeros::damped_zeros;
 use bench_test_support::identified::{measurable, model, stands_for};
 use bench_test_support::seeds::over_seeds;

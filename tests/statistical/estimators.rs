@@ -1,6 +1,6 @@
 //! Bias and confidence intervals of H1, H2 and Hv with noise on the output, on the input and on both.
 
-use bench::identify::Estimator;
+use bench_identify::Estimator;
 use bench_test_support::gain_in_noise::{ESTIMATORS, Estimate, GAIN, NOISE, every_way, signals};
 use nalgebra::Complex;
 

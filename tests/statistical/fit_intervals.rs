@@ -1,6 +1,6 @@
 //! Coverage of the confidence intervals of the fit.
-use bench::identify::modal::{Estimate, MeasurementChain, fit};
-use bench::identify::verdict::zeros;
+use bench_identify::modal::{Estimate, MeasurementChain, fit};
+use bench_identify::verdict::zeros;
 
 use bench_test_support::synthetic::{frf_data, stage};
 

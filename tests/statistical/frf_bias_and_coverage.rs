@@ -2,7 +2,7 @@
 //! quantisation and unmodelled modes. The reference response is computed independently of the library.
 
 use bench::config::{Config, Source, load};
-use bench::identify::{Frf, response};
+use bench_identify::{Frf, response};
 
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::stage::SampledPlant;

@@ -1,6 +1,6 @@
 //! The standard deviations of a frequency response match its errors.
 
-use bench::identify::{EstimatorSettings, Frf, Signals, local};
+use bench_identify::{EstimatorSettings, Frf, Signals, local};
 use bench_test_support::stage::{self, RATE_HZ, SampledPlant};
 
 fn estimate(signals: &Signals, band_hz: (f64, f64)) -> Frf {

@@ -1,7 +1,7 @@
 //! Bias and confidence intervals of identification in closed loop.
 
-use bench::identify::joint::estimate;
-use bench::identify::{EstimatorSettings, local};
+use bench_identify::joint::estimate;
+use bench_identify::{EstimatorSettings, local};
 use bench_test_support::feedback_loop::{BAND_HZ, POLE, plant, run};
 use nalgebra::Complex;
 

@@ -2,9 +2,9 @@
 
 use bench::config::{Config, Source, load};
 use bench::experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
-use bench::identify::{Estimate, response};
 use bench::rig::simulated;
 use bench_control::{ClosedLoop, ControllerText};
+use bench_identify::{Estimate, response};
 use bench_plant::LoopPlant;
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::unrecorded;

@@ -1,6 +1,6 @@
 //! Modes R, u and v of the simulated stage with noise, quantisation and unmodelled modes.
 use bench::config::{Source, load};
-use bench::identify::modal::Estimate;
+use bench_identify::modal::Estimate;
 use bench_plant::UnmodelledMode;
 use bench_test_support::identified::{Truth, analysed, config, measurable, model, stands_for};
 use bench_test_support::seeds::over_seeds;

@@ -4,7 +4,7 @@
 //! (with `-- --nocapture` it prints the motion).
 
 use bench::config::Config;
-use bench::identify::verdict::Cnmp;
+use bench_identify::verdict::Cnmp;
 use bench_test_support::identified::{config, truth};
 use bench_test_support::seeds::over_seeds;
 use bench_test_support::sequences::decided;

@@ -2,8 +2,8 @@
 
 use bench::config::Config;
 use bench::experiment::Analysis;
-use bench::identify::modal::Estimate;
-use bench::identify::verdict::Cnmp;
+use bench_identify::modal::Estimate;
+use bench_identify::verdict::Cnmp;
 use bench_test_support::identified::{analysed, config, model, stands_for, truth};
 use bench_test_support::synthetic::normal;
 

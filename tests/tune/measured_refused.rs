@@ -51,7 +51,7 @@ fn changed(
     for k in 0..frf.len() {
         if let Some(response) = change(frf.frequency_hz[k], frf.response[k]) {
             let factor = (response / frf.response[k]).norm();
-            changed.measured.frf.push(bench::identify::FrfPoint {
+            changed.measured.frf.push(bench_identify::FrfPoint {
                 frequency_hz: frf.frequency_hz[k],
                 response,
                 coherence: 1.0,
@@ -66,7 +66,7 @@ fn changed(
         .filter_map(|datum| {
             let response = change(datum.frequency_hz, datum.response)?;
             let factor = (response / datum.response).norm();
-            Some(bench::identify::FrfDatum {
+            Some(bench_identify::FrfDatum {
                 response,
                 variance: datum.variance * factor * factor,
                 ..*datum

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::identify::GrowingPoint;
+use bench_identify::GrowingPoint;
 
 /// The response so far: an estimate for watching. The result is that of the analysis after the run.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

@@ -9,7 +9,7 @@ use super::point::PointResult;
 use super::recommend::{Recommendation, Tolerances, recommend};
 use super::region::Region;
 use crate::config::{Config, Sr4dofSettings};
-use crate::identify::verdict::Cnmp;
+use bench_identify::verdict::Cnmp;
 use bench_plant::PlantError;
 use bench_plant::zeros::cnmp_map;
 

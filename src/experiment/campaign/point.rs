@@ -8,9 +8,9 @@ use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::run::Run;
 use crate::experiment::sequential::Sequence;
-use crate::identify::modal::FittedMode;
-use crate::identify::verdict::Cnmp;
 use crate::recording::{Recording, RecordingError};
+use bench_identify::modal::FittedMode;
+use bench_identify::verdict::Cnmp;
 
 /// Verdict, modes and zeros of the chirps at one point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

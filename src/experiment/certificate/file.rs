@@ -8,9 +8,9 @@ use sha2::{Digest, Sha256};
 
 use super::error::CertificateError;
 use super::signs::SignCheck;
-use crate::identify::modal::FittedMode;
-use crate::identify::{Estimate, Frf, frf_csv};
 use bench_base::input_file::{self, MAX_SETTINGS_BYTES, MAX_TABLE_BYTES};
+use bench_identify::modal::FittedMode;
+use bench_identify::{Estimate, Frf, frf_csv};
 
 /// Version of the format.
 pub(super) const FORMAT: u32 = 1;

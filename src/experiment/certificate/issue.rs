@@ -11,9 +11,9 @@ use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::plan::{CALIBRATION, KIND, RunKind};
 use crate::experiment::plan_error::PlanError;
-use crate::identify::Frf;
 use crate::recording::Recording;
 use bench_control::ControllerText;
+use bench_identify::Frf;
 
 /// The file of a frequency response.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use crate::identify::SIGMAS_95;
-use crate::identify::modal::FittedMode;
+use bench_identify::SIGMAS_95;
+use bench_identify::modal::FittedMode;
 use bench_plant::{ModalModel, Sign};
 
 /// Modes above this multiple of the highest mode of the model are not compared.

@@ -8,8 +8,8 @@ use super::prediction::predicted_extremes;
 use super::run::Run;
 use super::runner::Runner;
 use crate::config::{Config, validate};
-use crate::identify::modal::FittedMode;
 use bench_excitation::Extremes;
+use bench_identify::modal::FittedMode;
 
 pub use mode_shifts::{ModeOverAmplitude, is_within, modes_over_amplitude};
 
@@ -145,7 +145,7 @@ fn no_shift_text(modes: &[ModeOverAmplitude]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::modal::Estimate;
+    use bench_identify::modal::Estimate;
 
     #[test]
     fn names_a_mode_that_is_not_found_at_every_amplitude() {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::experiment::mode_pairs::{probability_of_difference, same_mode};
-use crate::identify::modal::{Estimate, FittedMode};
+use bench_identify::modal::{Estimate, FittedMode};
 
 /// Probability that noise alone makes any of the compared parameters shift.
 const FALSE_ALARM: f64 = 0.01;

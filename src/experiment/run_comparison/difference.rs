@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::experiment::mode_pairs::probability_of_difference;
-use crate::identify::Estimate;
+use bench_identify::Estimate;
 
 /// Probability that noise alone makes any of the tested differences significant.
 pub const FAMILY_FALSE_ALARM: f64 = 0.05;

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::difference::Difference;
 use crate::experiment::mode_pairs::same_mode;
-use crate::identify::modal::{FittedMode, ModalFit};
+use bench_identify::modal::{FittedMode, ModalFit};
 
 /// A mode that both runs show.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

@@ -10,9 +10,9 @@ use crate::experiment::description::Description;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::{Plan, RunKind};
-use crate::identify::modal::{FittedMode, ModalFit};
-use crate::identify::verdict::Cnmp;
 use crate::recording::Recording;
+use bench_identify::modal::{FittedMode, ModalFit};
+use bench_identify::verdict::Cnmp;
 
 /// A recorded run with its results.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use crate::experiment::MarginError;
 use crate::experiment::analyse;
 use crate::experiment::certificate::{CertificateError, CertificateText, ResponseFile, certify};
 use crate::experiment::stage_check::StageCheckError;
-use crate::identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
 /// A loop on devices that do not exist.
 fn refused(controller: &str) -> ExperimentError {

@@ -6,9 +6,9 @@ use crate::config::Config;
 use crate::experiment::amplitude_plan::{limit_travel, shape_travel_m};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::prediction::extremes;
-use crate::identify::modal::{MeasurementChain, ModalFit};
 use bench_base::units::hz;
 use bench_excitation::{AmplitudePoint, CurrentLimit, shaped_amplitude};
+use bench_identify::modal::{MeasurementChain, ModalFit};
 
 /// Frequencies at which the response of a fit is evaluated, beside those of its modes.
 const GRID: usize = 400;

@@ -10,8 +10,8 @@ use crate::experiment::analysis::{
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::read_run::open_with_signals;
 use crate::experiment::response_estimate::ResponseEstimate;
-use crate::identify::verdict::Certainty;
-use crate::identify::{Frf, FrfDatum, best_of};
+use bench_identify::verdict::Certainty;
+use bench_identify::{Frf, FrfDatum, best_of};
 
 /// The responses of the shots, and their data for the fit.
 #[derive(Default)]

@@ -12,9 +12,9 @@
 use nalgebra::{Cholesky, Complex, DMatrix, DVector};
 
 use super::shot::Shot;
-use crate::identify::FrfDatum;
-use crate::identify::modal::{MeasurementChain, ModalFit, merged};
 use bench_excitation::AmplitudeCurve;
+use bench_identify::FrfDatum;
+use bench_identify::modal::{MeasurementChain, ModalFit, merged};
 
 /// Number of parts of the band, equal in ln f.
 const CELLS: usize = 16;

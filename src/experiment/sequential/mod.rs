@@ -10,7 +10,7 @@
 //! residue), for as long as the fit predicts to be necessary. Each look at the data requires a smaller probability of error than a single
 //! one ([`Certainty::REPEATED_LOOKS`]), so that the number of looks does not increase the probability of a wrong verdict.
 //!
-//! [`Certainty::REPEATED_LOOKS`]: crate::identify::verdict::Certainty::REPEATED_LOOKS
+//! [`Certainty::REPEATED_LOOKS`]: bench_identify::verdict::Certainty::REPEATED_LOOKS
 
 mod amplitude;
 mod evidence;

@@ -2,7 +2,7 @@
 
 use super::information::InformationByFrequency;
 use super::shot::Shot;
-use crate::identify::verdict::DecisiveQuantity;
+use bench_identify::verdict::DecisiveQuantity;
 
 /// Lengths of a shot as multiples of that of the first one.
 const LENGTHS: [f64; 10] = [0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 5.6];

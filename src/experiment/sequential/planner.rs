@@ -13,9 +13,9 @@ use crate::experiment::analysis::{Analysis, VerdictScope};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::run::Run;
 use crate::experiment::run_summary::RunSummary;
-use crate::identify::modal::MeasurementChain;
-use crate::identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
 use bench_excitation::AmplitudeCurve;
+use bench_identify::modal::MeasurementChain;
+use bench_identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
 use bench_plant::ModalModel;
 
 /// The sequence ends early, because nothing can be decided, after this number of shots or more.

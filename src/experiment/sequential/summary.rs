@@ -5,7 +5,7 @@ use std::sync::atomic::AtomicBool;
 use serde::Serialize;
 
 use super::shot::Shot;
-use crate::identify::verdict::Cnmp;
+use bench_identify::verdict::Cnmp;
 
 /// A shot with the verdict of all data up to it.
 #[derive(Clone, Debug, Serialize)]
@@ -40,7 +40,7 @@ pub enum SequenceEnd {
     Decided,
     /// The motion reached its limit.
     LimitReached,
-    /// The number of shots reached [`MAX_LOOKS`](crate::identify::verdict::MAX_LOOKS).
+    /// The number of shots reached [`MAX_LOOKS`](bench_identify::verdict::MAX_LOOKS).
     ChirpLimitReached,
     /// More motion is predicted to be necessary than is allowed.
     NeedsMoreMotion {

@@ -13,8 +13,8 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::shot::Shot;
-use crate::identify::Signals;
 use bench_excitation::{Excitation, StageCheckSignal};
+use bench_identify::Signals;
 
 /// Distances of the neighbours from a tone, in units of one over the measured time: beyond the width of its line.
 const NEIGHBOURS: [f64; 4] = [2.0, 3.0, 4.0, 5.0];

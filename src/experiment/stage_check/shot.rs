@@ -11,9 +11,9 @@ use nalgebra::Complex;
 
 use crate::config::Config;
 use crate::experiment::certificate::{CertifiedMode, LoadedCertificate};
-use crate::identify::Frf;
 use bench_control::ClosedLoop;
 use bench_excitation::{StageCheckSettings, Tone};
+use bench_identify::Frf;
 
 /// Static travel of the step as a ratio of the soft limit.
 const STEP_RATIO: f64 = 0.01;

@@ -2,7 +2,7 @@
 
 use super::error::TuneSourceError;
 use super::source::FrfSource;
-use crate::identify::modal::FittedMode;
+use bench_identify::modal::FittedMode;
 
 /// Two numbers differ if their distance is more than this multiple of its standard deviation.
 const DIFFERENT_SIGMAS: f64 = 5.0;

@@ -2,8 +2,8 @@
 
 use super::disturbance::DisturbanceError;
 use crate::experiment::measured_frf::FrfError;
-use crate::identify::modal::FitError;
 use bench_control::ControllerError;
+use bench_identify::modal::FitError;
 use bench_plant::PlantError;
 
 /// Measured responses that cannot be used for a design.

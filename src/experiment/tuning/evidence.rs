@@ -8,13 +8,13 @@ use crate::config::Config;
 use crate::experiment::measured_frf::FrfError;
 use crate::experiment::measured_margins::{MeasuredLoopMargins, margins_around};
 use crate::experiment::response_points::points;
-use crate::identify::Estimate;
-use crate::identify::modal::FittedMode;
-use crate::identify::verdict::Cnmp;
 use bench_base::units::hz;
 use bench_control::measured::{MeasuredLoop, OutsideBand, Stability};
 use bench_control::tuning::DISC_SIGMAS_95;
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
+use bench_identify::Estimate;
+use bench_identify::modal::FittedMode;
+use bench_identify::verdict::Cnmp;
 use bench_plant::SignalPath;
 
 /// Part of half the sampling rate up to which the tolerance above the band is computed: C has zeros at its end.

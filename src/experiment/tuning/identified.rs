@@ -12,11 +12,11 @@ use crate::experiment::analysis::{VerdictScope, judge};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::measured_frf::{FrfError, check_rate, judge_excess};
 use crate::experiment::response_points::points;
-use crate::identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
-use crate::identify::verdict::Verdict;
 use bench_base::units::{hz, rad_s};
 use bench_control::measured::{MeasuredLoop, check_gaps};
 use bench_control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
+use bench_identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
+use bench_identify::verdict::Verdict;
 use bench_plant::UnmodelledMode;
 use bench_plant::{LoopPlant, Mode, SignalPath};
 

@@ -5,8 +5,8 @@
 //! other data of the same response often has no such modes, and is preferred.
 
 use super::source::{FrfSource, independent};
-use crate::identify::FrfDatum;
-use crate::identify::modal::{self, FitError, FittedMode, MeasurementChain, ModalFit};
+use bench_identify::FrfDatum;
+use bench_identify::modal::{self, FitError, FittedMode, MeasurementChain, ModalFit};
 
 /// A residue with a larger relative standard deviation, of a mode that is closer to another one than their widths, is not determined.
 const UNRESOLVED: f64 = 0.3;
@@ -107,7 +107,7 @@ fn is_determined(mode: &FittedMode) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::Estimate;
+    use bench_identify::Estimate;
 
     fn mode(omega_rad_s: f64, residue: f64, sigma: f64) -> FittedMode {
         let exact = |value| Estimate { value, sigma: 0.0 };

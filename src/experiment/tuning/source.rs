@@ -8,8 +8,8 @@ use super::error::TuneSourceError;
 use crate::config::{Config, PlantSettings};
 use crate::experiment::measured_frf::MeasuredFrf;
 use crate::experiment::response_points::variance;
-use crate::identify::{Frf, FrfDatum};
 use bench_base::numeric::to_four_decimals;
+use bench_identify::{Frf, FrfDatum};
 
 /// A measured frequency response, from command (A) to reading (m), with the data for a fit.
 #[derive(Clone, Debug)]

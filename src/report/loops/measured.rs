@@ -3,7 +3,6 @@
 use nalgebra::Complex;
 
 use super::plane::{self, CRITICAL, plane, with_critical_point, with_unit_circle};
-use crate::identify::{Frf, Unit};
 use crate::report::ReportError;
 use crate::report::bode::{MAGNITUDE_HEIGHT, PHASE_HEIGHT, magnitude, phase, stacked};
 use crate::report::chart::colours::{Colour, GREY, PURPLE};
@@ -12,6 +11,7 @@ use crate::report::ellipse::{self, SIGMAS_95_PLANE};
 use crate::report::labels::{ResponsePoint, frequency_text, spread};
 use crate::report::magnitude::{MagnitudeAxis, MagnitudeScale};
 use crate::report::trace::{self, Line, Trace};
+use bench_identify::{Frf, Unit};
 
 /// Ends of the axes of the Nyquist plot: the surroundings of -1 and of the unit circle.
 const REAL_PART: (f64, f64) = (-2.6, 1.4);

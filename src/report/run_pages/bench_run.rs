@@ -6,14 +6,14 @@ use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::config::Config;
 use crate::experiment::{Analysis, ClosedResponses, Description};
-use crate::identify::Unit;
-use crate::identify::modal::MeasurementChain;
 use crate::recording::Recording;
 use crate::report::conditions::lines;
 use crate::report::html::row;
 use crate::report::number::{angular_frequency, significant};
 use crate::report::{MagnitudeAxis, ReportError, crossing_count, place};
 use bench_excitation::AmplitudeCurve;
+use bench_identify::Unit;
+use bench_identify::modal::MeasurementChain;
 
 const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a band of two sigma, and by the model. Dotted: |L| = 1 \
     and -180 degrees.";

@@ -5,7 +5,6 @@ use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
 use crate::config::Config;
 use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
-use crate::identify::SIGMAS_95;
 use crate::recording::Recording;
 use crate::report::conditions::{joined, lines};
 use crate::report::html::{facts, note, row, section};
@@ -14,6 +13,7 @@ use crate::report::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
     loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
 };
+use bench_identify::SIGMAS_95;
 
 const SIGNALS_CAPTION: &str =
     "The whole run. Each column reaches from minimum to maximum, so that no spike is left out.";

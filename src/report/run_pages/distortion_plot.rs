@@ -1,8 +1,8 @@
 //! The plot of distortion and noise of a periodic record.
 
 use super::plots::{Plot, PlotKind};
-use crate::identify::linearity::Linearity;
 use crate::report::{DistortionLevels, ReportError, distortion_svg};
+use bench_identify::linearity::Linearity;
 
 /// The plot of the levels of a quantity, such as `Displacement (m)`.
 ///

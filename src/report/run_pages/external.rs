@@ -4,10 +4,10 @@ use super::RecordReport;
 use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named};
 use crate::experiment::ExternalAnalysis;
-use crate::identify::Unit;
-use crate::identify::modal::MeasurementChain;
 use crate::report::html::{facts, section};
 use crate::report::{MagnitudeAxis, ReportError};
+use bench_identify::Unit;
+use bench_identify::modal::MeasurementChain;
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]

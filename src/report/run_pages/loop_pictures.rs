@@ -3,7 +3,6 @@
 use nalgebra::Complex;
 
 use super::page::with_interval;
-use crate::identify::Frf;
 use crate::report::labels::frequency_text;
 use crate::report::{
     MeasuredLoopPlot, MeasuredMark, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
@@ -11,6 +10,7 @@ use crate::report::{
 };
 use bench_base::units::hz;
 use bench_control::measured::MeasuredMargins;
+use bench_identify::Frf;
 
 /// A measured loop beside that of the model.
 pub(super) struct MeasuredLoop<'a> {

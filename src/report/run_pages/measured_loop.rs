@@ -8,9 +8,9 @@ use serde::Serialize;
 use super::loop_pictures::MeasuredLoop;
 use super::result_files::{OutputError, ResultFiles};
 use crate::experiment::LoopCurves;
-use crate::identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
 use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredMargins;
+use bench_identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
 
 /// A loop with a measured plant.
 #[derive(Clone)]

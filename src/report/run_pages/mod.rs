@@ -28,10 +28,10 @@ mod run_facts;
 
 use crate::experiment::ModelResponse;
 use crate::experiment::certificate::SignCheck;
-use crate::identify::modal::{MeasurementChain, ModalFit};
-use crate::identify::verdict::Verdict;
-use crate::identify::{Frf, Unit};
 use crate::report::MagnitudeAxis;
+use bench_identify::modal::{MeasurementChain, ModalFit};
+use bench_identify::verdict::Verdict;
+use bench_identify::{Frf, Unit};
 
 pub use amplitude_page::AmplitudeFiles;
 pub use basic_page::BasicReport;

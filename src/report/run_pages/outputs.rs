@@ -9,10 +9,10 @@ use super::page_files::PageFiles;
 use super::result_files::{OutputError, ResultFiles};
 use crate::experiment::certificate::{ResponseFile, SignCheck, certify};
 use crate::experiment::{Analysis, ClosedResponses};
-use crate::identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
-use crate::identify::linearity::Linearity;
-use crate::identify::modal::{FittedMode, ModalFit, ModelOrder};
-use crate::identify::verdict::{Cnmp, UncertainZero, Verdict};
+use bench_identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
+use bench_identify::linearity::Linearity;
+use bench_identify::modal::{FittedMode, ModalFit, ModelOrder};
+use bench_identify::verdict::{Cnmp, UncertainZero, Verdict};
 
 /// Modes, zeros and verdict; the names in JSON must not change.
 #[derive(Clone, Debug, Serialize)]

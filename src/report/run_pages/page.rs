@@ -4,10 +4,10 @@ use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
 use crate::experiment::certificate::SIGNS_DIFFER;
-use crate::identify::modal::{Estimate, FittedMode, SIGMAS_95};
-use crate::identify::verdict::UncertainZero;
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::number::{interval, percent};
+use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use bench_identify::verdict::UncertainZero;
 
 /// The page as an HTML document.
 pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {

@@ -6,13 +6,13 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::RecordReport;
-use crate::identify::modal::{ModalFit, ModelOrder, UncertainPole};
-use crate::identify::verdict::{self, UncertainZero};
 use crate::report::html::{picture, section};
 use crate::report::{
     Identification, OrderedMode, PoleZeroMap, ReportError, StabilityChart, Trace, UncertainPoint,
     coherence_svg, identification_svg, nyquist_svg, pole_zero_svg, stability_svg,
 };
+use bench_identify::modal::{ModalFit, ModelOrder, UncertainPole};
+use bench_identify::verdict::{self, UncertainZero};
 use bench_plant::zeros::ModalTerm;
 
 /// The part of a Nyquist plot around two close modes extends by this multiple of their distance to either side.

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use crate::experiment::PlanError;
-use crate::identify::Frf;
-use crate::identify::frf_csv;
 use crate::report::ReportError;
 use bench_base::atomic_file::{write_atomic, write_new};
+use bench_identify::Frf;
+use bench_identify::frf_csv;
 
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]

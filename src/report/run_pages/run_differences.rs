@@ -102,7 +102,7 @@ fn modes(modes: &ModeDifferences) -> String {
 }
 
 fn difference_row(name: &str, found: &Difference, factor: f64) -> String {
-    let shown = |estimate: crate::identify::Estimate| {
+    let shown = |estimate: bench_identify::Estimate| {
         let scaled = estimate.scaled(factor);
         interval(scaled.value, scaled.half_width_95())
     };

@@ -3,9 +3,9 @@
 use bench::config::{Config, Source, load};
 use bench::experiment::MeasuredFrf;
 use bench::experiment::tuning::FrfSource;
-use bench::identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
 use bench::rig::simulated;
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
+use bench_identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
 use bench_plant::{LoopPlant, Mode};
 use nalgebra::Complex;
 

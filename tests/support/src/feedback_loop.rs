@@ -1,7 +1,7 @@
 //! A closed loop of a resonance and a PI controller, simulated independently of the library: y = P u + v, u = C (r - y).
 
-use bench::identify::Signals;
-use bench::identify::joint::LoopSignals;
+use bench_identify::Signals;
+use bench_identify::joint::LoopSignals;
 use nalgebra::Complex;
 
 use crate::stage::Dice;

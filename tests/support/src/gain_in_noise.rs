@@ -1,6 +1,6 @@
 //! A constant gain with white noise on its measured input and output, and the estimators for it.
 
-use bench::identify::{
+use bench_identify::{
     Estimator, EstimatorSettings, Frf, IdentifyError, LocalModel, Signals, local, welch,
 };
 

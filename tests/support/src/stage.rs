@@ -4,7 +4,7 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use bench::identify::Signals;
+use bench_identify::Signals;
 use nalgebra::Complex;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;

@@ -1,5 +1,5 @@
 //! Frequency responses in closed form, with noise of known power.
-use bench::identify::FrfDatum;
+use bench_identify::FrfDatum;
 use bench_plant::zeros::ModalTerm;
 use nalgebra::Complex;
 

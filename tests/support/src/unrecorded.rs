@@ -1,9 +1,9 @@
 //! The default excitation on the simulated stage, without loop and recording.
 use bench::config::Config;
-use bench::identify::Signals;
 use bench::rig::simulated::SimulatedRig;
 use bench_excitation::{Chirp, Excitation};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
+use bench_identify::Signals;
 
 /// Commands and readings of the chirp of a configuration.
 pub fn chirp(config: &Config) -> Signals {

@@ -4,7 +4,7 @@ use super::*;
 use crate::config::{Purpose, Source, load};
 use crate::experiment::plan::Plan;
 use crate::experiment::runner::{Runner, Setup};
-use crate::identify::verdict::{DecisiveQuantity, UncertainZero, zeros};
+use bench_identify::verdict::{DecisiveQuantity, UncertainZero, zeros};
 
 /// A stage beside the border of the region with CNMP zeros, with a noise of 8 um.
 fn config(seed: u64) -> Config {

@@ -1,0 +1,224 @@
+//! Frequency response functions as measured: value, coherence and standard deviations at each frequency.
+
+use core::f64::consts::PI;
+
+use nalgebra::Complex;
+
+/// Largest standard deviation of a phase, that of a uniform distribution over one turn: pi/sqrt(3) rad = 103.9 deg.
+pub const PHASE_SIGMA_LIMIT_RAD: f64 = PI / 1.732_050_807_568_877_2;
+
+/// Unit of the magnitude of a response.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// Metres per ampere: from current to displacement.
+    MetresPerAmpere,
+    /// A ratio, or the units of the columns of an external record.
+    Bare,
+}
+
+/// A measured frequency response. All columns have one entry per frequency; frequencies rise; every entry is finite.
+///
+/// A frequency at which the input had no energy is omitted.
+///
+/// ```
+/// use bench_identify::{Frf, FrfPoint};
+///
+/// let mut frf = Frf::default();
+/// let added = frf.push(FrfPoint {
+///     frequency_hz: 29.3,
+///     response: nalgebra::Complex::new(0.0, -3.4e-4),
+///     coherence: 0.999,
+///     variance: 2e-12,
+///     resolution_hz: 0.1,
+/// });
+/// assert!(added && (frf.phase_rad(0).to_degrees() + 90.0).abs() < 1e-12);
+/// // sigma(|H|) = sqrt(variance/2)
+/// assert!((frf.magnitude_sigma[0] - 1e-6).abs() < 1e-18);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Frf {
+    /// Frequencies in hertz.
+    pub frequency_hz: Vec<f64>,
+    /// H = output/input in metres per ampere; a lag is a negative phase.
+    pub response: Vec<Complex<f64>>,
+    /// Magnitude-squared coherence, 0 to 1: the ratio of the output's power that the input explains.
+    pub coherence: Vec<f64>,
+    /// Standard deviation of |H| in metres per ampere.
+    pub magnitude_sigma: Vec<f64>,
+    /// Standard deviation of arg H in radians, at most [`PHASE_SIGMA_LIMIT_RAD`].
+    pub phase_sigma_rad: Vec<f64>,
+    /// Equivalent noise bandwidth of the estimator in hertz: the width of the rectangular average with the same noise
+    /// reduction. Features of the plant that are narrower are smeared.
+    pub resolution_hz: Vec<f64>,
+}
+
+/// One frequency of an [`Frf`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrfPoint {
+    /// Frequency in hertz.
+    pub frequency_hz: f64,
+    /// H in metres per ampere.
+    pub response: Complex<f64>,
+    /// Magnitude-squared coherence, 0 to 1.
+    pub coherence: f64,
+    /// E|error of H|^2 in (m/A)^2.
+    pub variance: f64,
+    /// See [`Frf::resolution_hz`].
+    pub resolution_hz: f64,
+}
+
+/// One datum of a parametric fit: the mean response over a few neighbouring bins. The errors of different data are
+/// independent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrfDatum {
+    /// Mean frequency of the bins in hertz, weighted with the power of the input.
+    pub frequency_hz: f64,
+    /// Standard deviation of the bins' frequencies about their mean, with the same weights, in hertz.
+    pub spread_hz: f64,
+    /// Mean of H in metres per ampere.
+    pub response: Complex<f64>,
+    /// E|error of the response|^2 in (m/A)^2.
+    pub variance: f64,
+}
+
+/// The points of several responses of the same plant, each where its standard deviation is the smallest; frequencies rise.
+pub fn best_of(frfs: &[Frf]) -> Frf {
+    let mut points: Vec<(usize, usize)> = Vec::new();
+    for (which, frf) in frfs.iter().enumerate() {
+        let best = (0..frf.len()).filter(|index| is_best(frfs, which, *index));
+        points.extend(best.map(|index| (which, index)));
+    }
+    let hz = |(which, index): (usize, usize)| frfs[which].frequency_hz[index];
+    points.sort_by(|a, b| hz(*a).total_cmp(&hz(*b)));
+    points.dedup_by(|a, b| hz(*a) <= hz(*b));
+    let mut best = Frf::default();
+    for (which, index) in points {
+        best.take_from(&frfs[which], index);
+    }
+    best
+}
+
+/// Whether no other response has a smaller standard deviation at the frequency of a point, within its band.
+fn is_best(frfs: &[Frf], which: usize, index: usize) -> bool {
+    let (hz, sigma) = (
+        frfs[which].frequency_hz[index],
+        frfs[which].magnitude_sigma[index],
+    );
+    let others = frfs.iter().enumerate().filter(|(other, _)| *other != which);
+    let mut sigmas = others.filter_map(|(_, frf)| frf.magnitude_sigma_at(hz));
+    sigmas.all(|other| sigma <= other)
+}
+
+impl FrfDatum {
+    /// Angular frequency in rad/s.
+    pub fn omega_rad_s(&self) -> f64 {
+        2.0 * PI * self.frequency_hz
+    }
+}
+
+impl Frf {
+    /// Number of frequencies.
+    pub fn len(&self) -> usize {
+        self.frequency_hz.len()
+    }
+
+    /// Whether there are no frequencies.
+    pub fn is_empty(&self) -> bool {
+        self.frequency_hz.is_empty()
+    }
+
+    /// Median of the coherence over the frequencies.
+    pub fn median_coherence(&self) -> Option<f64> {
+        let mut sorted = self.coherence.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied()
+    }
+
+    /// The response with a delay removed from its phases: H exp(j w delay).
+    pub fn without_delay(&self, delay_s: f64) -> Frf {
+        let response = self
+            .frequency_hz
+            .iter()
+            .zip(&self.response)
+            .map(|(f, h)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s))
+            .collect();
+        Frf {
+            response,
+            ..self.clone()
+        }
+    }
+
+    /// Standard deviation of |H| at the point below a frequency within the band; `None` outside.
+    fn magnitude_sigma_at(&self, frequency_hz: f64) -> Option<f64> {
+        let after = self.frequency_hz.partition_point(|hz| *hz <= frequency_hz);
+        let is_last = self.frequency_hz.last() == Some(&frequency_hz);
+        let is_within = after < self.len() || is_last;
+        let before = after.checked_sub(1).filter(|_| is_within)?;
+        self.magnitude_sigma.get(before).copied()
+    }
+
+    /// Appends a point of another response.
+    fn take_from(&mut self, other: &Frf, index: usize) {
+        self.frequency_hz.push(other.frequency_hz[index]);
+        self.response.push(other.response[index]);
+        self.coherence.push(other.coherence[index]);
+        self.magnitude_sigma.push(other.magnitude_sigma[index]);
+        self.phase_sigma_rad.push(other.phase_sigma_rad[index]);
+        self.resolution_hz.push(other.resolution_hz[index]);
+    }
+
+    /// Phase in radians, in (-pi, pi].
+    pub fn phase_rad(&self, index: usize) -> f64 {
+        wrapped_phase_rad(self.response[index])
+    }
+
+    /// Appends a frequency; returns false and appends nothing if a number is not finite.
+    ///
+    /// The error of H is circular, half its power lies along H and half across it: sigma(|H|) = sqrt(E|error|^2 / 2) and
+    /// sigma(arg H) = sigma(|H|) / |H| as long as that is small; it is limited to [`PHASE_SIGMA_LIMIT_RAD`].
+    pub fn push(&mut self, point: FrfPoint) -> bool {
+        let sigma = (point.variance / 2.0).sqrt();
+        let magnitude = point.response.norm();
+        if !(sigma.is_finite() && magnitude.is_finite() && point.coherence.is_finite()) {
+            return false;
+        }
+        self.frequency_hz.push(point.frequency_hz);
+        self.response.push(point.response);
+        self.coherence.push(point.coherence.clamp(0.0, 1.0));
+        self.magnitude_sigma.push(sigma);
+        self.phase_sigma_rad.push(phase_sigma_rad(sigma, magnitude));
+        self.resolution_hz.push(point.resolution_hz);
+        true
+    }
+
+    /// Appends points; those with a number that is not finite are omitted.
+    pub(super) fn extend(&mut self, points: impl IntoIterator<Item = FrfPoint>) {
+        for point in points {
+            self.push(point);
+        }
+    }
+
+    /// The response, or an error if it has no frequencies.
+    pub(super) fn excited(self, band_hz: (f64, f64)) -> Result<Frf, super::IdentifyError> {
+        if self.is_empty() {
+            Err(super::IdentifyError::not_excited(band_hz))
+        } else {
+            Ok(self)
+        }
+    }
+}
+
+/// arg H in (-pi, pi]: -pi, which atan2 returns for a negative zero, becomes pi.
+pub fn wrapped_phase_rad(response: Complex<f64>) -> f64 {
+    let phase = response.arg();
+    if phase <= -PI { PI } else { phase }
+}
+
+/// sigma/|H|, limited; the limit also applies to 0/0 (neither response nor noise).
+fn phase_sigma_rad(sigma: f64, magnitude: f64) -> f64 {
+    if sigma < PHASE_SIGMA_LIMIT_RAD * magnitude {
+        sigma / magnitude
+    } else {
+        PHASE_SIGMA_LIMIT_RAD
+    }
+}

@@ -1,0 +1,102 @@
+//! From recorded signals to a frequency response function (FRF) with standard deviations, its modes, and a verdict.
+//!
+//! ```text
+//! Signals -> drift removed -> FFT of the whole record -> local models of neighbouring bins -> Frf -> CSV, plots
+//!                                                                                    '--> FrfDatum -> modal -> verdict
+//! ```
+//!
+//! | to find | look in |
+//! |---|---|
+//! | the default estimator, for records that begin and end at rest | [`local`] |
+//! | the same without smoothing, for a fit | [`frf_data()`] |
+//! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
+//! | the estimator that the configuration selects | [`response`] |
+//! | the response while a run goes on | [`GrowingResponse`] |
+//! | defects of an external record | [`record_check`] |
+//! | the band that an input excites | [`excited_band_hz`] |
+//! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
+//! | the periods in which a plant settles | [`settling`] |
+//! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
+//! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
+//! | the excess delay of a response over its model | [`delay`] |
+//! | modes with confidence intervals | [`modal`] |
+//! | whether there are CNMP zeros | [`verdict`] |
+//! | external records as CSV, FRFs as CSV | [`external_csv`], [`frf_csv`] |
+//!
+//! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
+
+mod band;
+pub mod delay;
+mod error;
+mod estimator;
+mod excited_band;
+pub mod external_csv;
+mod fft;
+mod frf;
+pub mod frf_csv;
+mod growing;
+mod local_model;
+mod mean;
+pub mod modal;
+mod multisine_lines;
+mod noise_parts;
+pub mod record_check;
+pub mod repeated;
+mod settings;
+mod signals;
+mod timing;
+pub mod verdict;
+pub mod welch;
+
+pub use bench_base::estimate::{Estimate, SIGMAS_95};
+pub use error::IdentifyError;
+pub use excited_band::excited_band_hz;
+pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};
+pub use growing::{GrowingPoint, GrowingResponse};
+pub use local_model::frf_data::frf_data;
+pub use local_model::{joint, local};
+pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
+pub use multisine_lines::{harmonics, linearity, periodic, settling};
+pub use noise_parts::{NoiseParts, PowerDatum};
+pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
+pub use signals::Signals;
+pub use timing::{resampling, setpoint_timing};
+
+/// The frequency response as by [`response`], and the data for a fit as by [`frf_data()`].
+///
+/// # Errors
+/// Those of the two.
+pub fn response_and_data(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &IdentifySettings,
+) -> Result<(Frf, Vec<FrfDatum>), IdentifyError> {
+    match settings {
+        IdentifySettings::Local(local) => local::estimate_with_data(signals, band_hz, local),
+        IdentifySettings::Welch { .. } => Ok((
+            response(signals, band_hz, settings)?,
+            frf_data(signals, band_hz, &settings.local())?,
+        )),
+    }
+}
+
+/// The frequency response by the estimator that the configuration selects.
+///
+/// # Errors
+/// Those of the estimator.
+pub fn response(
+    signals: &Signals,
+    band_hz: (f64, f64),
+    settings: &IdentifySettings,
+) -> Result<Frf, IdentifyError> {
+    match settings {
+        IdentifySettings::Local(local) => local::estimate(signals, band_hz, local),
+        IdentifySettings::Welch {
+            segment_s,
+            estimator,
+        } => {
+            let segment = libm::round(segment_s * signals.rate_hz) as usize;
+            welch::estimate(signals, band_hz, segment, *estimator)
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! The measurement chain through which the mechanics are observed.
+
+use nalgebra::{Complex, DVector};
+
+use crate::FrfDatum;
+use bench_plant::zeros::ModalTerm;
+use bench_plant::{LoopPlant, Mode, PathResponse, SignalPath};
+
+/// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
+const FAR_RAD_S: f64 = 1e6;
+
+/// The signal path between set-point and reading, without the mechanics.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MeasurementChain {
+    /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.
+    Bench(SignalPath),
+    /// No chain: the input is a force in newtons, or another input unit.
+    Direct,
+    /// Hold and lag between the recorded input and the force.
+    Input(InputPath),
+}
+
+/// What lies between the samples of an input and the force, apart from a delay.
+///
+/// ```text
+/// (1 - exp(-s T))/(s T) 1/(1 + s tau)             T the hold, tau the lag
+/// ```
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct InputPath {
+    /// Time in seconds for which each sample is held; 0 without a hold.
+    pub hold_s: f64,
+    /// Time constant in seconds of a first-order lag, for example of a current loop; 0 without one.
+    pub lag_s: f64,
+}
+
+impl InputPath {
+    fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        let held = s * self.hold_s;
+        let hold = if held.norm() > 0.0 {
+            (-(-held).exp() + 1.0) / held
+        } else {
+            Complex::new(1.0, 0.0)
+        };
+        hold / (s * self.lag_s + 1.0)
+    }
+}
+
+/// The frequencies at which the model of each datum is evaluated, with that part of the model that its parameters do not change.
+pub(super) struct Nodes {
+    /// The chain, with an additional delay.
+    chain: MeasurementChain,
+    /// The additional delay: the aliases have it too. Only a change of the delay multiplies the response by exp(-s change).
+    delay_s: f64,
+    data: Vec<DatumNodes>,
+}
+
+/// A response at each node of each datum, with the delay of the nodes.
+pub(super) struct NodeResponse(Vec<[Complex<f64>; 2]>);
+
+/// exp(-s change) at each node of each datum, for one change of the delay.
+pub(super) struct Delays(Vec<[Complex<f64>; 2]>);
+
+/// Two frequencies that have the first three moments of a datum, or one.
+struct DatumNodes(Node, Option<Node>);
+
+struct Node {
+    s: Complex<f64>,
+    chain: ChainResponse,
+    /// The response of a mode far above all frequencies.
+    far: Complex<f64>,
+}
+
+/// The chain at one frequency.
+enum ChainResponse {
+    Bench(PathResponse),
+    Direct,
+    Input(Complex<f64>),
+}
+
+/// A mode of residue 1, to be observed through a chain.
+struct ObservedMode {
+    mode: Mode,
+    /// The mode at the end of the signal path of a bench.
+    plant: Option<LoopPlant>,
+}
+
+impl ObservedMode {
+    fn response(&self, s: Complex<f64>, chain: &ChainResponse) -> Complex<f64> {
+        match (chain, &self.plant) {
+            (ChainResponse::Bench(path), Some(plant)) => plant.response_along(path),
+            (ChainResponse::Input(path), _) => self.mode.resonance(s) * path,
+            (ChainResponse::Bench(_) | ChainResponse::Direct, _) => self.mode.resonance(s),
+        }
+    }
+}
+
+impl Node {
+    fn new(chain: &MeasurementChain, far: &ObservedMode, frequency_hz: f64) -> Node {
+        let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * frequency_hz);
+        let chain = match (chain, &far.plant) {
+            (MeasurementChain::Bench(path), Some(plant)) => {
+                ChainResponse::Bench(plant.path_response(unit_phasor(s.im * path.period_s)))
+            }
+            (MeasurementChain::Input(path), _) => ChainResponse::Input(path.response(s)),
+            (MeasurementChain::Bench(_) | MeasurementChain::Direct, _) => ChainResponse::Direct,
+        };
+        let far = far.response(s, &chain);
+        Node { s, chain, far }
+    }
+
+    /// exp(-s tau).
+    fn delay(&self, delay_s: f64) -> Complex<f64> {
+        unit_phasor(-self.s.im * delay_s)
+    }
+}
+
+impl DatumNodes {
+    fn new(
+        chain: &MeasurementChain,
+        far: &ObservedMode,
+        frequency_hz: f64,
+        spread_hz: f64,
+    ) -> DatumNodes {
+        let node = |frequency_hz| Node::new(chain, far, frequency_hz);
+        match spread_hz == 0.0 {
+            true => DatumNodes(node(frequency_hz), None),
+            false => DatumNodes(
+                node(frequency_hz - spread_hz),
+                Some(node(frequency_hz + spread_hz)),
+            ),
+        }
+    }
+
+    /// The delay at the nodes; 1 in place of a second node that does not exist.
+    fn delays(&self, delay_s: f64) -> [Complex<f64>; 2] {
+        let other = self.1.as_ref().map(|node| node.delay(delay_s));
+        [
+            self.0.delay(delay_s),
+            other.unwrap_or(Complex::new(1.0, 0.0)),
+        ]
+    }
+
+    /// A response at the nodes; 0 in place of a second node that does not exist.
+    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> [Complex<f64>; 2] {
+        let other = self.1.as_ref().map(&response);
+        [response(&self.0), other.unwrap_or_default()]
+    }
+
+    /// The mean of a response over the datum, with the delays.
+    fn mean(&self, response: &[Complex<f64>; 2], delays: &[Complex<f64>; 2]) -> Complex<f64> {
+        match &self.1 {
+            Some(_) => (response[0] * delays[0] + response[1] * delays[1]) * 0.5,
+            None => response[0] * delays[0],
+        }
+    }
+}
+
+/// exp(j angle).
+pub(super) fn unit_phasor(angle: f64) -> Complex<f64> {
+    let (sine, cosine) = libm::sincos(angle);
+    Complex::new(cosine, sine)
+}
+
+impl Nodes {
+    /// The nodes at frequencies with their spreads in hertz, at a chain with an additional delay.
+    fn new(
+        chain: &MeasurementChain,
+        frequencies: impl Iterator<Item = (f64, f64)>,
+        delay_s: f64,
+    ) -> Nodes {
+        let (chain, delay_s) = chain.with_added_delay(delay_s);
+        let far = chain.observed(FAR_RAD_S, 1.0);
+        let data = frequencies.map(|(hz, spread_hz)| DatumNodes::new(&chain, &far, hz, spread_hz));
+        Nodes {
+            data: data.collect(),
+            chain,
+            delay_s,
+        }
+    }
+
+    /// exp(-s change) at each node, for the change from the delay of the nodes to `delay_s` beyond the given chain.
+    pub(super) fn delays(&self, delay_s: f64) -> Delays {
+        let change_s = delay_s - self.delay_s;
+        Delays(
+            self.data
+                .iter()
+                .map(|nodes| nodes.delays(change_s))
+                .collect(),
+        )
+    }
+
+    /// The response of a mode of residue 1, its own excluded.
+    pub(super) fn mode(&self, term: &ModalTerm) -> NodeResponse {
+        let mode = self.chain.observed(term.omega_rad_s, term.damping_ratio);
+        self.response(|node| mode.response(node.s, &node.chain))
+    }
+
+    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> NodeResponse {
+        NodeResponse(
+            self.data
+                .iter()
+                .map(|nodes| nodes.response(&response))
+                .collect(),
+        )
+    }
+
+    /// The mean of a response over each datum, with the delay.
+    pub(super) fn mean(&self, response: &NodeResponse, delays: &Delays) -> Vec<Complex<f64>> {
+        let data = self.data.iter().zip(&response.0).zip(&delays.0);
+        data.map(|((nodes, response), delays)| nodes.mean(response, delays))
+            .collect()
+    }
+
+    /// The response of a constant compliance of 1 m/N for each datum.
+    pub(super) fn constant(&self, delays: &Delays) -> Vec<Complex<f64>> {
+        let far = self.mean(&self.response(|node| node.far), delays);
+        far.into_iter()
+            .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
+            .collect()
+    }
+}
+
+impl MeasurementChain {
+    /// The chain of a bench, with readings that all have the mean age.
+    pub fn bench(path: impl Into<SignalPath>) -> MeasurementChain {
+        MeasurementChain::Bench(path.into().with_mean_age())
+    }
+
+    /// The chain of a bench with an additional delay, as far as its whole delay is not negative, and the delay that was added. Nothing
+    /// is added to the other chains: their delay multiplies the response by exp(-s tau).
+    fn with_added_delay(&self, delay_s: f64) -> (MeasurementChain, f64) {
+        let MeasurementChain::Bench(path) = self else {
+            return (self.clone(), 0.0);
+        };
+        let delayed = path.with_added_delay(delay_s);
+        let added_s = delayed.mean_delay_s() - path.mean_delay_s();
+        (MeasurementChain::Bench(delayed), added_s)
+    }
+
+    /// The nodes of `data`, for delays of about `delay_s` beyond that of the chain.
+    pub(super) fn nodes(&self, data: &[FrfDatum], delay_s: f64) -> Nodes {
+        let frequencies = data
+            .iter()
+            .map(|datum| (datum.frequency_hz, datum.spread_hz));
+        Nodes::new(self, frequencies, delay_s)
+    }
+
+    /// One node at each frequency.
+    pub(super) fn nodes_at(&self, frequency_hz: &[f64], delay_s: f64) -> Nodes {
+        Nodes::new(self, frequency_hz.iter().map(|hz| (*hz, 0.0)), delay_s)
+    }
+
+    /// A mode of residue 1 at this chain.
+    fn observed(&self, omega_rad_s: f64, damping_ratio: f64) -> ObservedMode {
+        let mode = Mode {
+            omega_rad_s,
+            damping_ratio,
+            shape: DVector::zeros(0),
+            force_gain: 1.0,
+            sensor_gain: 1.0,
+            floor_gain: 0.0,
+        };
+        let plant = match self {
+            MeasurementChain::Bench(path) => Some(LoopPlant::of(path, std::slice::from_ref(&mode))),
+            MeasurementChain::Direct | MeasurementChain::Input(_) => None,
+        };
+        ObservedMode { mode, plant }
+    }
+
+    /// The response of the mechanics alone in m/N: the data without hold, motor, amplifier and delays, and without another
+    /// delay of `delay_s`. Aliases are not removed.
+    pub(crate) fn mechanics(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
+        let nodes = self.nodes(data, delay_s);
+        let chain = nodes.constant(&nodes.delays(delay_s));
+        data.iter()
+            .zip(chain)
+            .map(|(datum, chain)| datum.response / chain)
+            .collect()
+    }
+}
+
+/// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, from which sampling deviates by a
+/// thousandth.
+pub(super) fn log_derivatives(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
+    let (s, w, zeta) = (
+        Complex::new(0.0, omega_rad_s),
+        term.omega_rad_s,
+        term.damping_ratio,
+    );
+    let resonance = term.resonance(s);
+    [
+        -resonance * (s * (2.0 * zeta) + 2.0 * w),
+        -resonance * s * (2.0 * w),
+    ]
+}

@@ -1,0 +1,155 @@
+//! Modal fit: number of modes, frequencies, damping ratios, residues and their covariance, from a measured response.
+//!
+//! ```text
+//! FRF data --search--> orders 1, 2, ... --prune--> needed modes --residual as noise--> refine --> modes, R, tau, covariance
+//! ```
+//!
+//! The model is that of the plant, G(s) = R + sum of r_k/(s^2 + 2 zeta_k w_k s + w_k^2) (Eq. 3-2) with real residues, observed
+//! through hold, amplifier and delays ([`MeasurementChain`]). Therefore every parameter is one of the mechanics, there are no
+//! computational poles, and no polynomials are expanded.
+//!
+//! The noise is that of the estimator first, and then the residual of the fit around each datum: where the model does not
+//! describe the data, the standard deviations grow accordingly.
+
+mod candidates;
+mod clusters;
+mod error;
+mod measurement_chain;
+mod merge;
+mod modal_fit;
+mod normal_equations;
+mod parameters;
+mod peaks;
+mod prune;
+mod refine;
+mod residual_noise;
+mod search;
+mod sensitivity;
+mod solution;
+
+use core::ops::ControlFlow;
+
+use error::report;
+pub use error::{FitError, Progress};
+pub use measurement_chain::{InputPath, MeasurementChain};
+pub use modal_fit::{FittedMode, ModalFit, UncertainPole};
+pub use parameters::{ModalParameters, Parameter};
+pub use search::ModelOrder;
+
+use crate::FrfDatum;
+pub use crate::{Estimate, SIGMAS_95};
+pub use merge::merged;
+use prune::{pruned, without_least_certain};
+use refine::refine;
+use residual_noise::with_residual_noise;
+pub(crate) use sensitivity::{by_denominator, mechanics_derivative};
+use solution::{Problem, Solution};
+
+/// Progress at the end of the search; the rest is the final fit.
+const SEARCH_PROGRESS: f64 = 0.8;
+
+/// Fits as many modes to a response as are significant.
+///
+/// ```
+/// use bench_identify::FrfDatum;
+/// use bench_identify::modal::{MeasurementChain, fit};
+/// use nalgebra::Complex;
+///
+/// // G = 0.5/(s^2 + 2 zeta w s + w^2) with w = 2 pi 30 Hz, zeta = 0.01, from 5 to 200 Hz.
+/// let w = std::f64::consts::TAU * 30.0;
+/// let datum = |k: u32| {
+///     let frequency_hz = 5.0 * (f64::from(k) * 2e-3).exp();
+///     let s = Complex::new(0.0, std::f64::consts::TAU * frequency_hz);
+///     let response = (s * s + s * (2.0 * 0.01 * w) + w * w).inv() * 0.5;
+///     FrfDatum { frequency_hz, spread_hz: 0.0, response, variance: 1e-18 }
+/// };
+/// let data: Vec<FrfDatum> = (0..1844).map(datum).collect();
+/// let modes = fit(&data, &MeasurementChain::Direct)?.modes();
+/// assert_eq!(modes.len(), 1);
+/// assert!((modes[0].frequency_hz().value - 30.0).abs() < 1e-3);
+/// # Ok::<(), bench_identify::modal::FitError>(())
+/// ```
+pub fn fit(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
+    fit_with_progress(data, chain, &mut |_| ControlFlow::Continue(()))
+}
+
+/// As [`fit`], with a receiver of its progress, which can cancel it.
+pub fn fit_with_progress(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    progress: &mut Progress<'_>,
+) -> Result<ModalFit, FitError> {
+    let [first, .., last] = data else {
+        return Err(too_few(data));
+    };
+    let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
+    let nodes = &chain.nodes(data, 0.0);
+    let problem = Problem { chain, data, nodes };
+    let orders = search::orders(problem, &mut |done| progress(SEARCH_PROGRESS * done))?;
+    let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
+    report(progress, SEARCH_PROGRESS)?;
+    let fit = ModalFit {
+        band_hz: (low_hz, high_hz),
+        ..final_fit(problem, best.parameters.clone())?
+    };
+    report(progress, 1.0)?;
+    Ok(ModalFit { orders, ..fit })
+}
+
+fn too_few(data: &[FrfDatum]) -> FitError {
+    FitError::TooFew {
+        frequencies: data.len(),
+    }
+}
+
+/// The fit of the needed modes, as many as the data determine with the residual as noise; without orders and band.
+fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
+    let data = &merged(problem.data, &start);
+    if 2 * data.len() <= start.free().len() {
+        return Err(too_few(data));
+    }
+    let chain = problem.chain;
+    let nodes = &chain.nodes(data, start.delay_s);
+    let problem = Problem { chain, data, nodes };
+    let mut parameters = pruned(problem, start);
+    loop {
+        match with_covariance(problem, parameters.clone()) {
+            Err(FitError::Undetermined { modes }) if modes > 1 => {
+                parameters = without_least_certain(problem, parameters);
+            }
+            result => return result,
+        }
+    }
+}
+
+/// The fit of given modes with its covariance; the residual counts as noise.
+fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
+    let data = problem.data;
+    let free = start.free().len();
+    let undetermined = FitError::Undetermined {
+        modes: start.modes.len(),
+    };
+    let by_estimator = Solution::new(problem, start.clone());
+    let chi2_per_freedom = by_estimator.chi2 / (2 * data.len() - free) as f64;
+    let fit = |solution: &Solution, data: &[FrfDatum]| {
+        Some(ModalFit {
+            covariance: solution.covariance(data)?,
+            chi2_per_freedom,
+            orders: Vec::new(),
+            parameters: solution.parameters.clone(),
+            band_hz: (0.0, 0.0),
+        })
+    };
+    let Some(first) = fit(&by_estimator, data) else {
+        return Err(undetermined);
+    };
+    let noisy = &with_residual_noise(problem, &first, &by_estimator.residual);
+    let problem = Problem {
+        data: noisy,
+        ..problem
+    };
+    // A mode may have moved past its neighbours.
+    let refined = refine(problem, start, 0.0).parameters;
+    let in_order = Solution::new(problem, refined.by_rising_frequency());
+    fit(&in_order, noisy).ok_or(undetermined)
+}

@@ -1,0 +1,143 @@
+//! The parameters of a sum of modes.
+
+use nalgebra::DVector;
+
+use bench_plant::zeros::ModalTerm;
+
+/// Largest change of ln w in a step.
+const MAX_FREQUENCY_STEP: f64 = 0.02;
+/// Largest change of ln zeta in a step.
+const MAX_DAMPING_STEP: f64 = 0.7;
+/// Bounds of a damping ratio.
+const DAMPING_RATIO: (f64, f64) = (1e-6, 2.0);
+
+/// A sum of modes with a delay.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ModalParameters {
+    /// The modes; one with w = 0 is a free body.
+    pub modes: Vec<ModalTerm>,
+    /// R: the compliance in m/N of modes above the band.
+    pub remainder_m_per_n: f64,
+    /// tau: the delay beyond that of the measurement chain, in seconds.
+    pub delay_s: f64,
+}
+
+/// One free parameter; modes are given by their index.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parameter {
+    /// w of a mode.
+    Frequency(usize),
+    /// zeta of a mode.
+    Damping(usize),
+    /// r of a mode.
+    Residue(usize),
+    /// R.
+    Remainder,
+    /// tau.
+    Delay,
+}
+
+impl Parameter {
+    /// Whether the model is linear in the parameter.
+    pub(super) fn is_linear(self) -> bool {
+        matches!(self, Parameter::Residue(_) | Parameter::Remainder)
+    }
+}
+
+impl ModalParameters {
+    /// One mode and a delay.
+    pub(super) fn one_mode(mode: ModalTerm, delay_s: f64) -> ModalParameters {
+        ModalParameters {
+            modes: vec![mode],
+            remainder_m_per_n: 0.0,
+            delay_s,
+        }
+    }
+
+    /// The parameters with the lowest frequency first.
+    pub(super) fn by_rising_frequency(mut self) -> ModalParameters {
+        self.modes
+            .sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        self
+    }
+
+    /// The parameters with one more mode.
+    pub(super) fn with_mode(mut self, mode: ModalTerm) -> ModalParameters {
+        self.modes.push(mode);
+        self
+    }
+
+    /// The free parameters, in the order of a covariance.
+    pub fn free(&self) -> Vec<Parameter> {
+        let mut free = Vec::new();
+        for (k, mode) in self.modes.iter().enumerate() {
+            if mode.omega_rad_s != 0.0 {
+                free.extend([Parameter::Frequency(k), Parameter::Damping(k)]);
+            }
+            free.push(Parameter::Residue(k));
+        }
+        free.extend([Parameter::Remainder, Parameter::Delay]);
+        free
+    }
+
+    /// The parameters with other residues, followed by another R.
+    pub(super) fn with_linear(mut self, linear: &DVector<f64>) -> ModalParameters {
+        self.remainder_m_per_n = linear[self.modes.len()];
+        self.modes
+            .iter_mut()
+            .zip(linear.iter())
+            .for_each(|(mode, r)| mode.residue_per_kg = *r);
+        self
+    }
+
+    /// The parameters after a step in ln w, ln zeta, r, R and tau, limited to what is possible.
+    pub(super) fn moved(&self, free: &[Parameter], step: &DVector<f64>) -> ModalParameters {
+        let mut next = self.clone();
+        for (parameter, step) in free.iter().zip(step.iter()) {
+            next.change(*parameter, *step);
+        }
+        next
+    }
+
+    /// The parameters with a difference added to each free one, in its own unit; dampings keep their bounds.
+    pub fn shifted(&self, difference: &[f64]) -> ModalParameters {
+        let mut next = self.clone();
+        for (parameter, difference) in self.free().into_iter().zip(difference) {
+            next.add(parameter, *difference);
+        }
+        next
+    }
+
+    fn add(&mut self, parameter: Parameter, difference: f64) {
+        match parameter {
+            Parameter::Frequency(k) => self.modes[k].omega_rad_s += difference,
+            Parameter::Damping(k) => {
+                let ratio = self.modes[k].damping_ratio + difference;
+                self.modes[k].damping_ratio = ratio.clamp(DAMPING_RATIO.0, DAMPING_RATIO.1);
+            }
+            Parameter::Residue(k) => self.modes[k].residue_per_kg += difference,
+            Parameter::Remainder => self.remainder_m_per_n += difference,
+            Parameter::Delay => self.delay_s += difference,
+        }
+    }
+
+    fn change(&mut self, parameter: Parameter, step: f64) {
+        match parameter {
+            Parameter::Frequency(k) => {
+                self.modes[k].omega_rad_s *= factor(step, MAX_FREQUENCY_STEP)
+            }
+            Parameter::Damping(k) => {
+                let ratio = self.modes[k].damping_ratio * factor(step, MAX_DAMPING_STEP);
+                self.modes[k].damping_ratio = ratio.clamp(DAMPING_RATIO.0, DAMPING_RATIO.1);
+            }
+            Parameter::Residue(k) => self.modes[k].residue_per_kg += step,
+            Parameter::Remainder => self.remainder_m_per_n += step,
+            Parameter::Delay => self.delay_s += step,
+        }
+    }
+}
+
+/// exp(step), with a limited step.
+fn factor(step: f64, max: f64) -> f64 {
+    step.clamp(-max, max).exp()
+}

@@ -1,0 +1,269 @@
+//! The number of modes: modes are added one at a time, each where the residual exceeds the noise most, as long as the decrease
+//! of chi^2 is significant.
+//!
+//! The first pass is made from two starts: from no mode, and from one mode at each peak of the response. With the first, a delay of
+//! the wrong half turn can take the place of a mode, and modes added later do not lead back. The better result is used.
+
+use serde::ser::{Serialize, SerializeStruct, Serializer};
+
+use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
+use super::error::{FitError, Progress, report};
+use super::merge::merged;
+use super::parameters::ModalParameters;
+use super::peaks::peak_starts;
+use super::refine::refine;
+use super::solution::{Problem, Solution};
+use crate::FrfDatum;
+
+/// Largest number of modes.
+const MAX_MODES: usize = 24;
+
+/// No data are left out below this number of data, as of the lines of a multisine.
+const MIN_DATA: usize = 400;
+
+/// One pass of the search.
+struct Pass {
+    /// Error as a ratio of H that is added to the noise.
+    relative_error: f64,
+    /// Every n-th datum is used, if there are many. A mode of 0.2 % damping spans eight data of 0.05 % width.
+    every: usize,
+    /// See [`refine`].
+    tolerance: f64,
+    /// Progress of the search at the end of the pass.
+    progress: f64,
+}
+
+/// The passes, from coarse to fine.
+const PASSES: [Pass; 3] = [
+    Pass {
+        relative_error: 0.03,
+        every: 4,
+        tolerance: 1e-2,
+        progress: 0.2,
+    },
+    Pass {
+        relative_error: 0.003,
+        every: 1,
+        tolerance: 1e-3,
+        progress: 0.5,
+    },
+    Pass {
+        relative_error: 0.0,
+        every: 1,
+        tolerance: 1e-7,
+        progress: 1.0,
+    },
+];
+
+/// The fit of one model order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelOrder {
+    /// The parameters.
+    pub parameters: ModalParameters,
+    /// Reduced chi-square with the errors of the pass that found this order.
+    pub chi2_per_freedom: f64,
+    /// Decrease of chi^2 by the last mode, over the smallest significant decrease.
+    pub evidence: f64,
+}
+
+/// Frequencies and damping ratios of the modes and reduced chi-square: a row of a stability chart.
+impl Serialize for ModelOrder {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let modes = &self.parameters.modes;
+        let frequency_hz: Vec<f64> = modes
+            .iter()
+            .map(|mode| mode.omega_rad_s / (2.0 * std::f64::consts::PI))
+            .collect();
+        let damping_ratio: Vec<f64> = modes.iter().map(|mode| mode.damping_ratio).collect();
+        let mut order = serializer.serialize_struct("ModelOrder", 3)?;
+        order.serialize_field("frequency_hz", &frequency_hz)?;
+        order.serialize_field("damping_ratio", &damping_ratio)?;
+        order.serialize_field("chi2_per_freedom", &self.chi2_per_freedom)?;
+        order.end()
+    }
+}
+
+/// All orders that are significant, from one mode on.
+///
+/// A relative error is added to the noise: a large one first, then a small one, then none. So modes are found in the order of
+/// their effect on the response rather than of the accuracy of the data, and an approximate model of all of them exists before
+/// small differences count.
+pub(super) fn orders(
+    problem: Problem<'_>,
+    progress: &mut Progress<'_>,
+) -> Result<Vec<ModelOrder>, FitError> {
+    let mut search = Search {
+        orders: Vec::new(),
+        parameters: ModalParameters::default(),
+        done: 0.0,
+        progress,
+    };
+    let [coarse, finer @ ..] = &PASSES;
+    search.run_from_best_start(coarse, problem)?;
+    for pass in finer {
+        search.run(pass, problem)?;
+    }
+    Ok(search.orders)
+}
+
+/// The state of the search between two passes.
+struct Search<'a, 'p> {
+    /// The orders found so far.
+    orders: Vec<ModelOrder>,
+    /// Result of the pass before.
+    parameters: ModalParameters,
+    /// Progress at the end of the pass before.
+    done: f64,
+    progress: &'a mut Progress<'p>,
+}
+
+impl Search<'_, '_> {
+    /// A pass from each start: the result with the fewest and most significant modes.
+    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &pass.data(problem.data, &self.parameters);
+        let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
+        let chain = problem.chain;
+        let starts = peak_starts(Problem { chain, data, nodes });
+        let by_one = self.cost_of_run(pass, problem)?;
+        let first = (by_one, self.parameters.clone(), self.orders.clone());
+        let mut best = first;
+        for start in starts {
+            self.parameters = start;
+            self.orders.clear();
+            self.done = 0.0;
+            let cost = self.cost_of_run(pass, problem)?;
+            if cost + problem.significant_decrease() < best.0 {
+                best = (cost, self.parameters.clone(), self.orders.clone());
+            }
+        }
+        (_, self.parameters, self.orders) = best;
+        Ok(())
+    }
+
+    /// Runs a pass: chi^2 of its result, and the smallest significant decrease for each mode.
+    fn cost_of_run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
+        let data = &pass.data(problem.data, &ModalParameters::default());
+        self.run(pass, problem)?;
+        let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
+        let chain = problem.chain;
+        let problem = Problem { chain, data, nodes };
+        let chi2 = Solution::new(problem, self.parameters.clone()).chi2;
+        let modes = self.parameters.modes.len() as f64;
+        Ok(chi2 + modes * problem.significant_decrease())
+    }
+
+    /// Adds modes, with the errors of a pass, as long as they are significant.
+    fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+        let data = &pass.data(problem.data, &self.parameters);
+        let chain = problem.chain;
+        let nodes = &chain.nodes(data, self.parameters.delay_s);
+        let problem = Problem { chain, data, nodes };
+        let start = std::mem::take(&mut self.parameters);
+        let mut solution = refine(problem, start, pass.tolerance);
+        if !solution.parameters.modes.is_empty() {
+            self.orders.push(order(problem, &solution, f64::INFINITY));
+        }
+        let first_misfit = problem.misfit(solution.chi2);
+        while solution.parameters.modes.len() < MAX_MODES {
+            self.report(
+                pass,
+                pass_progress(first_misfit, problem.misfit(solution.chi2)),
+            )?;
+            let Some(next) = with_another_mode(problem, &solution, pass.tolerance) else {
+                break;
+            };
+            let evidence = evidence(problem, &solution, &next);
+            self.orders.push(order(problem, &next, evidence));
+            solution = next;
+        }
+        self.parameters = solution.parameters;
+        self.done = pass.progress;
+        Ok(())
+    }
+
+    /// Reports the progress of a pass, 0 to 1, as progress of the search.
+    fn report(&mut self, pass: &Pass, fraction: f64) -> Result<(), FitError> {
+        let done = self.done + (pass.progress - self.done) * fraction;
+        report(self.progress, done)
+    }
+}
+
+/// Progress of a pass, 0 to 1: how far the misfit has fallen towards 1, on a logarithmic scale.
+fn pass_progress(first_misfit: f64, misfit: f64) -> f64 {
+    if first_misfit > 1.0 {
+        (1.0 - misfit.ln() / first_misfit.ln()).clamp(0.0, 1.0)
+    } else {
+        0.0
+    }
+}
+
+impl Pass {
+    /// The data of the pass, merged once modes are known.
+    fn data(&self, data: &[FrfDatum], known: &ModalParameters) -> Vec<FrfDatum> {
+        let data = if known.modes.is_empty() {
+            data.to_vec()
+        } else {
+            merged(data, known)
+        };
+        let every = self.every.min(data.len() / MIN_DATA).max(1);
+        data.iter()
+            .step_by(every)
+            .map(|datum| self.with_error(datum))
+            .collect()
+    }
+
+    /// The datum with the relative model error of this pass added to its variance.
+    fn with_error(&self, datum: &FrfDatum) -> FrfDatum {
+        let square = self.relative_error * self.relative_error;
+        FrfDatum {
+            variance: datum.variance + square * datum.response.norm_sqr(),
+            ..*datum
+        }
+    }
+}
+
+fn order(problem: Problem<'_>, solution: &Solution, evidence: f64) -> ModelOrder {
+    let parameters = solution.parameters.clone();
+    let freedom = (2 * problem.data.len())
+        .saturating_sub(parameters.free().len())
+        .max(1);
+    ModelOrder {
+        parameters,
+        chi2_per_freedom: solution.chi2 / freedom as f64,
+        evidence,
+    }
+}
+
+/// The best solution with one more mode, if it is significantly better.
+fn with_another_mode(
+    problem: Problem<'_>,
+    solution: &Solution,
+    tolerance: f64,
+) -> Option<Solution> {
+    let significant = |next: &Solution| evidence(problem, solution, next) > 1.0;
+    if solution.parameters.modes.is_empty() {
+        return first_mode(problem, solution, tolerance).filter(significant);
+    }
+    let candidates = candidates(problem, solution).into_iter().take(TRIALS);
+    candidates
+        .map(|mode| solution.parameters.clone().with_mode(mode))
+        .map(|start| refine(problem, start, tolerance))
+        .find(significant)
+}
+
+/// The best solution with one mode, a free body included. All others build on it, so that all candidates are fitted.
+fn first_mode(problem: Problem<'_>, solution: &Solution, tolerance: f64) -> Option<Solution> {
+    let terms = candidates(problem, solution)
+        .into_iter()
+        .take(TRIALS)
+        .chain([FREE_BODY]);
+    let starts = terms.flat_map(|term| first_mode_starts(problem, solution, term));
+    let fitted = starts.map(|start| refine(problem, start, tolerance));
+    fitted.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+}
+
+/// The decrease of chi^2 over the smallest significant one.
+fn evidence(problem: Problem<'_>, solution: &Solution, next: &Solution) -> f64 {
+    let misfit = problem.misfit(next.chi2);
+    (solution.chi2 - next.chi2) / (problem.significant_decrease() * misfit)
+}

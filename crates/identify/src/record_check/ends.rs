@@ -1,0 +1,60 @@
+//! Motion of the output at the first and at the last sample of a record.
+
+use super::defect::Defect;
+use crate::Signals;
+
+/// Samples at each end from which its velocity is determined, and number of such intervals.
+const END_SAMPLES: usize = 16;
+const END_INTERVALS: usize = 8;
+/// A record is not at rest if its velocity exceeds this ratio of its root mean square, and noise by this factor.
+const MOVING_RATIO: f64 = 0.1;
+const MOVING_SIGMAS: f64 = 8.0;
+
+/// The start of a record is one of this number of parts.
+const PARTS: usize = 200;
+
+/// The RMS value of the input at the start of the record as a ratio of that of the whole record.
+pub fn input_ratio_at_start(signals: &Signals) -> f64 {
+    let input = &signals.input_a;
+    rms(&input[..input.len().div_ceil(PARTS)]) / rms(input)
+}
+
+/// Motion of the output at its ends, where its noise has the given standard deviation.
+pub(super) fn motion_at_ends(signals: &Signals, noise: f64) -> Vec<Defect> {
+    let output = &signals.output_m;
+    let count = END_SAMPLES * END_INTERVALS;
+    if output.len() < 4 * count {
+        return Vec::new();
+    }
+    let of = |samples: &[f64]| samples.chunks_exact(END_SAMPLES).map(slope).collect();
+    let all: Vec<f64> = of(output);
+    let rms = rms(&all);
+    // The slope of n samples of noise has the variance 12 sigma^2/n^3.
+    let limit = MOVING_SIGMAS * noise * (12.0 / (END_SAMPLES as f64).powi(3)).sqrt();
+    let moving = |velocity: f64| velocity > limit && velocity > MOVING_RATIO * rms;
+    let start = all[0].abs();
+    let last: Vec<f64> = of(&output[output.len() - count..]);
+    let end = self::rms(&last);
+    let mut found = Vec::new();
+    if moving(start) {
+        found.push(Defect::MovingAtStart { ratio: start / rms });
+    }
+    if moving(end) {
+        found.push(Defect::MovingAtEnd { ratio: end / rms });
+    }
+    found
+}
+
+fn rms(values: &[f64]) -> f64 {
+    let squares: f64 = values.iter().map(|value| value * value).sum();
+    (squares / values.len() as f64).sqrt()
+}
+
+/// The slope per sample of the least-squares line.
+fn slope(samples: &[f64]) -> f64 {
+    let middle = (samples.len() - 1) as f64 / 2.0;
+    let moments = samples.iter().enumerate();
+    let product: f64 = moments.map(|(n, y)| (n as f64 - middle) * y).sum();
+    let n = samples.len() as f64;
+    product / (n * (n * n - 1.0) / 12.0)
+}

@@ -1,0 +1,243 @@
+//! Spikes and steps, found from the error of a prediction of each output sample by the samples before it and by the input (least
+//! squares over the record):
+//!
+//! ```text
+//! y_k = sum a_i y_(k-i) + sum b_j u_(k-j) + e_k           i = 1 .. 8, j = 0 .. 8
+//! spike of height h     e = h (1, -a_1, -a_2, ...)
+//! step of height h      e = h (1, 1 - a_1, 1 - a_1 - a_2, ...)
+//! ```
+//!
+//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins a defect. A spike counts if its square
+//! exceeds 2 % of the energy of the noise over the record: smaller ones have no effect. Samples after a jump of the input, which
+//! excites more than the prediction describes, do not count. In a periodic record such defects differ from period to period and count
+//! as noise.
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use super::defect::Defect;
+use crate::Signals;
+use crate::mean;
+
+/// Samples of the output, and of the input before the present one, in the prediction.
+const ORDER: usize = 8;
+/// Coefficients of the prediction.
+const COEFFICIENTS: usize = 2 * ORDER + 1;
+/// The coefficients are determined from at most this many samples.
+const MAX_EQUATIONS: usize = 100_000;
+/// Added to the diagonal of the normal equations, relative to it: they are nearly singular for a slow signal.
+const REGULARIZATION: f64 = 1e-12;
+/// Number of samples whose errors are compared.
+const BLOCK: usize = 2048;
+/// Errors of the prediction beyond this many standard deviations are no noise.
+const DEFECT_SIGMAS: f64 = 20.0;
+/// The median magnitude of normally distributed numbers of standard deviation 1.
+const NORMAL_MEDIAN: f64 = 0.6745;
+/// The input jumps if it changes by more than this multiple of its median change.
+const JUMP_RATIO: f64 = 30.0;
+/// The square of a spike is at least this ratio of the energy of the noise.
+const MIN_ENERGY_RATIO: f64 = 0.02;
+/// A spike is at most this many samples long.
+const MAX_SPIKE: usize = 4;
+
+/// The errors of the prediction of a record.
+pub(super) struct Prediction<'a> {
+    signals: &'a Signals,
+    coefficients: DVector<f64>,
+    /// Error of each sample; 0 of the first ones.
+    error: Vec<f64>,
+    /// Standard deviation of the errors of each block, at least that of rounding.
+    sigma: Vec<f64>,
+}
+
+impl<'a> Prediction<'a> {
+    pub(super) fn new(signals: &'a Signals) -> Option<Self> {
+        let scale = Scale::new(signals);
+        let coefficients = coefficients(signals, &scale)?;
+        let row_error = |k: usize| {
+            let row = row(signals, &scale, k);
+            let predicted: f64 = row
+                .iter()
+                .zip(coefficients.iter())
+                .map(|(x, c)| x * c)
+                .sum();
+            (signals.output_m[k] - scale.offset) - predicted * scale.output
+        };
+        let mut error = vec![0.0; ORDER];
+        error.extend((ORDER..signals.len()).map(row_error));
+        let rounding = f64::EPSILON * scale.output.max(scale.offset.abs());
+        let blocks = error.chunks(BLOCK);
+        let sigma = blocks
+            .map(|block| sigma_by_median(block).max(rounding))
+            .collect();
+        Some(Self {
+            signals,
+            coefficients,
+            error,
+            sigma,
+        })
+    }
+
+    /// The median over the blocks.
+    pub(super) fn median_sigma(&self) -> f64 {
+        median(self.sigma.clone())
+    }
+
+    /// The first spike and the first step.
+    pub(super) fn jumps(&self) -> Vec<Defect> {
+        let mut found: Vec<Defect> = Vec::new();
+        let jumps_of_input = jumps(&self.signals.input_a);
+        let mut k = ORDER;
+        while k < self.error.len() {
+            if !self.is_outlier(k) || after_a_jump(&jumps_of_input, k) {
+                k += 1;
+                continue;
+            }
+            let defect = self.classify(k);
+            let has_effect = self.has_effect(defect, k);
+            let is_new =
+                |known: &Defect| std::mem::discriminant(known) != std::mem::discriminant(&defect);
+            if has_effect && found.iter().all(is_new) {
+                found.push(defect);
+            }
+            k += ORDER + 1;
+        }
+        found
+    }
+
+    fn is_outlier(&self, k: usize) -> bool {
+        self.error[k].abs() > DEFECT_SIGMAS * self.sigma[k / BLOCK]
+    }
+
+    /// Whether a defect matters beside the noise: a short spike must have some of the noise's energy, a step always matters.
+    fn has_effect(&self, defect: Defect, k: usize) -> bool {
+        let Defect::Spike { height, .. } = defect else {
+            return true;
+        };
+        let sigma = self.sigma[k / BLOCK];
+        height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
+    }
+
+    fn classify(&self, k: usize) -> Defect {
+        let time_s = |k: usize| k as f64 / self.signals.rate_hz;
+        let end = (k + ORDER + 1).min(self.error.len());
+        let error = &self.error[k..end];
+        let time_s = time_s(k);
+        let spikes = (1..=MAX_SPIKE).map(|length| projection(error, &self.pattern(length)));
+        let spike = spikes.min_by(|a, b| a.1.total_cmp(&b.1));
+        let (step_height, step_rest) = projection(error, &self.pattern(ORDER + 1));
+        match spike {
+            Some((height, rest)) if rest <= step_rest => Defect::Spike { time_s, height },
+            _ => Defect::Step {
+                time_s,
+                height: step_height,
+            },
+        }
+    }
+
+    /// The errors after an offset of 1 that lasts some samples.
+    fn pattern(&self, length: usize) -> Vec<f64> {
+        let single = |i: usize| {
+            if i == 0 {
+                1.0
+            } else {
+                -self.coefficients[i - 1]
+            }
+        };
+        let sum = |i: usize| (0..=i.min(length - 1)).map(|j| single(i - j)).sum();
+        (0..=ORDER).map(sum).collect()
+    }
+}
+
+/// Scales that make both signals of size 1.
+struct Scale {
+    offset: f64,
+    output: f64,
+    input: f64,
+}
+
+impl Scale {
+    fn new(signals: &Signals) -> Scale {
+        let offset = mean::mean(&signals.output_m);
+        let rms = |samples: &[f64], offset: f64| {
+            let sum: f64 = samples.iter().map(|x| (x - offset) * (x - offset)).sum();
+            (sum / samples.len() as f64).sqrt().max(f64::MIN_POSITIVE)
+        };
+        Scale {
+            offset,
+            output: rms(&signals.output_m, offset),
+            input: rms(&signals.input_a, 0.0),
+        }
+    }
+}
+
+/// The scaled samples from which sample `k` is predicted.
+fn row(signals: &Signals, scale: &Scale, k: usize) -> [f64; COEFFICIENTS] {
+    std::array::from_fn(|i| {
+        if i < ORDER {
+            (signals.output_m[k - 1 - i] - scale.offset) / scale.output
+        } else {
+            signals.input_a[k - (i - ORDER)] / scale.input
+        }
+    })
+}
+
+/// The coefficients of the prediction by least squares.
+fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
+    let mut matrix = DMatrix::<f64>::zeros(COEFFICIENTS, COEFFICIENTS);
+    let mut right = DVector::<f64>::zeros(COEFFICIENTS);
+    let step = (signals.len() / MAX_EQUATIONS).max(1);
+    for k in (ORDER..signals.len()).step_by(step) {
+        let row = row(signals, scale, k);
+        let output = (signals.output_m[k] - scale.offset) / scale.output;
+        for i in 0..COEFFICIENTS {
+            for j in 0..=i {
+                matrix[(i, j)] += row[i] * row[j];
+            }
+            right[i] += row[i] * output;
+        }
+    }
+    let trace = matrix.trace();
+    for i in 0..COEFFICIENTS {
+        matrix[(i, i)] += REGULARIZATION * trace;
+    }
+    // Cholesky reads the lower triangle alone.
+    Some(Cholesky::<f64, Dyn>::new(matrix)?.solve(&right))
+}
+
+fn sigma_by_median(errors: &[f64]) -> f64 {
+    median(errors.iter().map(|error| error.abs()).collect()) / NORMAL_MEDIAN
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(0.0)
+}
+
+/// The indices at which a signal changes by far more than usual, if it seldom does.
+fn jumps(samples: &[f64]) -> Vec<usize> {
+    let changes: Vec<f64> = samples
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .collect();
+    let limit = JUMP_RATIO * median(changes.clone());
+    let jumps = changes
+        .iter()
+        .enumerate()
+        .filter(|(_, change)| **change > limit);
+    jumps.map(|(k, _)| k + 1).collect()
+}
+
+/// Whether one of the jumps lies at most two orders of the prediction before a sample.
+fn after_a_jump(jumps: &[usize], k: usize) -> bool {
+    let next = jumps.partition_point(|jump| *jump <= k);
+    next > 0 && k - jumps[next - 1] <= 2 * ORDER
+}
+
+/// The factor of a pattern in some errors, and what remains of them.
+fn projection(errors: &[f64], pattern: &[f64]) -> (f64, f64) {
+    let pairs = || errors.iter().zip(pattern);
+    let product: f64 = pairs().map(|(e, p)| e * p).sum();
+    let square: f64 = pairs().map(|(_, p)| p * p).sum();
+    let factor = product / square;
+    (factor, pairs().map(|(e, p)| (e - factor * p).powi(2)).sum())
+}

@@ -1,0 +1,291 @@
+//! Verdict on complex non-minimum phase (CNMP) zeros of a stage: "detected", "excluded" or "undecided", with the
+//! reasons.
+//!
+//! Three criteria must agree:
+//!
+//! 1. the zeros of the fit, each with its probability of lying in the right half plane;
+//! 2. the signs of the residues: two close modes of opposite signs, and a remainder, are necessary for CNMP zeros between
+//!    them (sections 3.2.2 and 3.2.4);
+//! 3. the phase drop of the measured response beyond Bode's relation, compared with that of the fitted zeros over the same band
+//!    ([`PhaseDrop`]).
+//!
+//! Only what can change the verdict is evaluated: a residue of uncertain sign prevents a verdict only if the number of CNMP pairs
+//! depends on it, and a real zero may lie on either side.
+//!
+//! A verdict needs sufficient data: as many modes as the model has, and residuals that are noise. It covers the band up to a
+//! given frequency. All comparisons state what must hold, so that a number that is not finite (a singular covariance, a bin
+//! without response) makes the verdict undecided.
+
+mod decisive;
+mod information;
+mod input;
+mod phase_check;
+mod phase_drop;
+mod sign_groups;
+#[cfg(test)]
+mod tests;
+mod zeros;
+
+pub use information::{DecisiveQuantity, decisive_quantities};
+pub use input::{Certainty, MAX_LOOKS, VerdictInput};
+pub use phase_drop::PhaseDrop;
+pub use zeros::{UncertainZero, zeros};
+
+use decisive::decisive_uncertain_mode;
+use phase_check::phase_drop_over;
+use serde::{Deserialize, Serialize};
+use sign_groups::signs_of;
+
+use crate::FrfDatum;
+use crate::modal::FittedMode;
+use bench_plant::zeros::ZeroKind;
+use bench_plant::{PlantError, Sign};
+
+/// A CNMP pair that the phase does not confirm, because the response around it is noise, lies this many standard deviations off the
+/// axis: a fit is then extrapolated, and errors of the model count as well as noise.
+const UNCONFIRMED_SIGMAS: f64 = 6.0;
+/// The phase confirms pairs that turn it by at least this angle each, half of a full turn, in degrees.
+const CONFIRMED_DEG: f64 = 180.0;
+/// Relative accuracy of a fit: a zero closer to the imaginary axis is on neither side.
+const FIT_ACCURACY: f64 = 1e-4;
+/// With a larger reduced chi-square the fit does not describe the stage.
+pub const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
+/// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
+const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
+
+const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
+const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
+const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and increase the amplitude or the duration of the excitation";
+
+/// Whether there are CNMP zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Cnmp {
+    /// There are CNMP zeros.
+    Detected,
+    /// There are none.
+    Excluded,
+    /// The data are insufficient.
+    Undecided,
+}
+
+impl Cnmp {
+    /// `detected`, `excluded` or `undecided`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Cnmp::Detected => "detected",
+            Cnmp::Excluded => "excluded",
+            Cnmp::Undecided => "undecided",
+        }
+    }
+}
+
+/// A verdict with its reasons.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Verdict {
+    /// The verdict.
+    pub cnmp: Cnmp,
+    /// The reasons; if undecided, what to change.
+    pub why: String,
+    /// The zeros in the band of the verdict.
+    pub zeros: Vec<UncertainZero>,
+    /// The phase drop over the modes of the band, if there are two or more.
+    pub phase_drop: Option<PhaseDrop>,
+}
+
+impl Verdict {
+    /// An undecided verdict without any zeros.
+    pub fn undecided(why: String) -> Verdict {
+        Verdict {
+            cnmp: Cnmp::Undecided,
+            why,
+            zeros: Vec::new(),
+            phase_drop: None,
+        }
+    }
+
+    /// The verdict with a caution added to its reasons.
+    pub fn with(mut self, caution: Option<String>) -> Verdict {
+        if let Some(caution) = caution {
+            self.why = format!("{}; {caution}", self.why);
+        }
+        self
+    }
+}
+
+/// Evaluates the criteria.
+///
+/// # Errors
+/// When the zeros of the fit cannot be computed.
+pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
+    let mut zeros = zeros(input.fit)?;
+    let mut modes = input.fit.modes();
+    modes.retain(|mode| input.covers(mode.omega_rad_s.value));
+    let phase_drop = phase_drop_over(input, &modes, &zeros)?;
+    zeros.retain(|zero| input.covers(zero.s.norm()));
+    let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
+    let insufficient = insufficient_data(input, &modes)
+        .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
+        .or_else(|| uncertain_side(&zeros, input.certainty));
+    let (cnmp, why) = match insufficient {
+        Some(why) => (Cnmp::Undecided, why),
+        None => evaluate(&zeros, &signs_of(input), phase_drop),
+    };
+    Ok(Verdict {
+        cnmp,
+        why,
+        zeros,
+        phase_drop,
+    })
+}
+
+/// Why the data are insufficient for a verdict.
+fn insufficient_data(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
+    poor_fit(input.fit.chi2_per_freedom)
+        .or_else(|| missing_modes(input, modes.len()))
+        .or_else(|| undefined_response(input.frf_data))
+}
+
+fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
+    let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
+    (!good).then(|| {
+        format!(
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes with real residues; lower the amplitude, so that the stage stays linear, or find in the Bode plot where response and fit differ and select a band without it"
+        )
+    })
+}
+
+fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
+    let expected = input.expected_modes.unwrap_or(0);
+    if found >= expected {
+        return None;
+    }
+    let (up_to_hz, (_, last_hz)) = (hertz(input.up_to_rad_s), input.fit.band_hz);
+    let remedy = match last_hz < up_to_hz {
+        true => format!(
+            "the excitation ends at {last_hz:.0} Hz: extend it to more than {up_to_hz:.0} Hz"
+        ),
+        false => "increase the amplitude there, or the duration".into(),
+    };
+    Some(format!(
+        "only {found} of the {expected} modes that the model has up to {up_to_hz:.0} Hz are found; {remedy}"
+    ))
+}
+
+/// A response of zero has neither a phase nor a logarithm of its magnitude.
+fn undefined_response(data: &[FrfDatum]) -> Option<String> {
+    let undefined = data
+        .iter()
+        .find(|datum| !datum.response.norm().is_normal())?;
+    Some(format!(
+        "the response at {:.2} Hz is {}, which has no phase; check the output of the record, or exclude this frequency from the band",
+        undefined.frequency_hz, undefined.response
+    ))
+}
+
+fn uncertain_sign_reason(mode: &FittedMode) -> String {
+    format!(
+        "the sign of the residue at {:.2} Hz is uncertain, and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
+        mode.frequency_hz().value
+    )
+}
+
+/// A complex zero that may lie on either side of the imaginary axis. (A real zero is no CNMP zero on either side.)
+fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<String> {
+    let mut complex = zeros.iter().filter(|zero| zero.s.im != 0.0);
+    let zero = complex.find(|zero| !has_certain_side(zero, certainty))?;
+    let real_part = zero.real_part();
+    Some(format!(
+        "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
+        real_part.value,
+        real_part.half_width_95(),
+        hertz(zero.s.norm()),
+        100.0 * zero.rhp_probability
+    ))
+}
+
+fn has_certain_side(zero: &UncertainZero, certainty: Certainty) -> bool {
+    let off_axis = zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm();
+    let right = zero.rhp_probability;
+    off_axis && (certainty.allows(right) || certainty.allows(1.0 - right))
+}
+
+/// The verdict from zeros that all have a certain side: the other two criteria must agree.
+fn evaluate(
+    zeros: &[UncertainZero],
+    signs: &[f64],
+    phase_drop: Option<PhaseDrop>,
+) -> (Cnmp, String) {
+    let Some(phase_drop) = phase_drop else {
+        return (Cnmp::Undecided, NO_PHASE_DROP.into());
+    };
+    let pairs = cnmp_pairs(zeros);
+    let agrees = phase_drop.deviation_deg() <= MAX_PHASE_DEVIATION_DEG;
+    if !agrees {
+        (Cnmp::Undecided, disagreement(phase_drop))
+    } else if pairs == 0 {
+        (Cnmp::Excluded, NO_CNMP.into())
+    } else if let Some(zero) = unconfirmed(zeros, pairs, phase_drop) {
+        (Cnmp::Undecided, unconfirmed_reason(zero))
+    } else if !has_opposite_neighbours(signs) {
+        (Cnmp::Undecided, NO_OPPOSITE_NEIGHBOURS.into())
+    } else {
+        (Cnmp::Detected, detected(pairs, signs, phase_drop))
+    }
+}
+
+fn cnmp_pairs(zeros: &[UncertainZero]) -> usize {
+    let pairs = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
+    pairs.count()
+}
+
+fn disagreement(phase_drop: PhaseDrop) -> String {
+    format!(
+        "the zeros of the fit predict {:.0} degrees more phase lag than a minimum-phase system of this magnitude, the measured response has {:.0}; increase the amplitude between the modes, or the duration",
+        phase_drop.predicted_deg, phase_drop.drop_deg
+    )
+}
+
+/// A CNMP pair that is neither confirmed by the phase nor far from the axis.
+fn unconfirmed(
+    zeros: &[UncertainZero],
+    pairs: usize,
+    phase_drop: PhaseDrop,
+) -> Option<&UncertainZero> {
+    if phase_drop.predicted_deg >= CONFIRMED_DEG * pairs as f64 {
+        return None;
+    }
+    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
+    cnmp.find(|zero| zero.s.re < UNCONFIRMED_SIGMAS * zero.real_part().sigma)
+}
+
+fn unconfirmed_reason(zero: &UncertainZero) -> String {
+    format!(
+        "the fit has CNMP zeros at {:.2} Hz, where the response is noise and its phase cannot confirm them; increase the amplitude there, or the duration",
+        hertz(zero.s.norm())
+    )
+}
+
+fn detected(pairs: usize, signs: &[f64], phase_drop: PhaseDrop) -> String {
+    let plural = if pairs == 1 { "" } else { "s" };
+    let symbol = |residue: &f64| Sign::of(*residue).symbol();
+    let signs: String = signs.iter().map(symbol).collect();
+    let found = format!("{pairs} pair{plural} of CNMP zeros, residues of opposite signs ({signs})");
+    if phase_drop.predicted_deg < CONFIRMED_DEG * pairs as f64 {
+        return format!(
+            "{found}; the response around the zeros is noise, so that the phase does not confirm them"
+        );
+    }
+    format!(
+        "{found}, and {:.0} degrees more phase lag than a minimum-phase system of this magnitude",
+        phase_drop.drop_deg
+    )
+}
+
+fn has_opposite_neighbours(residues: &[f64]) -> bool {
+    residues.windows(2).any(|pair| pair[0] * pair[1] < 0.0)
+}
+
+fn hertz(omega_rad_s: f64) -> f64 {
+    omega_rad_s / (2.0 * std::f64::consts::PI)
+}

@@ -1,0 +1,179 @@
+//! The criteria alone, with zeros and phase drops made by hand.
+
+use nalgebra::{Complex, DMatrix};
+
+use super::stage::{Case, Stage, index};
+use crate::modal::Parameter;
+use crate::verdict::sign_groups::signs_of;
+use crate::verdict::{Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate};
+use bench_plant::zeros::ZeroKind;
+
+const OPPOSITE: [f64; 2] = [1.0, -1.0];
+
+/// A CNMP zero at 1 + 100 j with a standard deviation of its real part.
+fn cnmp_zero(sigma: f64) -> UncertainZero {
+    UncertainZero {
+        s: Complex::new(1.0, 100.0),
+        covariance: [[sigma * sigma, 0.0], [0.0, 0.0]],
+        rhp_probability: 1.0,
+        kind: ZeroKind::Cnmp,
+    }
+}
+
+fn left_zero() -> UncertainZero {
+    UncertainZero {
+        s: Complex::new(-1.0, 100.0),
+        kind: ZeroKind::Mmp,
+        rhp_probability: 0.0,
+        ..cnmp_zero(0.0)
+    }
+}
+
+fn phase_drop(predicted_deg: f64, excess_deg: f64) -> Option<PhaseDrop> {
+    Some(PhaseDrop {
+        drop_deg: predicted_deg + excess_deg,
+        predicted_deg,
+    })
+}
+
+#[test]
+fn phase_may_deviate_by_sixty_degrees() {
+    let (right, left) = ([cnmp_zero(0.0)], [left_zero()]);
+    for (zeros, predicted_deg, decided) in [
+        (&right, 350.0, Cnmp::Detected),
+        (&left, 0.0, Cnmp::Excluded),
+    ] {
+        let cnmp_at =
+            |excess_deg: f64| evaluate(zeros, &OPPOSITE, phase_drop(predicted_deg, excess_deg)).0;
+        for near in [0.0, 59.9, 60.0, -59.9, -60.0] {
+            assert_eq!(cnmp_at(near), decided, "{near}");
+        }
+        for far in [60.1, -60.1, 119.0, -119.0, 360.0, f64::NAN] {
+            assert_eq!(cnmp_at(far), Cnmp::Undecided, "{far}");
+        }
+    }
+}
+
+#[test]
+fn reason_of_a_disagreement_states_both_phase_drops() {
+    let (_, why) = evaluate(&[cnmp_zero(0.0)], &OPPOSITE, phase_drop(350.0, -340.0));
+    assert!(
+        why.contains("predict 350 degrees") && why.contains("the measured response has 10;"),
+        "{why}"
+    );
+}
+
+#[test]
+fn phase_confirms_pairs_that_turn_it_by_half_a_turn_each() {
+    // Three standard deviations off the axis: certain on its side, but not without the phase.
+    let near = cnmp_zero(1.0 / 3.0);
+    for pairs in [1, 2] {
+        let zeros = vec![near; pairs];
+        let cnmp_at = |predicted_deg| evaluate(&zeros, &OPPOSITE, phase_drop(predicted_deg, 0.0)).0;
+        let limit_deg = 180.0 * pairs as f64;
+        assert_eq!(cnmp_at(limit_deg), Cnmp::Detected, "{pairs}");
+        assert_eq!(cnmp_at(limit_deg - 0.1), Cnmp::Undecided, "{pairs}");
+    }
+}
+
+#[test]
+fn every_pair_in_noise_must_lie_far_off_the_axis() {
+    let (far, near) = (cnmp_zero(0.99 / 6.0), cnmp_zero(1.01 / 6.0));
+    for (zeros, decided) in [
+        ([far, far], Cnmp::Detected),
+        ([far, near], Cnmp::Undecided),
+        ([near, far], Cnmp::Undecided),
+    ] {
+        assert_eq!(evaluate(&zeros, &OPPOSITE, phase_drop(0.0, 0.0)).0, decided);
+    }
+}
+
+#[test]
+fn only_neighbours_of_opposite_signs_are_opposite() {
+    let evaluated = |signs: &[f64]| evaluate(&[cnmp_zero(0.0)], signs, phase_drop(350.0, 0.0));
+    for signs in [vec![1.0, -1.0], vec![-2.0, 3.0], vec![1.0, 2.0, -1e-9]] {
+        assert_eq!(evaluated(&signs).0, Cnmp::Detected, "{signs:?}");
+    }
+    for signs in [vec![], vec![1.0], vec![1.0, 1.0], vec![-1.0, -2.0, -3.0]] {
+        let (cnmp, why) = evaluated(&signs);
+        assert_eq!(cnmp, Cnmp::Undecided, "{signs:?}");
+        assert_eq!(why, NO_OPPOSITE_NEIGHBOURS);
+    }
+}
+
+#[test]
+fn zeros_left_of_the_axis_need_no_opposite_neighbours() {
+    let (cnmp, why) = evaluate(&[left_zero()], &[1.0, 1.0], phase_drop(0.0, 0.0));
+    assert_eq!((cnmp, why.as_str()), (Cnmp::Excluded, NO_CNMP));
+}
+
+#[test]
+fn reason_of_a_detection_states_pairs_signs_and_phase() {
+    let why = |pairs: usize, predicted_deg| {
+        let zeros = vec![cnmp_zero(0.0); pairs];
+        evaluate(&zeros, &[1.0, -1.0, 1.0], phase_drop(predicted_deg, 4.0)).1
+    };
+    assert_eq!(
+        why(1, 350.0),
+        "1 pair of CNMP zeros, residues of opposite signs (+-+), and 354 degrees more phase lag than a minimum-phase system of this magnitude"
+    );
+    assert_eq!(
+        why(2, 350.0),
+        "2 pairs of CNMP zeros, residues of opposite signs (+-+); the response around the zeros is noise, so that the phase does not confirm them"
+    );
+}
+
+/// The modes at 100 and 110 rad/s with residues whose signs are uncertain each, and whose sum has a standard deviation.
+fn with_sum_sigma(sum_sigma: f64) -> Case {
+    let stage = Stage::with_mode_below(3.0);
+    let [second, third] = [1, 2].map(Parameter::Residue);
+    let variance = stage.residue(1).powi(2) + stage.residue(2).powi(2);
+    // The variance of the sum is 2 variance + 2 covariance.
+    let covariance = 0.5 * sum_sigma * sum_sigma - variance;
+    Case::of(&stage)
+        .with_covariance(second, second, variance)
+        .with_covariance(third, third, variance)
+        .with_covariance(second, third, covariance)
+}
+
+#[test]
+fn neighbours_of_uncertain_signs_count_by_the_sum_of_their_residues() {
+    let stage = Stage::with_mode_below(3.0);
+    let sum = stage.residue(1) + stage.residue(2);
+    let signs_at = |sigmas: f64| signs_of(&with_sum_sigma(sum.abs() / sigmas).input());
+    // The quantile of 1e-3 is 3.0902.
+    let certain = signs_at(3.1);
+    assert_eq!(certain.len(), 2, "{certain:?}");
+    // Rounding of the residues.
+    let size = stage.residue(1).abs();
+    assert!((certain[0] - stage.residue(0)).abs() < 1e-12 * size);
+    assert!((certain[1] - sum).abs() < 1e-12 * size);
+    assert_eq!(signs_at(3.08).len(), 1);
+}
+
+#[test]
+fn modes_of_certain_signs_count_one_by_one() {
+    let case = Case::of(&Stage::with_mode_below(3.0));
+    let signs = signs_of(&case.input());
+    let positive: Vec<bool> = signs.iter().map(|sign| *sign > 0.0).collect();
+    assert_eq!(positive, [true, true, false]);
+}
+
+#[test]
+fn modes_outside_the_band_have_no_sign() {
+    let case = Case {
+        up_to_rad_s: 109.9,
+        ..Case::of(&Stage::with_mode_below(3.0))
+    };
+    assert_eq!(signs_of(&case.input()).len(), 2);
+}
+
+#[test]
+fn residue_of_unknown_variance_has_no_sign() {
+    let mut case = Case::of(&Stage::with_pair(3.0));
+    let size = case.fit.covariance.nrows();
+    case.fit.covariance = DMatrix::zeros(size, size);
+    let at = index(&case.fit, Parameter::Residue(0));
+    case.fit.covariance[(at, at)] = f64::INFINITY;
+    assert_eq!(signs_of(&case.input()).len(), 1);
+}
