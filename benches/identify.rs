@@ -4,7 +4,7 @@
 
 use bench_test_support::unrecorded;
 
-use bench::config::{Config, Source, load};
+use bench_config::{Config, Source, load};
 use bench_identify::modal::{MeasurementChain, fit};
 use bench_identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use bench_identify::{Estimator, EstimatorSettings, FrfDatum, local, welch};

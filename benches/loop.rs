@@ -12,7 +12,6 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bench::config::{Config, ControlSettings, Source, load};
 use bench::experiment::{Plan, residuals, rig_model};
 use bench::recording::{self, DiskWatch, Header, Recorder};
 use bench::rig::simulated::SimulatedRig;
@@ -26,6 +25,7 @@ use bench::rt::request::RequestSender;
 use bench::rt::residual::Residuals;
 use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
+use bench_config::{Config, ControlSettings, Source, load};
 use bench_control::{Controller, ControllerText};
 use bench_hal::{Reading, Tick, Validity};
 use criterion::{Criterion, criterion_group, criterion_main};

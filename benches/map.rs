@@ -2,7 +2,7 @@
 //! and on two; the time per map in seconds is the time per point in microseconds. `benches/map_numpy.py` measures
 //! numpy's batched pencil, for comparison.
 
-use bench::config::{PlantSettings, Source, Sr4dofSettings, load};
+use bench_config::{PlantSettings, Source, Sr4dofSettings, load};
 use bench_plant::zeros::cnmp_map;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 

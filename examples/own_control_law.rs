@@ -2,9 +2,9 @@
 //!
 //! `cargo run --example own_control_law`
 
-use bench::config::{Source, load};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program, ProgramInput};
+use bench_config::{Source, load};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};

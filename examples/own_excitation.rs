@@ -2,11 +2,11 @@
 //!
 //! `cargo run --example own_excitation`
 
-use bench::config::{Config, Source, load};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Excite, Program, ProgramInput};
+use bench_config::{Config, Source, load};
 use bench_excitation::{Excitation, Extremes};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 

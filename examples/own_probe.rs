@@ -58,7 +58,7 @@ impl Responder for Interferometer {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let stage = Stage::new(&bench::config::load(&Default::default())?)?;
+    let stage = Stage::new(&bench_config::load(&Default::default())?)?;
     let start = Instant::now();
     let line = Line::terminal(PortSettings::new("", 921_600))?;
     let mut port = PortSettings::new(line.path(), 921_600);

@@ -33,7 +33,7 @@
 //! The modes of the default stage: frequency in hertz and residue in 1/kg.
 //!
 //! ```
-//! use bench::config::{Source, load};
+//! use bench_config::{Source, load};
 //! use bench_plant::{ModalModel, build};
 //!
 //! let config = load(&Source::default())?;
@@ -54,7 +54,6 @@
 #![deny(unsafe_code)]
 
 pub mod cli;
-pub mod config;
 pub mod daemon;
 pub mod doctor;
 pub mod experiment;

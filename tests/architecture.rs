@@ -7,8 +7,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 11] = [
-    "config",
+const ORDER: [&str; 10] = [
     "model",
     "rig",
     "rt",

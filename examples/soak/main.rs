@@ -24,8 +24,8 @@ mod supervisor;
 use std::error::Error;
 use std::process::ExitCode;
 
-use bench::config::{Source, load};
 use bench::rt::thread::Pace;
+use bench_config::{Source, load};
 use clap::Parser;
 
 use faults::{CASES, Schedule};

@@ -2,9 +2,9 @@
 
 use std::error::Error;
 
-use bench::config::{AmplitudePoint, Config, ReferenceSettings};
 use bench::experiment::Plan;
 use bench::rt::program::{Decision, Program, ProgramInput};
+use bench_config::{AmplitudePoint, Config, ReferenceSettings};
 use bench_excitation::{HoldReference, SineReference, StepReference};
 
 use super::faults::{Current, Injection, Period, Schedule};

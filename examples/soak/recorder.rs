@@ -6,11 +6,11 @@ use std::hash::{DefaultHasher, Hasher};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use bench::config::Config;
 use bench::recording::{Header, Recorder, RecordingError};
 use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
 use bench::rt::thread::Pace;
+use bench_config::Config;
 use rtrb::Consumer;
 use tempfile::TempDir;
 

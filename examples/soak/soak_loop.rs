@@ -4,7 +4,6 @@ use std::error::Error;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use bench::config::Config;
 use bench::experiment::Plan;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::interlock::Interlocks;
@@ -14,6 +13,7 @@ use bench::rt::servo::Servo;
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch};
 use bench::rt::thread::Pace;
+use bench_config::Config;
 use rtrb::RingBuffer;
 
 use super::faults::Schedule;

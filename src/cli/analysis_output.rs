@@ -8,7 +8,6 @@ use super::outcome::Outcome;
 use super::run_options::exit;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
-use crate::config::Config;
 use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use crate::experiment::{
     AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
@@ -18,6 +17,7 @@ use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

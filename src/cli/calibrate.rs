@@ -12,7 +12,6 @@ use super::output::{print_result, print_text, warn};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
-use crate::config::{Config, OptionSetting, Purpose, warnings};
 use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{PlanLimits, RunSummary, Runner};
 use crate::rig::calibration::{
@@ -21,6 +20,7 @@ use crate::rig::calibration::{
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_base::quantity::Current;
+use bench_config::{Config, OptionSetting, Purpose, warnings};
 use bench_excitation::Extremes;
 
 /// Arguments of the command.

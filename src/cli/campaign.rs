@@ -14,7 +14,6 @@ use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use super::value_range::{ValueRange, asymmetries, operating_points};
-use crate::config::{Config, Purpose, profiles};
 use crate::experiment::campaign::{
     Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
 };
@@ -24,6 +23,7 @@ use crate::rig::devices;
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, Ratio, si};
+use bench_config::{Config, Purpose, profiles};
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];

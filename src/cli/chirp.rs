@@ -18,7 +18,6 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, run_text};
 use super::table::{labelled, wrap};
 use super::until_decided::{SequenceCommand, SequentialOptions};
-use crate::config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
 use crate::experiment::sequential::first_shot_config;
 use crate::experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
@@ -28,6 +27,7 @@ use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use crate::rig::devices;
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
+use bench_config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
 use bench_excitation::Extremes;
 
 /// The bench and its excitation.

@@ -12,8 +12,8 @@ use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
-use crate::config::{Config, Purpose, profiles};
 use crate::experiment::check_named_files;
+use bench_config::{Config, Purpose, profiles};
 use bench_settings::files::{find, own};
 
 /// What to do with the configuration.
@@ -112,7 +112,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     match &args.what {
         ConfigCommand::Show(args) => show(args)?,
         ConfigCommand::Check(args) => check(args)?,
-        ConfigCommand::Schema => print_json(&crate::config::schema())?,
+        ConfigCommand::Schema => print_json(&bench_config::schema())?,
         ConfigCommand::Profiles { json } => list_profiles(*json)?,
         ConfigCommand::Init(args) => init(args)?,
     }

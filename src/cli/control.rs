@@ -11,13 +11,13 @@ use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{close, exit};
-use crate::config::{Purpose, warnings};
 use crate::experiment::certificate::{Evidence, require_evidence};
 use crate::experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
 };
 use crate::report::MagnitudeAxis;
+use bench_config::{Purpose, warnings};
 use bench_control::{ClosedLoop, Margins, listed_poles};
 use bench_excitation::Extremes;
 

@@ -12,7 +12,6 @@ use super::margins::text as margins_text;
 use super::output::warn;
 use super::run_options::run_text;
 use super::table::{labelled, table};
-use crate::config::Config;
 use crate::experiment::certificate::{Agreement, Condition, Evidence};
 use crate::experiment::stage_check::RestAfterCheck;
 use crate::experiment::{
@@ -24,6 +23,7 @@ use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
 };
 use bench_base::decimal::Decimal;
+use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
 use bench_identify::SIGMAS_95;

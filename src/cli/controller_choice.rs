@@ -1,7 +1,7 @@
 //! Which controller: an option of `bench control` and `bench margins`.
 
 use super::help::with_setting;
-use crate::config::OptionSetting;
+use bench_config::OptionSetting;
 use bench_control::CONTROLLERS;
 use bench_settings::files::names;
 

@@ -8,8 +8,8 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::table::wrap;
-use crate::config::{Config, Purpose};
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
+use bench_config::{Config, Purpose};
 
 /// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]

@@ -13,13 +13,13 @@ use super::error::CliError;
 use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_message, print_note};
-use crate::config::{Config, OptionSetting, Purpose};
 use crate::experiment::StopSignals;
 use crate::rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
 use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
+use bench_config::{Config, OptionSetting, Purpose};
 
 /// Period at which commands and planned faults are handled.
 const PERIOD: Duration = Duration::from_millis(2);

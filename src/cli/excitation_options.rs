@@ -5,9 +5,9 @@ use toml::{Table, Value};
 use super::error::CliError;
 use super::help::with_setting;
 use super::options::given;
-use crate::config::{Config, OptionSetting};
 use crate::experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 use bench_base::quantity::{Current, Frequency};
+use bench_config::{Config, OptionSetting};
 
 /// Frequency band and amplitude.
 #[derive(Clone, Debug, clap::Args)]

@@ -4,8 +4,8 @@ use std::sync::OnceLock;
 
 use toml::Table;
 
-use crate::config::profiles;
 use bench_base::quantity::Dimension;
+use bench_config::profiles;
 use bench_settings::files::find;
 
 /// Where the terms of the help texts are explained.

@@ -18,7 +18,6 @@ use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, run_text};
 use super::table::{labelled, table, wrap};
-use crate::config::{Config, OptionSetting, Purpose};
 use crate::experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
@@ -28,6 +27,7 @@ use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Ratio;
+use bench_config::{Config, OptionSetting, Purpose};
 use bench_excitation::Extremes;
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 

@@ -8,12 +8,12 @@ use super::analysis_output::in_folder;
 use super::error::CliError;
 use super::output::warn;
 use super::table::wrap;
-use crate::config::Config;
 use crate::experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
 use crate::report::{crossing_count, place};
 use bench_base::units::{UM_PER_M, hz};
+use bench_config::Config;
 use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,

@@ -3,9 +3,9 @@
 use clap::Args;
 
 use super::error::CliError;
-use crate::config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
 use crate::rig::devices;
 use bench_base::quantity::{Measure, OperatingPoint, Ratio};
+use bench_config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]
@@ -60,7 +60,7 @@ impl BenchOptions {
     pub fn profile(&self) -> &str {
         self.config
             .as_deref()
-            .unwrap_or(crate::config::profiles::DEFAULT)
+            .unwrap_or(bench_config::profiles::DEFAULT)
     }
 
     /// The effective configuration; `more` are those of the command's own options.

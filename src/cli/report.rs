@@ -10,7 +10,6 @@ use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
-use crate::config::Config;
 use crate::experiment::run_comparison::RunResult;
 use crate::experiment::{Analysis, BasicResults, ControlRun, overview};
 use crate::recording::Recording;
@@ -20,6 +19,7 @@ use crate::report::run_pages::{
 };
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 /// The page on standard output instead of a file.
 const STANDARD_OUTPUT: &str = "-";

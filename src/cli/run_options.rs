@@ -13,7 +13,6 @@ use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
-use crate::config::Config;
 use crate::experiment::{
     self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
     RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
@@ -21,6 +20,7 @@ use crate::experiment::{
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]

@@ -9,9 +9,9 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::table::labelled;
-use crate::config::{Purpose, Source};
 use crate::daemon::{DaemonConfig, ServeOptions, Started, own_socket, serve};
 use crate::rig::devices::is_simulated;
+use bench_config::{Purpose, Source};
 
 /// Address of the page of a demonstration.
 const DEMO_ADDRESS: SocketAddr =

@@ -14,7 +14,6 @@ use super::tune_plants::{ModelOptions, model_plants};
 use super::tune_values::{
     GoalName, factor, gain_margin, margin, phase_margin_deg, positive, sensitivity_limit,
 };
-use crate::config::{Config, OptionSetting, Purpose};
 use crate::experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
     recorded_disturbance,
@@ -25,6 +24,7 @@ use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, si};
 use bench_base::units::UM_PER_M;
+use bench_config::{Config, OptionSetting, Purpose};
 use bench_control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
     Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,

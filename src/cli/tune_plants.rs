@@ -2,8 +2,8 @@
 
 use super::error::CliError;
 use super::options::BenchOptions;
-use crate::config::{Config, OptionSetting, Purpose};
 use bench_base::quantity::{OperatingPoint, QuantityError};
+use bench_config::{Config, OptionSetting, Purpose};
 use bench_control::tuning::NamedPlant;
 
 /// Name of the plant of a model without operating points.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use super::live::status::EDGES_US;
 use super::shared::Daemon;
 use crate::recording::free_bytes;
-use crate::rig::devices::CanAmplifier;
+use crate::rig::devices::{CanAmplifier, can_amplifier};
 use crate::rt::arming::State;
 
 /// Time in which the folder of the recordings answers.
@@ -162,7 +162,7 @@ fn write_loop(out: &mut Exposition, daemon: &Daemon) {
 /// Errors of the connections to the devices; nothing on a simulated stage.
 fn write_devices(out: &mut Exposition, daemon: &Daemon) {
     let amplifier = &daemon.configuration().config.amplifier.device;
-    let address = amplifier.can().map(CanAmplifier::address);
+    let address = can_amplifier(amplifier).map(CanAmplifier::address);
     if let Some(errors) = address.and_then(|can| interface_errors(can.interface)) {
         let help = "Errors of the CAN interface, received and sent, as the kernel counts them.";
         out.counter("bench_bus_errors_total", help, errors);

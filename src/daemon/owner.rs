@@ -10,7 +10,6 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::same_rig::require_same_rig;
 use super::warnings::copy_warnings;
-use crate::config::Config;
 use crate::experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
     RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
@@ -19,6 +18,7 @@ use crate::rig::motor::Moment;
 use crate::rt::supervision::{ArmLease, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 /// Pause between two attempts to open the devices, and between two checks of open devices without a command.
 const RETRY: Duration = Duration::from_secs(2);

@@ -2,8 +2,8 @@
 
 use toml::Value;
 
-use crate::config::Config;
 use crate::experiment::{ExperimentError, Stage};
+use bench_config::Config;
 
 /// The tables of the settings that belong to the devices. The daemon answers for their limits, so that an order cannot change them.
 const TABLES: [&str; 5] = ["loop", "motor", "amplifier", "probe", "interlock"];

@@ -2,10 +2,10 @@
 
 use super::finding::{Finding, Severity, Subject};
 use super::report::Report;
-use crate::config::Config;
 use crate::experiment::{ExperimentError, MotorError, MotorForecast, Plan};
 use crate::rig::devices;
 use crate::rig::motor::{Moment, MotorMemory};
+use bench_config::Config;
 
 /// Examines the stored state. The simulated motor has none.
 pub(super) fn examine(config: &Config, report: &mut Report) {

@@ -7,10 +7,10 @@ use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-use crate::config::{InterlockSettings, ProbeSettings};
 use crate::rig::devices::first_reading;
 use bench_base::decimal::Decimal;
 use bench_base::numeric::is_within;
+use bench_config::{InterlockSettings, ProbeSettings};
 
 /// Duration of the observation.
 const OBSERVED: Duration = Duration::from_secs(1);
@@ -326,8 +326,8 @@ fn damage(readings: &Readings) -> Finding {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Config, Source, load};
     use crate::doctor::Severity::{self, Failure, Note, Warning};
+    use bench_config::{Config, Source, load};
 
     fn lab() -> Config {
         let source = Source {

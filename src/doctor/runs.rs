@@ -1,12 +1,12 @@
 //! The checks of the commands: whether `bench chirp` and `bench control` accept the configuration.
 
 use super::finding::{Finding, Subject};
-use crate::config::{self, Config};
 use crate::experiment::certificate::require_evidence;
 use crate::experiment::{
     ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
 };
 use crate::rig::devices;
+use bench_config::Config;
 use bench_control::Margins;
 use bench_excitation::Excitation;
 
@@ -78,7 +78,7 @@ pub fn kinds(config: &Config) -> Finding {
 
 /// The settings that need attention.
 pub fn attention(config: &Config) -> Vec<Finding> {
-    let warnings = config::warnings(config).into_iter();
+    let warnings = bench_config::warnings(config).into_iter();
     let remedy = "run only while the reason holds; the warning is shown in every run";
     let finding = |warning| Subject::Configuration.warning(warning, remedy);
     warnings.map(finding).collect()

@@ -6,10 +6,10 @@ use rtrb::RingBuffer;
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-use crate::config::LoopSettings;
 use crate::rt::clock::{Clock, Realtime, TickTiming};
 use crate::rt::publisher::Publisher;
 use crate::rt::thread::{Pace, Scheduling, become_realtime};
+use bench_config::LoopSettings;
 
 /// Duration of the trial.
 const DURATION: Duration = Duration::from_secs(1);
@@ -220,7 +220,7 @@ mod tests {
             healthy_s: None,
             arm_lease_s: None,
             wake_early_s: None,
-            on_recording_failure: crate::config::OnRecordingFailure::End,
+            on_recording_failure: bench_config::OnRecordingFailure::End,
         };
         let lateness = trial(&settings).unwrap().lateness;
         let all = lateness.ticks + lateness.missed;

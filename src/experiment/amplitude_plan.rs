@@ -7,8 +7,8 @@ use std::str::FromStr;
 
 use super::error::ExperimentError;
 use super::prediction::extremes;
-use crate::config::Config;
 use bench_base::units::{hz, rad_s};
+use bench_config::Config;
 use bench_excitation::{CurrentLimit, shaped_amplitude};
 use bench_identify::frf_csv;
 use bench_plant::{LoopPlant, ModalModel};

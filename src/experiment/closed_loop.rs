@@ -8,8 +8,8 @@ use super::plan::Plan;
 use super::plan_error::PlanError;
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::response_points::margins_of_loop;
-use crate::config::{Config, ReferenceSettings};
 use crate::recording::Recording;
+use bench_config::{Config, ReferenceSettings};
 use bench_control::ClosedLoop;
 use bench_identify::joint::{self, JointEstimate, LoopSignals};
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::loop_check::closed_loop_of;
 use super::plan_error::PlanError;
 use super::step_plan;
-use crate::config::{
+use bench_config::{
     Config, FeedforwardSettings, MinimumTimeSettings, PrefilterSettings, ShaperSettings,
     VibrationSettings,
 };

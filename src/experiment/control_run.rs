@@ -16,11 +16,11 @@ use super::sine_response::SineResponse;
 use super::step_response::{StepResponse, step_response};
 use super::swept_reference;
 use super::tracking::{TrackingMetrics, steady_tick, tracking_metrics};
-use crate::config::Config;
 use crate::recording::Recording;
 use crate::rig::devices::SIMULATED;
 use crate::rig::simulated::DisturbanceSpectra;
 use bench_base::units::{hz, rad_s};
+use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText, Margins};
 use nalgebra::Complex;
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::motor_forecast::MotorSummary;
-use crate::config::Config;
+use bench_config::Config;
 use bench_excitation::{AmplitudePoint, Extremes};
 
 /// The plan of an excitation, predicted by the model.

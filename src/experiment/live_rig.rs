@@ -16,7 +16,6 @@ use super::run_error::RunError;
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
-use crate::config::{self, Config, LoopSettings, OnRecordingFailure};
 use crate::recording::{self, DiskWatch, Recorder, free_bytes};
 use crate::rt::device_defect::DeviceDefect;
 use crate::rt::interlock::Interlocks;
@@ -27,6 +26,7 @@ use crate::rt::servo_run::{Connections, Progress, ServoRun};
 use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
 use crate::rt::tuning::Tune;
+use bench_config::{Config, LoopSettings, OnRecordingFailure};
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
@@ -116,7 +116,7 @@ impl LiveRig {
 
     /// Everything that a run needs, before its first tick.
     fn prepare<'a>(&self, plan: &'a Plan, folder: &Path) -> Result<PreparedRun<'a>, RunError> {
-        for warning in config::warnings(&plan.config) {
+        for warning in bench_config::warnings(&plan.config) {
             tracing::warn!("{warning}");
         }
         let program = plan.program()?;

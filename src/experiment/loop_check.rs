@@ -3,8 +3,8 @@
 use std::fmt;
 
 use super::plan_error::PlanError;
-use crate::config::Config;
 use crate::rig::devices;
+use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText, Margins};
 use bench_plant::{LoopPlant, ModalModel};
 
@@ -133,7 +133,7 @@ pub fn require_margins(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Purpose, Source, load};
+    use bench_config::{Purpose, Source, load};
 
     fn config(min_modulus_margin: f64) -> Config {
         load(&Source {

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::measured_frf::{FrfError, MeasuredFrf, check_frf};
 use super::response_points::{points, roll_off, variance};
-use crate::config::Config;
 use bench_base::units::rad_s;
+use bench_config::Config;
 use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredLoop, MeasuredMargins, NyquistCount, OutsideBand, Stability, check_gaps,

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use crate::config::Config;
+use bench_config::Config;
 use bench_plant::{LoopPlant, ModalModel};
 
 /// The model of a configuration between set-point and reading, for readings of the mean age.

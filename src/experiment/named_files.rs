@@ -5,16 +5,16 @@ use std::time::SystemTime;
 use super::error::ExperimentError;
 use super::loop_check::Stage;
 use super::plan_error::PlanError;
-use crate::config::{self, Config};
 use crate::rig::calibration::{CalibrationError, KnownDevices, load_calibration};
 use crate::rig::devices::{SIMULATED, probe};
+use bench_config::Config;
 use bench_control::ControllerText;
 use bench_excitation::ReferenceContext;
 
 /// Refuses a configuration whose controller, reference or calibration cannot be used. Returns what needs attention.
 pub fn check_named_files(config: &Config) -> Result<Vec<String>, ExperimentError> {
     check_control_files(config)?;
-    let mut attention = config::warnings(config);
+    let mut attention = bench_config::warnings(config);
     attention.extend(check_calibration(config, Stage::of(config))?);
     Ok(attention)
 }

@@ -1,7 +1,7 @@
 //! Why a run cannot be planned.
 
 use super::certificate::CertificateError;
-use crate::config::ConfigError;
+use bench_config::ConfigError;
 use bench_control::{ControllerError, MinimumTimeError};
 use bench_excitation::command::CommandFilterError;
 use bench_excitation::{ExcitationError, ReferenceError};

@@ -1,8 +1,8 @@
 //! The extremes of an excitation by the model of the whole rig.
 
 use super::error::ExperimentError;
-use crate::config::Config;
 use crate::rig::simulated;
+use bench_config::Config;
 use bench_excitation::{Excitation, Extremes};
 use bench_plant::DiscretePlant;
 

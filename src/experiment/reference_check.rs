@@ -4,7 +4,7 @@
 
 use super::plan_error::PlanError;
 use super::swept_reference::closed_loop;
-use crate::config::Config;
+use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText};
 use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand, Unfiltered};
 use bench_excitation::{Extremes, Limits, ReferenceContext};

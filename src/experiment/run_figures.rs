@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use crate::config::Config;
 use crate::recording::{Recording, RecordingError};
 use crate::rig::motor::ThermalModel;
 use crate::rt::record::{TickRecord, flag};
 use bench_base::numeric::larger;
+use bench_config::Config;
 
 /// Figures of a run from the tick on in which the loop closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -97,7 +97,7 @@ impl FiguresMeter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use bench_config::{Source, load};
 
     #[test]
     fn figures_of_a_constant_current_and_error() {

@@ -13,7 +13,6 @@ use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use super::remembered_motor::MotorHandling;
 use super::run::{RemoteRecording, Run, RunFile, StopCause};
-use crate::config;
 use crate::recording::Totals;
 use crate::rig::calibration::Calibration;
 use crate::rt::servo_run::RunOutcome;
@@ -104,7 +103,7 @@ impl RunOrder {
     /// # Errors
     /// When its texts cannot be read.
     pub fn plan(&self) -> Result<Plan, PlanError> {
-        let config = config::whole("the ordered configuration", &self.config_toml)?;
+        let config = bench_config::whole("the ordered configuration", &self.config_toml)?;
         let controller = self.controller.clone();
         let controller = controller.map(|(name, text)| ControllerText { name, text });
         let mut plan = Plan::with_texts(

@@ -9,13 +9,13 @@ use super::run::StopCause;
 use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
-use crate::config::OnRecordingFailure;
 use crate::recording::Health;
 use crate::rt::live_loop::{LiveLoop, LoopPanicked};
 use crate::rt::record::Origin;
 use crate::rt::request::{Request, RequestSender};
 use crate::rt::servo_run::{Progress, RunOutcome, ServoRun};
 use crate::rt::supervision::{ArmLease, StopFlags};
+use bench_config::OnRecordingFailure;
 
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);

@@ -22,12 +22,12 @@ use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::run_order::{RigOwner, RunConditions, run_elsewhere};
 use super::stage_check::{PlannedStageCheck, StageCheck};
-use crate::config::Config;
 use crate::recording::Recording;
 use crate::rig::calibration::{Calibration, KnownDevices, load_calibration};
 use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 /// The rig on which a plan runs, its pace, and the folder for its recording.
 #[derive(Clone, Debug)]

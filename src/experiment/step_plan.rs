@@ -1,8 +1,8 @@
 //! The plan of a minimum-time step: the plants for which it is planned, and its limits.
 
 use super::plan_error::PlanError;
-use crate::config::{Config, MinimumTimeSettings, PlantSettings, SimSettings};
 use crate::rig::simulated;
+use bench_config::{Config, MinimumTimeSettings, PlantSettings, SimSettings};
 use bench_control::{
     ClosedLoop, ControllerText, MinimumTime, SETTLING_BAND, StepLimits, StepPlant, StepTiming,
     minimum_time,

@@ -1,8 +1,8 @@
 //! The plan of a swept reference: its amplitudes, unless the user states them, and its extremes by the model.
 
 use super::plan_error::PlanError;
-use crate::config::{Config, ReferenceSettings, validate};
 use crate::rig::simulated;
+use bench_config::{Config, ReferenceSettings, validate};
 use bench_control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use bench_excitation::{Extremes, ReferenceContext, SweptReference};
 use bench_plant::LoopPlant;

@@ -1,7 +1,7 @@
 //! The conditions under which a plant was measured or computed, as text.
 
 use super::number::plain;
-use crate::config::PlantSettings;
+use bench_config::PlantSettings;
 
 /// Operating point and mass asymmetry of a plant that has them, without the settings that vary.
 pub fn plant_conditions(plant: &PlantSettings, varied: &[&str]) -> String {

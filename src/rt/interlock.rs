@@ -11,8 +11,8 @@ use super::arming::Trip;
 use super::following_error::FollowingError;
 use super::program::Decision;
 use super::residual::Residuals;
-use crate::config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
 use bench_base::numeric::is_within;
+use bench_config::{AmplifierSettings, InterlockSettings, LoopSettings, MotorSettings};
 
 /// The limits, and the state that their checks need.
 pub struct Interlocks {

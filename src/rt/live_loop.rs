@@ -19,7 +19,7 @@ use super::clock::{Clock, Realtime, Virtual};
 use super::servo::Servo;
 use super::servo_run::ServoRun;
 use super::thread::{Pace, Scheduling};
-use crate::config::LoopSettings;
+use bench_config::LoopSettings;
 
 /// The thread of the loop ended without an order to do so: it panicked. The amplifier is disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

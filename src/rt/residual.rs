@@ -31,8 +31,8 @@
 
 use super::arming::Trip;
 use super::program::Decision;
-use crate::config::CLOSED_SHARE_FACTOR;
 use bench_base::numeric::is_within;
+use bench_config::CLOSED_SHARE_FACTOR;
 use bench_control::{ControlLaw, LawInput};
 use bench_plant::{LoopPlant, LoopPlantState, Mode};
 

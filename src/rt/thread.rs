@@ -8,8 +8,8 @@ use std::io::Write;
 use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
 use serde::{Deserialize, Serialize};
 
-use crate::config::LoopSettings;
 use bench_base::thread_priority::set_fifo;
+use bench_config::LoopSettings;
 
 /// `virtual` or `realtime`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]

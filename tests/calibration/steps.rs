@@ -1,7 +1,6 @@
 //! The static steps: the fit estimates the errors of the rig.
 use std::path::Path;
 
-use bench::config::{Config, ScaleBy, Source, load};
 use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench::experiment::{self, Plan};
 use bench::recording::Recording;
@@ -10,6 +9,7 @@ use bench::rig::calibration::{
 };
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::{Config, ScaleBy, Source, load};
 use bench_hal::Rig;
 
 use crate::calibration::skewed_rig::{Skew, SkewedRig};

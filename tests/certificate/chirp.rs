@@ -125,7 +125,7 @@ fn uncertain_or_missing_signs_do_not_differ() {
 }
 
 /// A recording of a run of the simulated stage with more settings.
-fn recorded(plan: impl FnOnce(bench::config::Config) -> Plan, more: &[&str]) -> Recording {
+fn recorded(plan: impl FnOnce(bench_config::Config) -> Plan, more: &[&str]) -> Recording {
     let folder = tempfile::tempdir().expect("a folder");
     let config = config(more);
     let rig = Box::new(SimulatedRig::new(&config).expect("a rig"));

@@ -1,5 +1,4 @@
 //! The check of the stage before a loop closes: it accepts the stage of the certificate and finds another one.
-use bench::config::Config;
 use bench::experiment::certificate::sha256;
 use bench::experiment::stage_check::{
     PhaseComparison, PlannedStageCheck, StageCheck, StageCheckError, StaticComparison,
@@ -8,6 +7,7 @@ use bench::experiment::{self, ExperimentError, Plan};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::Config;
 use bench_hal::Rig;
 
 use crate::calibration::skewed_rig::{Skew, SkewedRig};

@@ -1,6 +1,6 @@
 //! Rejected settings: every command names the place, the value, the limit and the remedy.
 use crate::config_settings::COMMANDS;
-use bench::config::{Source, load, whole};
+use bench_config::{Source, load, whole};
 
 use crate::config_settings::program::Bench;
 

@@ -1,7 +1,7 @@
 //! Controllers with two integrators: the loop follows a ramp without error.
 
-use bench::config::{Purpose, Source, load};
 use bench::experiment::closed_loop;
+use bench_config::{Purpose, Source, load};
 use bench_control::ClosedLoop;
 
 use crate::controllers::program::Bench;
@@ -11,7 +11,7 @@ const STAGE: &str = "title = \"ramp\"\n[plant]\nmodel = \"modal\"\n[plant.modes]
 const RATE_HZ: f64 = 5000.0;
 const SLOPE_M_S: f64 = 1e-5;
 
-fn config(bench: &Bench, controller: &str) -> bench::config::Config {
+fn config(bench: &Bench, controller: &str) -> bench_config::Config {
     let path = |name: &str| bench.path(name).display().to_string();
     load(&Source {
         config: Some(path("stage.toml")),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::config::{Source, load};
+use bench_config::{Source, load};
 use bench_hal::serial::SerialProbe;
 use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 

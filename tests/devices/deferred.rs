@@ -1,7 +1,6 @@
 //! The configured computing delay of one period on devices: a set-point is sent in the tick after the one that computed it.
 use std::time::Duration;
 
-use bench::config::Config;
 use bench::experiment::{self, Plan, replay};
 use bench::recording::Recording;
 use bench::rig::devices::deferred::{Deferred, OutputTiming};
@@ -10,6 +9,7 @@ use bench::rt::arming::State;
 use bench::rt::record::{EventKind, TickRecord};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
+use bench_config::Config;
 use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, MemoryEndpoint};
 use bench_hal::can::pdo::{Direction, cob_id, unpack};
@@ -30,10 +30,7 @@ fn set_points(listener: &mut MemoryEndpoint) -> Vec<i16> {
 }
 
 fn set_point_id(config: &Config) -> Id {
-    let node = config
-        .amplifier
-        .device
-        .can()
+    let node = bench::rig::devices::can_amplifier(&config.amplifier.device)
         .expect("a drive")
         .address()
         .node;

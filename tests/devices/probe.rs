@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::Poll;
 use std::time::{Duration, Instant};
 
-use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
 use bench::rig::devices;
 use bench::rig::emulator::{EmulatedFault, FaultRequest, ProbeEndpoint, ProbeServer, Stage};
@@ -14,6 +13,7 @@ use bench::rt::arming::State;
 use bench::rt::program::Program;
 use bench::rt::record::EventKind;
 use bench::rt::servo::Request;
+use bench_config::{Config, Source, load};
 use bench_hal::serial::StatisticsHandle;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 

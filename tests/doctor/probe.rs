@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use bench::config::{Config, Source, load};
 use bench::rig::devices::probe::driver_settings;
+use bench_config::{Config, Source, load};
 use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Protocol, SerialProbe};
 use nix::fcntl::{Flock, FlockArg};

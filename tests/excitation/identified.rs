@@ -1,7 +1,7 @@
 //! Multisine, binary sequence and stepped sine each give the response of the rig and its modes.
-use bench::config::Config;
 use bench::experiment::{Analysis, replay};
 use bench::recording::Recording;
+use bench_config::Config;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::Cnmp;
 use nalgebra::Complex;

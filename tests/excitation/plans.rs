@@ -190,5 +190,5 @@ fn recording_without_excitation_kind_is_a_chirp() {
         .expect("a table")
         .remove("repetitions");
     let text = toml::to_string(&old).expect("TOML");
-    assert_eq!(bench::config::whole("an old recording", &text), Ok(config));
+    assert_eq!(bench_config::whole("an old recording", &text), Ok(config));
 }

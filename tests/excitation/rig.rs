@@ -1,9 +1,9 @@
 //! The simulated stage at 1 kHz, and runs on it.
 use std::path::{Path, PathBuf};
 
-use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::{Analysis, Plan};
 use bench::recording::Recording;
+use bench_config::{Config, Purpose, Source, load};
 
 use crate::excitation::simulated;
 

@@ -1,11 +1,11 @@
 //! Identification in closed loop with the fast controller: plant, loop, modes and zeros equal those of the open loop.
 use std::f64::consts::TAU;
 
-use bench::config::{Config, ReferenceSettings, Source, load};
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench::recording::Recording;
 use bench::rig::simulated::modes as simulated_modes;
 use bench::rt::arming::State;
+use bench_config::{Config, ReferenceSettings, Source, load};
 use bench_excitation::SweptReference;
 use bench_identify::verdict::Cnmp;
 use bench_plant::LoopPlant;

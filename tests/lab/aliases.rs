@@ -2,7 +2,7 @@
 //!
 //! With s_k = j (w + 2 pi k/T), G(w) = sum over k of P(s_k) (1 - exp(-s_k T))/(s_k T) exp(-s_k d), where P is motor, amplifier and
 //! modes and d the delay; a free-running probe multiplies each term by (1 - exp(-s_k Tp))/(s_k Tp).
-use bench::config::{Config, Source, load};
+use bench_config::{Config, Source, load};
 use bench_plant::{ModalModel, Mode, build};
 use nalgebra::Complex;
 

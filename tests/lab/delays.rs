@@ -2,10 +2,10 @@
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
-use bench::config::{Config, ConfigError, Purpose, Source, load, profiles, schema};
 use bench::experiment::{Plan, closed_loop, run};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::{Config, ConfigError, Purpose, Source, load, profiles, schema};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use nalgebra::Complex;
 

@@ -1,7 +1,7 @@
 //! A chirp over the simulated chain of the profile `lab`, against the closed form.
-use bench::config::Config;
 use bench::experiment::{Analysis, Plan};
 use bench::rig::simulated::modes as simulated_modes;
+use bench_config::Config;
 use bench_plant::Mode;
 use nalgebra::Complex;
 

@@ -1,7 +1,7 @@
 //! FRFs that do not belong to the loop, or do not contain its margins, are refused with a remedy.
 
-use bench::config::Config;
 use bench::experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
+use bench_config::Config;
 use bench_control::ClosedLoop;
 use bench_identify::Frf;
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};

@@ -1,7 +1,7 @@
 //! The response of a model as if it were measured.
 
-use bench::config::{Config, Source, load};
 use bench_base::units::{hz, rad_s};
+use bench_config::{Config, Source, load};
 use bench_control::ClosedLoop;
 use bench_control::measured::ResponsePoint;
 use bench_identify::{Frf, FrfPoint};

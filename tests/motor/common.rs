@@ -2,11 +2,11 @@
 use std::cell::Cell;
 use std::path::Path;
 
-use bench::config::{Config, ExcitationKind, Source, load};
 use bench::experiment::{
     ExperimentError, MotorHandling, Plan, Run, RunSummary, Runner, Setup, close,
 };
 use bench::rig::motor::{Moment, MotorMemory};
+use bench_config::{Config, ExcitationKind, Source, load};
 use bench_excitation::AmplitudePoint;
 
 /// Continuous current of the motor: 26 N over 11.12 N/A.

@@ -2,8 +2,8 @@
 
 use std::time::SystemTime;
 
-use bench::config::{Config, Source, load, whole};
 use bench::rig::calibration::{KnownDevices, load_calibration};
+use bench_config::{Config, Source, load, whole};
 use bench_control::{ControllerText, LawInput};
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};

@@ -4,7 +4,6 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 use std::time::Duration;
 
-use bench::config::Config;
 use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
@@ -16,6 +15,7 @@ use bench::rt::record::{EventKind, LoopMessage, Refusal};
 use bench::rt::request::{Request, RequestSender};
 use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench::rt::thread::Pace;
+use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };

@@ -2,10 +2,6 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use bench::config::{
-    AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
-    whole,
-};
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::calibration::Correction;
@@ -14,6 +10,10 @@ use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
+use bench_config::{
+    AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
+    whole,
+};
 use bench_excitation::{SineReference, StepReference};
 use bench_hal::Validity;
 

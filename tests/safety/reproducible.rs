@@ -1,10 +1,10 @@
 //! The same seed and settings give the same run, bit for bit, on any machine.
 use std::path::Path;
 
-use bench::config::{Config, Sweep};
 use bench::experiment::{self, Plan};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::{Config, Sweep};
 
 use crate::safety::rig::stage;
 

@@ -2,7 +2,6 @@
 use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
-use bench::config::{Config, Source, load};
 use bench::experiment::{Plan, replay, residuals, run};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
@@ -10,6 +9,7 @@ use bench::rt::arming::Trip;
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::Decision;
 use bench::rt::thread::Pace;
+use bench_config::{Config, Source, load};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 
 use crate::safety::rig::interlocks;

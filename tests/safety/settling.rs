@@ -1,11 +1,11 @@
 //! The end of a run: reference and current go to zero along ramps; a trip and a stop request cut the current at once.
-use bench::config::Config;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Excite, Program};
 use bench::rt::record::{EventKind, TickRecord, flag};
 use bench::rt::servo::Request;
 use bench::rt::settling::{Settling, SettlingStep};
+use bench_config::Config;
 use bench_control::{Controller, ControllerText, SectionController};
 use bench_excitation::Reference;
 use bench_hal::Validity;

@@ -2,7 +2,6 @@
 use std::f64::consts::TAU;
 use std::sync::mpsc::Sender;
 
-use bench::config::{Config, ReferenceSettings};
 use bench::experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
@@ -11,6 +10,7 @@ use bench::rt::record::{EventKind, Refusal, RequestKind, TickRecord};
 use bench::rt::servo::Request;
 use bench::rt::thread::Pace;
 use bench::rt::tuning::{Factors, Tune, TuneError};
+use bench_config::{Config, ReferenceSettings};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
 

@@ -4,12 +4,12 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bench::config::Config;
 use bench::experiment::sequential::{
     SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
 };
 use bench::experiment::{Plan, Runner, Setup};
 use bench::recording::Recording;
+use bench_config::Config;
 use bench_identify::verdict::{Cnmp, MAX_LOOKS};
 use bench_test_support::identified::{config, truth};
 use bench_test_support::program::{Bench, near, number};

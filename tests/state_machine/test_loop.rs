@@ -2,7 +2,6 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::Poll;
 
-use bench::config::Config;
 use bench::rt::clock::{TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Decision, Program, ProgramInput};
@@ -13,6 +12,7 @@ use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use bench::rt::tuning::{Factors, Tune};
+use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick, Validity,
 };

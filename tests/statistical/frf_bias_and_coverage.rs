@@ -1,7 +1,7 @@
 //! Bias and coverage of the default estimator over many seeds, on the default simulated stage at 5 kHz with noise, floor vibration,
 //! quantisation and unmodelled modes. The reference response is computed independently of the library.
 
-use bench::config::{Config, Source, load};
+use bench_config::{Config, Source, load};
 use bench_identify::{Frf, response};
 
 use bench_test_support::seeds::over_seeds;

@@ -1,7 +1,7 @@
 //! `bench tune` for stages that were not used when it was written.
 
-use bench::config::{Config, Source, load};
 use bench_base::progress::Progress;
+use bench_config::{Config, Source, load};
 use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, NamedPlant, Requirements, RigModel,
     Tolerances, TuneError, design,

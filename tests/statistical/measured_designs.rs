@@ -2,9 +2,9 @@
 //!
 //! `BENCH_TUNE_SEEDS=50` designs for 50 seeds; without it for a few.
 
-use bench::config::Config;
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
 use bench_base::progress::Progress;
+use bench_config::Config;
 use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MeasuredPlant, NamedPlant, Requirements,
     RigModel, Tolerances, design,

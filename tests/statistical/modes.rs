@@ -1,5 +1,5 @@
 //! Modes R, u and v of the simulated stage with noise, quantisation and unmodelled modes.
-use bench::config::{Source, load};
+use bench_config::{Source, load};
 use bench_identify::modal::Estimate;
 use bench_plant::UnmodelledMode;
 use bench_test_support::identified::{Truth, analysed, config, measurable, model, stands_for};

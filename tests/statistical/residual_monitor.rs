@@ -4,11 +4,11 @@
 //! `BENCH_MONITOR_TICKS=100000000` runs 10^8 ticks, the default is 4 million; `BENCH_MONITOR_SEED` sets the seed, and
 //! `BENCH_MONITOR_SHARE` a share `interlock.model_error_share` other than 0.5, to find the margin.
 
-use bench::config::{Config, ExcitationKind, PlantSettings, Source, load};
 use bench::experiment::{Plan, closed_loop, run};
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::Trip;
 use bench::rt::thread::Pace;
+use bench_config::{Config, ExcitationKind, PlantSettings, Source, load};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -3,7 +3,7 @@
 //! By default a coarse grid with one seed; `BENCH_SEQUENTIAL_SEEDS=5` takes the whole grid of 15 x 10 points with five seeds
 //! (with `-- --nocapture` it prints the motion).
 
-use bench::config::Config;
+use bench_config::Config;
 use bench_identify::verdict::Cnmp;
 use bench_test_support::identified::{config, truth};
 use bench_test_support::seeds::over_seeds;

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::certificate::{CertificateText, ResponseFile, certify};
 use bench::experiment::stage_check::{PlannedStageCheck, StageCheck};
 use bench::experiment::{self, Plan, Run, analyse};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::{Config, Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
 /// The stage with the fast controller, D = +10 %, and a chirp of 40 s.

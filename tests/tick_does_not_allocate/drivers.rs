@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use assert_no_alloc::assert_no_alloc;
-use bench::config::{Config, Source, load};
 use bench::rig::devices::{self, Requirements};
 use bench::rig::emulator::{AmplifierServer, EventLog, ProbeEndpoint, ProbeServer, Stage};
+use bench_config::{Config, Source, load};
 use bench_hal::can::bus::{BusError, BusEvent, CanBus, Port, SystemHost};
 use bench_hal::can::{CanFrame, Id};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DisplacementProbe, Tick, Validity, blocking};
@@ -182,7 +182,7 @@ fn can_drivers_only_write_frames_and_read_the_clock() {
             // A drive announces its start: a driver that is open by then would report a restart.
             while listener.receive(Duration::from_millis(1)) == Ok(None) {}
             let requirements = Requirements::new(&config.amplifier, &config.servo);
-            let driver = device.can().expect("a real device");
+            let driver = devices::can_amplifier(device).expect("a real device");
             let opened = driver.open(requirements, Box::new(host()));
             let mut drive = opened.expect("it opens").0;
             let termination = termination_with_current(&mut *drive);

@@ -6,7 +6,7 @@ mod system_calls;
 mod test_loop;
 
 use assert_no_alloc::AllocDisabler;
-use bench::config::{Config, Source, load};
+use bench_config::{Config, Source, load};
 use bench_hal::Validity;
 use bench_test_support::faulty_rig;
 

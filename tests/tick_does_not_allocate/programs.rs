@@ -1,8 +1,6 @@
 //! Programs of every kind, each with a duration of about 1 s.
-use bench::config::{
-    AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint,
-};
 use bench::rt::program::{Control, Excite, Program};
+use bench_config::{AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint};
 use bench_control::{ControlDesign, ControllerText};
 use bench_excitation::command::{CommandFilter, FilteredCommand, Taps};
 use bench_excitation::{

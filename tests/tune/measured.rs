@@ -1,9 +1,9 @@
 //! Designs from measured responses: on the true plant they have what they promise.
 
-use bench::config::Config;
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench::rig::simulated;
 use bench_base::progress::Progress;
+use bench_config::Config;
 use bench_control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
     MeasuredPlant, NamedPlant, RigModel, Tolerances, design, evaluate,

@@ -1,7 +1,7 @@
 //! Designs for the stage of the thesis, small enough for every test run.
 
-use bench::config::{Config, Source, load};
 use bench_base::progress::Progress;
+use bench_config::{Config, Source, load};
 use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MarginDisc, NamedPlant, Requirements,
     RigModel, SensitivityLimit, Tolerances, TuneError, design,

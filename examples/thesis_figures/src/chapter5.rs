@@ -2,9 +2,9 @@
 
 use super::model::{Model, even};
 use super::{Comparison, Content, FigureError, Runs};
-use bench::config::PlantSettings;
 use bench::report::colours::Colour;
 use bench::report::{Chart, Mark, Scale};
+use bench_config::PlantSettings;
 use bench_plant::zeros::cnmp_map;
 
 pub(crate) fn fig_5_2(_: &Runs) -> Result<Content, FigureError> {

@@ -1,10 +1,10 @@
 //! Errors of figures.
 
-use bench::config::ConfigError;
 use bench::experiment::{AnalysisError, RunError};
 use bench::recording::RecordingError;
 use bench::report::ReportError;
 use bench::rig::devices::DevicesError;
+use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_plant::PlantError;
 

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 
 use super::FigureError;
 use super::model::Model;
-use bench::config::Config;
 use bench::experiment::{self, Analysis, Plan, TrackingMetrics};
 use bench::recording::Recording;
 use bench::rig::devices;
 use bench::rt::record::{TickRecord, flag};
 use bench::rt::thread::Pace;
+use bench_config::Config;
 
 /// Runs that several figures show; each is made once.
 #[derive(Debug)]

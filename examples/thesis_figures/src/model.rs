@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 
 use super::FigureError;
-use bench::config::{Config, PlantSettings, Source, load};
+use bench_config::{Config, PlantSettings, Source, load};
 use bench_plant::zeros::{ModalSum, Zero};
 use bench_plant::{ModalModel, Structure};
 

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use super::content::signed;
 use super::model::Model;
 use super::{Comparison, Content, FigureError, Runs};
-use bench::config::{PlantSettings, XySettings};
+use bench_config::{PlantSettings, XySettings};
 use bench_plant::zeros::{
     MmpLocation, ModalSum, ModalTerm, Sequence, TABLES, Table, TableRow, ZeroCounts,
     phase_drop_deg, table_of, undamped_zeros,

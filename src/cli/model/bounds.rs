@@ -7,9 +7,9 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::Profiled;
-use crate::config::Purpose;
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
+use bench_config::Purpose;
 use bench_plant::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
 
 /// The demands on the loop.

@@ -10,9 +10,9 @@ use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::evenly_spread_rows;
 use super::sweep::SweepArgs;
-use crate::config::{Config, Purpose};
 use crate::report::{Picture, ReportError, locus_svg, plant_conditions};
 use bench_base::decimal::Decimal;
+use bench_config::{Config, Purpose};
 use bench_plant::ModalModel;
 use bench_plant::zeros::{
     ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,

@@ -5,8 +5,8 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::table;
 use super::Profiled;
-use crate::config::Purpose;
 use bench_base::decimal::Decimal;
+use bench_config::Purpose;
 use bench_plant::zeros::{ModeSummary, PlantSummary, Zero};
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {

@@ -4,7 +4,7 @@ use super::super::error::CliError;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::Profiled;
-use crate::config::Purpose;
+use bench_config::Purpose;
 use bench_plant::zeros::{SequenceReport, TableRow, ZeroCounts};
 use bench_plant::{ModalModel, build};
 

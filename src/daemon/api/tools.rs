@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 use super::arguments::check_arguments;
 use super::error::ApiError;
 use super::extract::{Body, ClientAddress};
-use crate::config::{self, Config, Source, load, profiles};
 use crate::daemon::computations::Purpose;
 use crate::daemon::shared::{Daemon, DaemonConfig};
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
 use crate::rig::devices;
+use bench_config::{Config, Source, load, profiles};
 
 /// Findings of `bench doctor`.
 pub async fn doctor(
@@ -79,7 +79,7 @@ fn text(config: &Config) -> Result<String, ApiError> {
 
 /// The JSON schema of the settings.
 pub async fn schema() -> Json<serde_json::Value> {
-    Json(config::schema())
+    Json(bench_config::schema())
 }
 
 /// Another configuration.

@@ -233,7 +233,7 @@ fn daemon_view(daemon: &Daemon) -> DaemonView {
         start_reason: daemon.start_reason.clone(),
         config: source
             .config
-            .unwrap_or_else(|| crate::config::profiles::DEFAULT.into()),
+            .unwrap_or_else(|| bench_config::profiles::DEFAULT.into()),
         sets: source.sets,
         rig: kind.into(),
         amplifier,

@@ -16,12 +16,12 @@ use super::history::History;
 use super::response::ResponseView;
 use super::status::{LatenessTotals, Status};
 pub use super::status::{LoopView, Share, TripView};
-use crate::config::Config;
 use crate::experiment::{Feed, FeedSender, FeedSource, RunKind};
 use crate::recording::{EncodedMessage, LiveEncoder};
 use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use bench_base::thread_priority::lower;
 use bench_base::timestamp::unix_ns;
+use bench_config::Config;
 use bench_identify::GrowingResponse;
 
 /// Period of the thread.

@@ -3,7 +3,6 @@
 use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
-use crate::config::{Config, ExcitationKind};
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
@@ -16,6 +15,7 @@ use crate::rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 use bench_base::timestamp;
+use bench_config::{Config, ExcitationKind};
 use bench_excitation::{Extremes, Staircase};
 use bench_plant::{ModalModel, PlantError};
 

@@ -1,10 +1,10 @@
 //! Fits the recording of a staircase of static currents: compliance with its sign, rest position, linearity, hysteresis.
 
-use crate::config::{CalibrateSettings, ScaleBy};
 use crate::recording::{Recording, RecordingError};
 use crate::rt::arming::State;
 use crate::rt::record::TickRecord;
 use bench_base::running_stats::RunningStats;
+use bench_config::{CalibrateSettings, ScaleBy};
 use bench_excitation::Staircase;
 
 /// The stage must move by this many standard deviations of the mean of a level.

@@ -8,7 +8,7 @@ use super::offset::{Judgement, Offset, disagreeing, estimate_offset};
 use super::point::PointResult;
 use super::recommend::{Recommendation, Tolerances, recommend};
 use super::region::Region;
-use crate::config::{Config, Sr4dofSettings};
+use bench_config::{Config, Sr4dofSettings};
 use bench_identify::verdict::Cnmp;
 use bench_plant::PlantError;
 use bench_plant::zeros::cnmp_map;

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::CampaignError;
-use crate::config::{Config, PlantSettings, Sr4dofSettings, validate};
+use bench_config::{Config, PlantSettings, Sr4dofSettings, validate};
 
 /// Largest number of points; the chirp of each point takes minutes.
 const MAX_POINTS: usize = 10_000;
@@ -15,7 +15,7 @@ const SEEDS: u64 = 1 << 63;
 /// Operating points, one row each, by mass asymmetries, one column each.
 ///
 /// ```
-/// use bench::config::{Source, load};
+/// use bench_config::{Source, load};
 /// use bench::experiment::campaign::Grid;
 ///
 /// let config = load(&Source::default()).unwrap();

@@ -16,8 +16,8 @@ use super::load::{Load, StageModel};
 use super::load_check::{Finding, LoadCheck};
 use super::point::PointResult;
 use super::rest_position::RestPosition;
-use crate::config::{Config, Sr4dofSettings};
 use bench_base::decimal::Decimal;
+use bench_config::{Config, Sr4dofSettings};
 
 /// A question to the operator.
 #[derive(Clone, Debug, PartialEq)]

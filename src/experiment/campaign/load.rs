@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::CampaignError;
 use super::grid::{MASS_STEP_KG, stage_settings};
-use crate::config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
+use bench_config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
 
 /// Standard gravity in m/s^2.
 const GRAVITY_M_PER_S2: f64 = 9.80665;

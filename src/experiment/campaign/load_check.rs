@@ -1,6 +1,6 @@
 //! Checks the load of the stage by its rest position, by a displacement that the operator measured, and by its modes.
 //!
-//! Limits of the X probe (see [`crate::config::Sr4dofSettings::holding_force_n`]): the rest position in X does not depend on the
+//! Limits of the X probe (see [`bench_config::Sr4dofSettings::holding_force_n`]): the rest position in X does not depend on the
 //! load in Y. A change of it therefore reveals a misaligned cable, not a missing weight. The operator measures the displacement
 //! in Y with a gauge, or it follows from the modes of the chirp: u and v depend on the operating point and on the masses.
 
@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::error::CampaignError;
 use super::load::{Load, StageModel};
 use super::rest_position::RestPosition;
-use crate::config::{PlantSettings, Sr4dofSettings};
 use bench_base::decimal::Decimal;
+use bench_config::{PlantSettings, Sr4dofSettings};
 use bench_plant::{ModalModel, Mode, Sign};
 
 /// A difference of more standard deviations is not noise; noise alone exceeds it once in two million cases.

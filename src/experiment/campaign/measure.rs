@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{CampaignError, file_error};
 use super::point::{PointResult, analyse_point, sequence_result};
-use crate::config::Config;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
 use crate::experiment::prediction::predicted_extremes;
@@ -17,6 +16,7 @@ use crate::experiment::sequential::{
     SequenceEnd, SequenceLimits, default_max_motion_s, until_decided,
 };
 use bench_base::checkpoint::FileAction;
+use bench_config::Config;
 
 /// How each point is measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

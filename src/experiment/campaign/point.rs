@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::load_check::LoadCheck;
-use crate::config::Config;
 use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::run::Run;
 use crate::experiment::sequential::Sequence;
 use crate::recording::{Recording, RecordingError};
+use bench_config::Config;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::Cnmp;
 

@@ -1,6 +1,6 @@
 //! The region of operating points and asymmetries in which the model with damping has CNMP zeros.
 
-use crate::config::{PlantSettings, Sr4dofSettings};
+use bench_config::{PlantSettings, Sr4dofSettings};
 use bench_plant::PlantError;
 use bench_plant::zeros::{cnmp_pairs, damped_zeros};
 

@@ -14,7 +14,6 @@ use super::recommend::Tolerances;
 use super::rest_position::RestPosition;
 use super::store::{OpenedStore, Store};
 use super::visit_order::visit_order;
-use crate::config::Config;
 use crate::experiment::description::Description;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
@@ -24,6 +23,7 @@ use crate::experiment::runner::{Runner, Setup, close};
 use crate::recording::Recording;
 use crate::rt::arming::Trip;
 use bench_base::progress::Progress;
+use bench_config::Config;
 
 /// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.
 pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;

@@ -16,11 +16,11 @@ use super::error::{CampaignError, file_error};
 use super::grid::{Grid, GridPoint};
 use super::measure::Method;
 use super::point::PointResult;
-use crate::config::Config;
 use bench_base::atomic_file::write_durable;
 use bench_base::checkpoint::{FileAction, checksum, differences, lock};
 use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
 use bench_base::locked::Locked;
+use bench_config::Config;
 
 const FORMAT: &str = "bench campaign 1";
 /// Largest number of differences that are listed.

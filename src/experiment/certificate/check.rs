@@ -6,9 +6,9 @@ use super::condition::{Checked, Subject};
 use super::error::CertificateError;
 use super::file::{Certificate, CertifiedLoad, Digests, sha256};
 use super::signs::{SignAgreement, SignCheck};
-use crate::config::Config;
 use crate::experiment::plan_error::PlanError;
 use bench_base::decimal::Decimal;
+use bench_config::Config;
 use bench_control::ControllerText;
 use bench_plant::ModalModel;
 

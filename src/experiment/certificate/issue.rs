@@ -6,12 +6,12 @@ use super::file::{
     Certificate, CertifiedDevices, CertifiedLoad, CertifiedLoop, CertifiedMode, CertifiedResponse,
     CertifiedVerdict, Digests, FORMAT, sha256,
 };
-use crate::config::Config;
 use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::plan::{CALIBRATION, KIND, RunKind};
 use crate::experiment::plan_error::PlanError;
 use crate::recording::Recording;
+use bench_config::Config;
 use bench_control::ControllerText;
 use bench_identify::Frf;
 

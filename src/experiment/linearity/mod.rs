@@ -7,7 +7,7 @@ use super::plan::Plan;
 use super::prediction::predicted_extremes;
 use super::run::Run;
 use super::runner::Runner;
-use crate::config::{Config, validate};
+use bench_config::{Config, validate};
 use bench_excitation::Extremes;
 use bench_identify::modal::FittedMode;
 

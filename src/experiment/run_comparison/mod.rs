@@ -13,7 +13,7 @@ mod run_result;
 
 use serde::Serialize;
 
-use crate::config::{SettingDifference, differences};
+use bench_config::{SettingDifference, differences};
 
 pub use difference::{Difference, FAMILY_FALSE_ALARM};
 pub use figures::{Figure, FigureDifference};

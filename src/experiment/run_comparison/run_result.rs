@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 
-use crate::config::Config;
 use crate::experiment::analysis::{Analysis, AnalysisProgress, analyse_with_progress, cautions};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::control_run::{ControlRun, control_run};
@@ -11,6 +10,7 @@ use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::{Plan, RunKind};
 use crate::recording::Recording;
+use bench_config::Config;
 use bench_identify::modal::{FittedMode, ModalFit};
 use bench_identify::verdict::Cnmp;
 

@@ -2,11 +2,11 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use super::*;
-use crate::config::{Purpose, Source, load};
 use crate::experiment::MarginError;
 use crate::experiment::analyse;
 use crate::experiment::certificate::{CertificateError, CertificateText, ResponseFile, certify};
 use crate::experiment::stage_check::StageCheckError;
+use bench_config::{Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
 /// A loop on devices that do not exist.

@@ -2,11 +2,11 @@
 //! (`shape.current_ratio`).
 
 use super::shot::Shot;
-use crate::config::Config;
 use crate::experiment::amplitude_plan::{limit_travel, shape_travel_m};
 use crate::experiment::error::ExperimentError;
 use crate::experiment::prediction::extremes;
 use bench_base::units::hz;
+use bench_config::Config;
 use bench_excitation::{AmplitudePoint, CurrentLimit, shaped_amplitude};
 use bench_identify::modal::{MeasurementChain, ModalFit};
 

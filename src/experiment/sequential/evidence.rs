@@ -3,13 +3,13 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use crate::config::Config;
 use crate::experiment::analysis::{
     Analysis, AnalysisPhase, ModalStep, cautions, estimated, run_signals_of,
 };
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::read_run::open_with_signals;
 use crate::experiment::response_estimate::ResponseEstimate;
+use bench_config::Config;
 use bench_identify::verdict::Certainty;
 use bench_identify::{Frf, FrfDatum, best_of};
 

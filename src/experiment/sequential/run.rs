@@ -4,7 +4,6 @@ use super::amplitude::first_config;
 use super::planner::{PlannedShot, SequentialExperiment, Step};
 use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
-use crate::config::{Config, validate};
 use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
@@ -12,6 +11,7 @@ use crate::experiment::plan::Plan;
 use crate::experiment::prediction::predicted_extremes;
 use crate::experiment::run::Run;
 use crate::experiment::runner::close;
+use bench_config::{Config, validate};
 
 /// The default limit of the motion, in lengths of the first shot.
 const DEFAULT_LIMIT: f64 = 20.0;

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::config::Config;
 use crate::experiment::error::ExperimentError;
 use bench_base::units::hz;
+use bench_config::Config;
 use bench_excitation::{AmplitudePoint, ExcitationKind, Sweep};
 use bench_plant::ModalModel;
 

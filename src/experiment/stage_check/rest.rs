@@ -13,8 +13,8 @@
 use serde::Serialize;
 
 use super::shot::Shot;
-use crate::config::Config;
 use crate::experiment::certificate::LoadedCertificate;
+use bench_config::Config;
 use bench_control::ClosedLoop;
 
 /// Part of the absolute bound of the residual monitor that is left to the vibration.

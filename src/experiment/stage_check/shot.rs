@@ -9,8 +9,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::Complex;
 
-use crate::config::Config;
 use crate::experiment::certificate::{CertifiedMode, LoadedCertificate};
+use bench_config::Config;
 use bench_control::ClosedLoop;
 use bench_excitation::{StageCheckSettings, Tone};
 use bench_identify::Frf;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::evidence::FrfEvidence;
-use crate::config::Config;
+use bench_config::Config;
 use bench_control::tuning::{
     Binding, ConvexBound, Design, DesignTask, Goal, PlantFigures, Requirements,
 };

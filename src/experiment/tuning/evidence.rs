@@ -4,11 +4,11 @@ use serde::Serialize;
 
 use super::error::TuneSourceError;
 use super::identified::{IdentifiedFrf, ModeRole};
-use crate::config::Config;
 use crate::experiment::measured_frf::FrfError;
 use crate::experiment::measured_margins::{MeasuredLoopMargins, margins_around};
 use crate::experiment::response_points::points;
 use bench_base::units::hz;
+use bench_config::Config;
 use bench_control::measured::{MeasuredLoop, OutsideBand, Stability};
 use bench_control::tuning::DISC_SIGMAS_95;
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};

@@ -5,10 +5,10 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 use super::error::TuneSourceError;
-use crate::config::{Config, PlantSettings};
 use crate::experiment::measured_frf::MeasuredFrf;
 use crate::experiment::response_points::variance;
 use bench_base::numeric::to_four_decimals;
+use bench_config::{Config, PlantSettings};
 use bench_identify::{Frf, FrfDatum};
 
 /// A measured frequency response, from command (A) to reading (m), with the data for a fit.

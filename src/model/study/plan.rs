@@ -10,8 +10,8 @@ use serde_json::Value;
 
 use super::counter::Counter;
 use super::{Deviation, StudyError, Tolerance};
-use crate::config::{Config, PlantSettings, validate};
 use bench_base::nearest::nearest;
+use bench_config::{Config, PlantSettings, validate};
 
 /// Settings that may vary at once: the classes of all pairs of them take less than 40 MB.
 const MOST_VARIED: usize = 64;
@@ -279,7 +279,7 @@ fn leaves(path: &str, value: &Value, found: &mut Vec<(String, Value)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use bench_config::{Source, load};
 
     fn plan(draws: u64, seed: u64) -> Plan {
         let source = Source {

@@ -3,7 +3,6 @@
 use super::comparison::signals_section;
 use super::page::{named, table_section, with_interval};
 use super::run_facts;
-use crate::config::Config;
 use crate::experiment::calibration::StaircaseResult;
 use crate::experiment::campaign::RestPosition;
 use crate::experiment::stage_check::{PhaseComparison, StageCheck};
@@ -13,6 +12,7 @@ use crate::report::ReportError;
 use crate::report::conditions::lines;
 use crate::report::html::{escaped, facts, row, section};
 use crate::report::number::plain;
+use bench_config::Config;
 use bench_identify::Estimate;
 
 /// A recorded run with its results.

@@ -3,7 +3,6 @@
 use super::comparison::step_picture;
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
-use crate::config::Config;
 use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use crate::recording::Recording;
 use crate::report::conditions::{joined, lines};
@@ -13,6 +12,7 @@ use crate::report::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
     loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
 };
+use bench_config::Config;
 use bench_identify::SIGMAS_95;
 
 const SIGNALS_CAPTION: &str =

@@ -1,11 +1,11 @@
 //! Sections of a page about the run itself: its scheduling and its configuration.
 
 use super::page::{self, named};
-use crate::config::{Config, SettingDifference, changed_settings};
 use crate::experiment::{Description, Ending, TripSummary};
 use crate::recording::{Recording, event_text};
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::{joined, plant_conditions};
+use bench_config::{Config, SettingDifference, changed_settings};
 
 /// Entries of the recording's metadata that the page shows.
 const METADATA: [&str; 11] = [

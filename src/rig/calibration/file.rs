@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::config::{
+use bench_config::{
     CalibrationSettings, Config, ConfigError, MIN_PROBE_GAIN, OnInvalidCalibration, is_near_one,
 };
 

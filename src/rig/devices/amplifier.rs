@@ -7,8 +7,8 @@ use bench_hal::can::bus::{Host, PortError, SocketPort, SystemHost};
 use bench_hal::can::drive::OpenError;
 use bench_hal::can::emulator::EmulatedAmplifier;
 
-use crate::config::{AmplifierDevice, AmplifierSettings, LoopSettings};
 use bench_base::thread_priority::device_thread_setup;
+use bench_config::{AmplifierDevice, AmplifierSettings, LoopSettings};
 
 /// An amplifier that cannot be opened.
 #[derive(Debug, thiserror::Error)]
@@ -92,7 +92,7 @@ pub fn open(
     amplifier: &AmplifierSettings,
     servo: &LoopSettings,
 ) -> Result<OpenAmplifier, AmplifierError> {
-    let device = amplifier.device.can().ok_or(AmplifierError::Simulated)?;
+    let device = can_amplifier(&amplifier.device).ok_or(AmplifierError::Simulated)?;
     let can = device.address();
     let port = SocketPort::open(can.interface, can.bit_rate)?;
     let host = SystemHost::new(port).prepared(device_thread_setup(servo.priority));
@@ -101,37 +101,26 @@ pub fn open(
 
 /// Refuses invalid settings, and traffic that the bus cannot carry.
 pub fn check(amplifier: &AmplifierSettings, servo: &LoopSettings) -> Result<(), AmplifierError> {
-    match amplifier.device.can() {
+    match can_amplifier(&amplifier.device) {
         Some(device) => device.check(Requirements::new(amplifier, servo)),
         None => Ok(()),
     }
 }
 
-impl AmplifierDevice {
-    /// The name of the kind, as in a configuration.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            AmplifierDevice::Simulated(_) => "simulated",
-            AmplifierDevice::Canopen(_) => "canopen",
-            AmplifierDevice::Vesc(_) => "vesc",
-        }
+/// The amplifier on a CAN bus; `None` for the simulated one.
+pub fn can_amplifier(device: &AmplifierDevice) -> Option<&dyn CanAmplifier> {
+    match device {
+        AmplifierDevice::Simulated(_) => None,
+        AmplifierDevice::Canopen(device) => Some(device),
+        AmplifierDevice::Vesc(device) => Some(device),
     }
+}
 
-    /// The amplifier on a CAN bus; `None` for the simulated one.
-    pub fn can(&self) -> Option<&dyn CanAmplifier> {
-        match self {
-            AmplifierDevice::Simulated(_) => None,
-            AmplifierDevice::Canopen(device) => Some(device),
-            AmplifierDevice::Vesc(device) => Some(device),
-        }
-    }
-
-    /// Resolution of the current in amperes; 0 for a continuous current.
-    pub fn current_step_a(&self) -> f64 {
-        match self {
-            AmplifierDevice::Simulated(device) => device.current_step_a,
-            AmplifierDevice::Canopen(device) => device.current_step_a(),
-            AmplifierDevice::Vesc(device) => device.current_step_a(),
-        }
+/// Resolution of the current in amperes; 0 for a continuous current.
+pub fn current_step_a(device: &AmplifierDevice) -> f64 {
+    match device {
+        AmplifierDevice::Simulated(device) => device.current_step_a,
+        AmplifierDevice::Canopen(device) => device.current_step_a(),
+        AmplifierDevice::Vesc(device) => device.current_step_a(),
     }
 }

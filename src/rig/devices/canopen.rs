@@ -10,7 +10,7 @@ use bench_hal::can::emulator::{EmulatedAmplifier, EmulatedDrive, EmulatedDriveSe
 use bench_hal::can::scale::Reference;
 
 use super::amplifier::{AmplifierError, CanAddress, CanAmplifier, OpenAmplifier, Requirements};
-use crate::config::{CanopenSettings, CanopenTimeouts, ExchangeSettings, OnCommunicationLoss};
+use bench_config::{CanopenSettings, CanopenTimeouts, ExchangeSettings, OnCommunicationLoss};
 
 impl CanAmplifier for CanopenSettings {
     fn address(&self) -> CanAddress<'_> {

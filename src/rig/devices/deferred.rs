@@ -16,7 +16,7 @@ use bench_hal::{
     Tick,
 };
 
-use crate::config::LoopSettings;
+use bench_config::LoopSettings;
 
 /// The delay between computation and output cannot be enforced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

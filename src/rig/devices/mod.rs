@@ -20,13 +20,13 @@ use std::time::{Duration, Instant};
 use bench_hal::serial::{Note, SerialProbe, StatisticsHandle};
 use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 
-use crate::config::{AmplifierDevice, Config, ProbeDevice};
 use crate::rig::simulated::SimulatedRig;
+use bench_config::{AmplifierDevice, Config, ProbeDevice};
 use bench_plant::PlantError;
 
 use deferred::{ComputingDelayError, OutputTiming};
 
-pub use amplifier::{AmplifierError, CanAmplifier, Requirements};
+pub use amplifier::{AmplifierError, CanAmplifier, Requirements, can_amplifier, current_step_a};
 pub use probe::ProbeError;
 pub use reservation::{DeviceInUse, Reservation};
 

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use bench_hal::serial::{self, SerialError, SerialProbe};
 
-use crate::config::{ProbeDevice, ProbeSettings};
 use bench_base::thread_priority::device_thread_setup;
+use bench_config::{ProbeDevice, ProbeSettings};
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]

@@ -14,7 +14,8 @@ use nix::sys::socket::{
     AddressFamily, SockFlag, SockType, UnixAddr, connect, getsockopt, socket, sockopt,
 };
 
-use crate::config::Config;
+use super::amplifier::can_amplifier;
+use bench_config::Config;
 
 /// Longest abstract name, without the zero byte before it.
 const MAX_NAME_BYTES: usize = 107;
@@ -66,7 +67,7 @@ impl Reservation {
 
 /// The real devices of a configuration: for the operator, and as the name of the reservation.
 fn devices(config: &Config) -> Vec<(String, String)> {
-    let amplifier = config.amplifier.device.can().map(|can| {
+    let amplifier = can_amplifier(&config.amplifier.device).map(|can| {
         let address = can.address();
         let (interface, node) = (address.interface, address.node);
         let shown = format!("node {node} on the CAN interface {interface}");
@@ -123,7 +124,7 @@ fn holder(name: &[u8]) -> Option<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Purpose, Source, load};
+    use bench_config::{Purpose, Source, load};
 
     fn lab(set: String) -> Config {
         let source = Source {

@@ -8,7 +8,7 @@ use bench_hal::can::emulator::{EmulatedAmplifier, EmulatedVesc};
 use bench_hal::can::vesc::{self, Vesc};
 
 use super::amplifier::{AmplifierError, CanAddress, CanAmplifier, OpenAmplifier, Requirements};
-use crate::config::VescSettings;
+use bench_config::VescSettings;
 
 /// The current is switched off after this time without a command, in seconds, or after [`PERIODS_LOST`] periods of a slow loop.
 const COMMAND_LOST_S: f64 = 0.02;

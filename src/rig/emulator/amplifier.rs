@@ -13,9 +13,9 @@ use super::event_log::{CurrentChange, CurrentMonitor, EventLog, LogEntry, LogEve
 use super::fault::AmplifierFault;
 use super::stage::{Stage, seconds};
 use super::{EmulatedDevice, EmulatorError};
-use crate::config::AmplifierDevice;
-use crate::rig::devices::amplifier::CanAddress;
+use crate::rig::devices::amplifier::{CanAddress, can_amplifier};
 use bench_base::thread_priority::device_thread_setup;
+use bench_config::AmplifierDevice;
 
 /// Serves an emulated amplifier; dropping it takes the amplifier from the bus.
 pub struct AmplifierServer {
@@ -76,7 +76,7 @@ impl AmplifierServer {
         log: EventLog,
         start: Instant,
     ) -> Result<AmplifierServer, EmulatorError> {
-        let can = device.can().ok_or_else(simulated)?.address();
+        let can = can_amplifier(device).ok_or_else(simulated)?.address();
         let port = SocketPort::open(can.interface, can.bit_rate)?;
         let claim = claim(can)?;
         let host = SystemHost::since(port, start).prepared(device_thread_setup(loop_priority));
@@ -94,7 +94,7 @@ impl AmplifierServer {
         stage: Stage,
         log: EventLog,
     ) -> Result<AmplifierServer, EmulatorError> {
-        let emulated = device.can().ok_or_else(simulated)?.emulate();
+        let emulated = can_amplifier(device).ok_or_else(simulated)?.emulate();
         let counters = Arc::<AmplifierCounters>::default();
         let observer = observer(stage, log, Arc::clone(&counters));
         let task = AmplifierTask::start_observed(&*host, Arc::clone(&emulated), observer);

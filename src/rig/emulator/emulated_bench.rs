@@ -11,7 +11,8 @@ use super::event_log::{EventLog, LogEntry, LogEvent};
 use super::fault::{AmplifierFault, EmulatedFault, FaultRequest};
 use super::stage::seconds;
 use super::{AmplifierServer, EmulatedDevice, EmulatorError, ProbeEndpoint, ProbeServer, Stage};
-use crate::config::{AmplifierDevice, Config};
+use crate::rig::devices::can_amplifier;
+use bench_config::{AmplifierDevice, Config};
 
 /// The devices to emulate, and their interfaces.
 #[derive(Clone, Debug, Default)]
@@ -270,7 +271,7 @@ fn not_emulated(request: &FaultRequest, device: EmulatedDevice) -> EmulatorError
 }
 
 fn amplifier_place(device: &AmplifierDevice, kind: &str) -> String {
-    match device.can() {
+    match can_amplifier(device) {
         Some(can) => {
             let can = can.address();
             format!("{kind} node {} on {}", can.node, can.interface)

@@ -10,9 +10,9 @@ use bench_hal::serial::{Mounting, Note, PortSettings, SerialError};
 use super::link::Link;
 use super::stage::Stage;
 use super::{EmulatedDevice, EmulatorError};
-use crate::config::{Config, ProbeSettings};
 use crate::rig::simulated::Sensor;
 use bench_base::thread_priority::device_thread_setup;
+use bench_config::{Config, ProbeSettings};
 
 /// Measurements per second of a streaming probe, if the configuration does not state its rate.
 const STREAM_HZ: f64 = 4000.0;

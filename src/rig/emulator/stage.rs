@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::config::Config;
 use crate::rig::simulated::LiveStage;
+use bench_config::Config;
 use bench_plant::PlantError;
 
 /// A stage in real time; clones refer to the same stage. Times are nanoseconds of one clock.

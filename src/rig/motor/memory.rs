@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::moment::Moment;
 use super::thermal::ThermalModel;
-use crate::config::{AmplifierSettings, Config, MotorSettings};
+use crate::rig::devices::can_amplifier;
 use bench_base::atomic_file::write_durable;
 use bench_base::checkpoint::checksum;
 use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
+use bench_config::{AmplifierSettings, Config, MotorSettings};
 
 /// A file of the motor that cannot be used. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
@@ -276,7 +277,7 @@ fn state_folder() -> Result<PathBuf, MotorMemoryError> {
 /// `motor-canopen-can0-1.json`: the address of the amplifier, because the motor is connected to it.
 fn file_name(amplifier: &AmplifierSettings) -> String {
     let device = &amplifier.device;
-    let address = device.can().map(|can| can.address());
+    let address = can_amplifier(device).map(|can| can.address());
     let address = address.map_or(String::new(), |can| {
         let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '.');
         let interface = can.interface.replace(|c: char| !is_plain(c), "_");
@@ -288,7 +289,7 @@ fn file_name(amplifier: &AmplifierSettings) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use bench_config::{Source, load};
 
     const DRIVE: &str = "canopen 1";
 

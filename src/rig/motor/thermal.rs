@@ -1,6 +1,6 @@
 //! The thermal model of the motor between runs, and its prediction over a run.
 
-use crate::config::MotorSettings;
+use bench_config::MotorSettings;
 
 /// First-order model of the winding: thermal' = (i^2 - thermal)/tau, with the thermal state in A^2.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! The linear model of the simulated stage, with what the configured model does not contain.
 
-use crate::config::{PlantSettings, SimSettings};
+use bench_config::{PlantSettings, SimSettings};
 use bench_plant::UnmodelledMode;
 use bench_plant::{ModalModel, Mode, PlantError};
 

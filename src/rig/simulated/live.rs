@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::stage::Stage;
 use super::trajectory::{Interval, Trajectory};
-use crate::config::Config;
+use bench_config::Config;
 use bench_plant::PlantError;
 
 /// Length of a step. It is a third of a radian of the fastest mode at 284 Hz; the cubic between two steps then has a relative
@@ -75,7 +75,7 @@ impl LiveStage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use bench_config::{Source, load};
 
     fn quiet() -> LiveStage {
         let mut config = load(&Source::default()).expect("the profile is valid");

@@ -20,7 +20,8 @@ mod trajectory;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use std::task::Poll;
 
-use crate::config::Config;
+use super::devices::current_step_a;
+use bench_config::Config;
 use bench_plant::PlantError;
 use probe::Probe;
 use stage::Stage;
@@ -34,7 +35,7 @@ pub use spectra::DisturbanceSpectra;
 /// The simulated amplifier, stage and probe.
 ///
 /// ```
-/// use bench::config::{Source, load};
+/// use bench_config::{Source, load};
 /// use bench::rig::simulated::SimulatedRig;
 /// use bench_hal::{DisplacementProbe, Tick, Validity};
 ///
@@ -72,7 +73,7 @@ impl SimulatedRig {
             accepted_a: 0.0,
             current_limit_a: config.amplifier.current_limit_a,
             max_change_a: config.amplifier.slew_limit_a_per_s * config.servo.period_s(),
-            current_step_a: config.amplifier.device.current_step_a(),
+            current_step_a: current_step_a(&config.amplifier.device),
             probe: Probe::new(&config.probe, &config.sim, &config.servo, is_synchronous),
             is_synchronous,
             tick: None,

@@ -1,7 +1,7 @@
 //! The plant with constraints that are not linearised.
 
 use super::drive::Drive;
-use crate::config::PlantSettings;
+use bench_config::PlantSettings;
 use bench_plant::{Disturbance, ModalModel, PlantError, QuadraticSr4dof, QuadraticState, build};
 
 /// Largest phase of the fastest mode per step, in radians. The relative error of the phase is then (0.02)^4/120 = 1.3e-9, and

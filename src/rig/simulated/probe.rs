@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use bench_hal::{Reading, Validity};
 
 use super::noise::Gaussian;
-use crate::config::{LoopSettings, ProbeSettings, SimSettings};
+use bench_config::{LoopSettings, ProbeSettings, SimSettings};
 
 /// Relative difference between the clock of a free-running probe and that of the loop. The readings then take all ages, as with
 /// two real oscillators; the ratio is irrational, so that the ages are uniformly distributed.

@@ -17,8 +17,8 @@ use std::f64::consts::PI;
 use nalgebra::Complex;
 
 use super::modes;
-use crate::config::Config;
 use bench_base::units::rad_s;
+use bench_config::Config;
 use bench_plant::FloorLine;
 use bench_plant::{Mode, PlantError};
 
@@ -98,7 +98,7 @@ fn sinc(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Source, load};
+    use bench_config::{Source, load};
 
     #[test]
     fn integral_of_a_line_is_its_mean_square() {

@@ -8,7 +8,7 @@ use super::drive::Drive;
 use super::floor::Line;
 use super::noise::Gaussian;
 use super::nonlinear_plant::NonlinearPlant;
-use crate::config::{Config, Geometry, SimSettings};
+use bench_config::{Config, Geometry, SimSettings};
 use bench_plant::{DiscretePlant, Disturbance, Mode, PlantError, PlantState};
 
 /// Largest step during contact with the stop. The contact frequency with the smallest effective mass is

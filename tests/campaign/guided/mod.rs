@@ -7,7 +7,6 @@ mod progress;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::campaign::{
     CampaignError, Grid, GridPoint, GuidedCampaign, Load, LoadCheck, LoadedRig, Operator,
     PointResult, Question, Reply, RestPosition, StageModel, analyse_point, visit_order,
@@ -16,6 +15,7 @@ use bench::experiment::{Plan, run};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
+use bench_config::{Config, Purpose, Source, load};
 use bench_hal::Validity;
 
 use crate::campaign::faulty_rig::{Fault, FaultyRig};

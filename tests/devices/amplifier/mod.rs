@@ -6,15 +6,15 @@ mod vesc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::config::{Config, Source, load};
 use bench::experiment::Plan;
-use bench::rig::devices::Requirements;
 use bench::rig::devices::deferred::OutputTiming;
+use bench::rig::devices::{Requirements, can_amplifier};
 use bench::rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
 use bench::rt::record::{EventKind, LoopMessage};
 use bench::rt::servo::Request;
+use bench_config::{Config, Source, load};
 use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::faults::*;
 use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Validity};
@@ -106,7 +106,7 @@ pub struct Lab {
 
 /// The driver, opened on the bus.
 fn driver(config: &Config, host: &SimulatedHost) -> Box<dyn CurrentAmplifier> {
-    let device = config.amplifier.device.can().expect("a real device");
+    let device = can_amplifier(&config.amplifier.device).expect("a real device");
     let requirements = Requirements::new(&config.amplifier, &config.servo);
     let opened = device.open(requirements, Box::new(host.clone()));
     opened.expect("it opens").0

@@ -3,10 +3,10 @@ mod amplifier;
 mod current;
 mod probe;
 
-use bench::config::Config;
 use bench::rt::arming::{State, Trip};
 use bench::rt::record::{EventKind, flag};
 use bench::rt::servo::Request;
+use bench_config::Config;
 use bench_hal::Validity;
 
 use crate::safety::faulty_rig::Fault;

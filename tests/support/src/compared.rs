@@ -8,10 +8,10 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use bench::config::{Config, Purpose, Source, load};
 use bench::experiment::Plan;
 use bench::experiment::run_comparison::{Comparison, Difference, RunResult};
 use bench::recording::Recording;
+use bench_config::{Config, Purpose, Source, load};
 
 use crate::simulated;
 

@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
-use bench::config::{Config, Source, load};
 use bench::recording::{Header, Recorder, Recording};
 use bench::rig::calibration::Correction;
 use bench::rt::arming::State;
@@ -17,6 +16,7 @@ use bench::rt::request::RequestSender;
 use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
+use bench_config::{Config, Source, load};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,

@@ -2,11 +2,11 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use bench::config::Config;
 use bench::experiment::sequential::{
     SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
 };
 use bench::experiment::{Analysis, Plan, Runner, Setup, close};
+use bench_config::Config;
 
 /// A sequence whose recordings are complete.
 pub struct Ended {

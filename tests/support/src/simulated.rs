@@ -1,12 +1,12 @@
 //! Runs on the simulated stage, recorded and analysed as by the command line.
 use std::path::{Path, PathBuf};
 
-use bench::config::Config;
 use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::recording::Recording;
 use bench::rig::simulated::SimulatedRig;
 use bench::rt::servo_run::RunOutcome;
 use bench::rt::thread::Pace;
+use bench_config::Config;
 
 /// The recording of a run by `plan`, and how the run ended.
 pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {

@@ -1,6 +1,6 @@
 //! The default excitation on the simulated stage, without loop and recording.
-use bench::config::Config;
 use bench::rig::simulated::SimulatedRig;
+use bench_config::Config;
 use bench_excitation::{Chirp, Excitation};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use bench_identify::Signals;

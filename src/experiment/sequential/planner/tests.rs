@@ -1,9 +1,9 @@
 use std::sync::atomic::AtomicBool;
 
 use super::*;
-use crate::config::{Purpose, Source, load};
 use crate::experiment::plan::Plan;
 use crate::experiment::runner::{Runner, Setup};
+use bench_config::{Purpose, Source, load};
 use bench_identify::verdict::{DecisiveQuantity, UncertainZero, zeros};
 
 /// A stage beside the border of the region with CNMP zeros, with a noise of 8 um.

@@ -17,6 +17,17 @@ pub enum AmplifierDevice {
     Vesc(VescSettings),
 }
 
+impl AmplifierDevice {
+    /// The name of the kind, as in a configuration.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            AmplifierDevice::Simulated(_) => "simulated",
+            AmplifierDevice::Canopen(_) => "canopen",
+            AmplifierDevice::Vesc(_) => "vesc",
+        }
+    }
+}
+
 /// The amplifier of the simulated stage.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -163,7 +163,7 @@ pub(super) fn sets(sets: &[String]) -> Result<Layer, ConfigError> {
 }
 
 /// All texts in the value of `KEY=VALUE`, as a configuration reads them; none if it is no such assignment.
-pub(crate) fn texts_of_set(set: &str) -> Vec<String> {
+pub fn texts_of_set(set: &str) -> Vec<String> {
     let mut texts = Vec::new();
     if let Ok((_, value)) = key_and_value(set) {
         texts_in(&value, &mut texts);

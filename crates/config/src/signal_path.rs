@@ -23,7 +23,7 @@ mod tests {
     use bench_plant::{LoopPlant, Mode};
     use nalgebra::{Complex, DMatrix};
 
-    use crate::config::{Config, Source, load};
+    use crate::{Config, Source, load};
 
     fn config(sets: &[&str]) -> Config {
         let sets = sets.iter().map(|set| set.to_string()).collect();

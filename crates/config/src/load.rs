@@ -19,12 +19,12 @@ use bench_settings::{ConfigError, MAX_ERRORS};
 /// A profile or file, and single settings that override it.
 ///
 /// ```
-/// use bench::config::{Source, load};
+/// use bench_config::{Source, load};
 ///
 /// let sets = vec!["loop.rate_hz=1000".to_string()];
 /// let config = load(&Source { sets, ..Source::default() })?;
 /// assert_eq!(config.servo.period_s(), 1e-3);
-/// # Ok::<(), bench::config::ConfigError>(())
+/// # Ok::<(), bench_config::ConfigError>(())
 /// ```
 #[derive(Clone, Debug, Default)]
 pub struct Source {
@@ -104,7 +104,7 @@ fn sets_of(layers: &[Layer]) -> Option<&Table> {
 }
 
 /// Checks a configuration that was changed after it was loaded.
-pub(crate) fn validate(config: &Config) -> Result<(), ConfigError> {
+pub fn validate(config: &Config) -> Result<(), ConfigError> {
     let value = Value::try_from(config).map_err(|e| ConfigError::Refused(vec![e.to_string()]))?;
     let mut findings = check(&schema(), &value, renamed::RENAMED);
     findings.extend(cross_checks(config, Purpose::Model));
