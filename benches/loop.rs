@@ -14,7 +14,6 @@ use std::time::{Duration, Instant};
 
 use bench::experiment::{Plan, residuals, rig_model};
 use bench::recording::{self, DiskWatch, Header, Recorder};
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::Virtual;
 use bench::rt::interlock::Interlocks;
 use bench::rt::live_loop::run_to_end;
@@ -28,6 +27,7 @@ use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench_config::{Config, ControlSettings, Source, load};
 use bench_control::{Controller, ControllerText};
 use bench_hal::{Reading, Tick, Validity};
+use bench_rig::simulated::SimulatedRig;
 use criterion::{Criterion, criterion_group, criterion_main};
 use rtrb::{Consumer, RingBuffer};
 

@@ -3,9 +3,9 @@
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use bench::rig::emulator::Stage;
 use bench_hal::serial::{emulator::*, *};
 use bench_hal::{DisplacementProbe, Tick};
+use bench_rig::emulator::Stage;
 
 const COUNT_M: f64 = 632.8e-9 / 64.0; // helium-neon laser, interpolated 64 times
 /// Both sides of the line, with an unfinished line of text.

@@ -15,8 +15,8 @@
 //! | two close modes: veering, conditions and propositions of Chapter 4 | [`model::veering`] |
 //! | tolerances: the probability of CNMP zeros | [`model::study`] |
 //! | excitations, references, and their prediction | [`bench_excitation`] |
-//! | the simulated stage | [`rig::simulated`] |
-//! | real devices, their emulators, calibration | [`rig::devices`], [`rig::emulator`], [`rig::calibration`] |
+//! | the simulated stage | [`bench_rig::simulated`] |
+//! | real devices, their emulators, calibration | [`bench_rig::devices`], [`bench_rig::emulator`], [`bench_rig::calibration`] |
 //! | estimation of a frequency response | [`bench_identify`] |
 //! | modal fit and model order | [`bench_identify::modal`] |
 //! | the decision about CNMP zeros | [`bench_identify::verdict`] |
@@ -61,5 +61,4 @@ pub mod export;
 pub mod model;
 pub mod recording;
 pub mod report;
-pub mod rig;
 pub mod rt;

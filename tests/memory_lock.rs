@@ -4,7 +4,6 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::interlock::Interlocks;
 use bench::rt::live_loop::LiveLoop;
 use bench::rt::publisher::Publisher;
@@ -12,6 +11,7 @@ use bench::rt::request::RequestSender;
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench::rt::thread::Pace;
 use bench_config::{Config, Source, load};
+use bench_rig::simulated::SimulatedRig;
 use rtrb::RingBuffer;
 
 /// A test that waits longer than this has failed. It is not a requirement.

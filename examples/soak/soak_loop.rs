@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use bench::experiment::Plan;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::interlock::Interlocks;
 use bench::rt::publisher::Publisher;
 use bench::rt::request::RequestSender;
@@ -14,6 +13,7 @@ use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench::rt::supervision::{ArmLease, LeaseWatch};
 use bench::rt::thread::Pace;
 use bench_config::Config;
+use bench_rig::simulated::SimulatedRig;
 use rtrb::RingBuffer;
 
 use super::faults::Schedule;

@@ -14,14 +14,14 @@ use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
 use crate::experiment::calibration::{self, CalibrationPlan};
 use crate::experiment::{PlanLimits, RunSummary, Runner};
-use crate::rig::calibration::{
-    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
-};
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_base::quantity::Current;
 use bench_config::{Config, OptionSetting, Purpose, warnings};
 use bench_excitation::Extremes;
+use bench_rig::calibration::{
+    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
+};
 
 /// Arguments of the command.
 #[derive(Clone, Debug, clap::Args)]

@@ -19,11 +19,11 @@ use crate::experiment::campaign::{
 };
 use crate::experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
 use crate::report::campaign_picture;
-use crate::rig::devices;
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, Ratio, si};
 use bench_config::{Config, Purpose, profiles};
+use bench_rig::devices;
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];

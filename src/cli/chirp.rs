@@ -24,11 +24,11 @@ use crate::experiment::{
 };
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
-use crate::rig::devices;
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
 use bench_config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
 use bench_excitation::Extremes;
+use bench_rig::devices;
 
 /// The bench and its excitation.
 #[derive(Clone, Debug, clap::Args)]

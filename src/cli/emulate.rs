@@ -14,12 +14,12 @@ use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_message, print_note};
 use crate::experiment::StopSignals;
-use crate::rig::emulator::{
+use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
+use bench_config::{Config, OptionSetting, Purpose};
+use bench_rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,
 };
-use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
-use bench_config::{Config, OptionSetting, Purpose};
 
 /// Period at which commands and planned faults are handled.
 const PERIOD: Duration = Duration::from_millis(2);

@@ -3,9 +3,9 @@
 use clap::Args;
 
 use super::error::CliError;
-use crate::rig::devices;
 use bench_base::quantity::{Measure, OperatingPoint, Ratio};
 use bench_config::{Config, OptionSetting, PlantSettings, Purpose, Source, load};
+use bench_rig::devices;
 
 /// Which bench.
 #[derive(Clone, Debug, Default, Args)]

@@ -17,10 +17,10 @@ use crate::experiment::{
     self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
     RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
-use crate::rig::motor::{Moment, MotorMemory};
 use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_rig::motor::{Moment, MotorMemory};
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]

@@ -10,8 +10,8 @@ use super::outcome::Outcome;
 use super::output::print_text;
 use super::table::labelled;
 use crate::daemon::{DaemonConfig, ServeOptions, Started, own_socket, serve};
-use crate::rig::devices::is_simulated;
 use bench_config::{Purpose, Source};
+use bench_rig::devices::is_simulated;
 
 /// Address of the page of a demonstration.
 const DEMO_ADDRESS: SocketAddr =

@@ -14,11 +14,11 @@ use crate::experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
     RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
 };
-use crate::rig::motor::Moment;
 use crate::rt::supervision::{ArmLease, StopFlags};
 use crate::rt::thread::{Pace, Scheduling};
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_rig::motor::Moment;
 
 /// Pause between two attempts to open the devices, and between two checks of open devices without a command.
 const RETRY: Duration = Duration::from_secs(2);

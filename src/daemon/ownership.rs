@@ -12,8 +12,8 @@ use super::private_files::{
 use super::run_record::{LastEnd, RunRecord};
 use super::secret::Secret;
 use super::start::{ServeError, ServeOptions};
-use crate::rig::devices::Reservation;
 use bench_base::lock_file::{Holder, LockError, LockFile};
+use bench_rig::devices::Reservation;
 
 /// The locks and files of a daemon. Dropping it removes the files that it made, in the order of the fields.
 #[derive(Debug)]

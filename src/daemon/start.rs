@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use super::private_files::FolderError;
 use super::secret::Secret;
 use super::shared::DaemonConfig;
-use crate::rig::devices::DeviceInUse;
 use bench_base::lock_file::Holder;
+use bench_rig::devices::DeviceInUse;
 
 /// Where the daemon can be reached.
 #[derive(Clone, Debug)]

@@ -12,10 +12,10 @@ use super::can_nodes::{self, BusTraffic};
 use super::finding::{Finding, Severity, Subject};
 use super::report::Report;
 use super::{bus_load, can_interface, drive, vesc};
-use crate::rig::devices::Requirements;
-use crate::rig::devices::canopen::drive_settings;
-use crate::rig::devices::vesc::driver_settings;
 use bench_config::{AmplifierDevice, AmplifierSettings, LoopSettings};
+use bench_rig::devices::Requirements;
+use bench_rig::devices::canopen::drive_settings;
+use bench_rig::devices::vesc::driver_settings;
 
 /// How long the bus is listened to.
 const LISTEN: Duration = Duration::from_millis(300);

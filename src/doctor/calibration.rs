@@ -5,10 +5,10 @@ use std::time::SystemTime;
 use super::drive::DriveFigures;
 use super::finding::{Finding, Subject};
 use super::runs;
-use crate::rig::calibration::{KnownDevices, LoadedCalibration, load_calibration};
-use crate::rig::devices::canopen::identity_text;
-use crate::rig::devices::{SIMULATED, probe, vesc};
 use bench_config::{AmplifierDevice, Config};
+use bench_rig::calibration::{KnownDevices, LoadedCalibration, load_calibration};
+use bench_rig::devices::canopen::identity_text;
+use bench_rig::devices::{SIMULATED, probe, vesc};
 
 /// Evaluates the calibration; `drive` is what a CANopen drive reported. No finding without a calibration.
 pub fn findings(config: &Config, drive: Option<&DriveFigures>) -> Vec<Finding> {

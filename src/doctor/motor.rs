@@ -3,9 +3,9 @@
 use super::finding::{Finding, Severity, Subject};
 use super::report::Report;
 use crate::experiment::{ExperimentError, MotorError, MotorForecast, Plan};
-use crate::rig::devices;
-use crate::rig::motor::{Moment, MotorMemory};
 use bench_config::Config;
+use bench_rig::devices;
+use bench_rig::motor::{Moment, MotorMemory};
 
 /// Examines the stored state. The simulated motor has none.
 pub(super) fn examine(config: &Config, report: &mut Report) {

@@ -7,10 +7,10 @@ use bench_hal::{DisplacementProbe, Reading, Tick, Validity};
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-use crate::rig::devices::first_reading;
 use bench_base::decimal::Decimal;
 use bench_base::numeric::is_within;
 use bench_config::{InterlockSettings, ProbeSettings};
+use bench_rig::devices::first_reading;
 
 /// Duration of the observation.
 const OBSERVED: Duration = Duration::from_secs(1);

@@ -5,10 +5,10 @@ use crate::experiment::certificate::require_evidence;
 use crate::experiment::{
     ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
 };
-use crate::rig::devices;
 use bench_config::Config;
 use bench_control::Margins;
 use bench_excitation::Excitation;
+use bench_rig::devices;
 
 /// The results of the checks of the commands.
 #[derive(Clone, Debug, PartialEq)]

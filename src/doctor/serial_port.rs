@@ -8,7 +8,7 @@ use nix::unistd::{AccessFlags, Gid, Group, User, eaccess, getegid, geteuid, getg
 
 use super::finding::{Finding, Subject, read_line};
 use super::usb::Usb;
-use crate::rig::devices::ProbeError;
+use bench_rig::devices::ProbeError;
 
 const PORT: Subject = Subject::SerialPort;
 /// A longer latency of the adapter is a warning, in milliseconds.

@@ -17,11 +17,11 @@ use super::step_response::{StepResponse, step_response};
 use super::swept_reference;
 use super::tracking::{TrackingMetrics, steady_tick, tracking_metrics};
 use crate::recording::Recording;
-use crate::rig::devices::SIMULATED;
-use crate::rig::simulated::DisturbanceSpectra;
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText, Margins};
+use bench_rig::devices::SIMULATED;
+use bench_rig::simulated::DisturbanceSpectra;
 use nalgebra::Complex;
 
 /// Lowest drawn frequency of the loop as a part of its lowest mode or of its crossover.

@@ -10,12 +10,12 @@ use super::plan_error::PlanError;
 use super::run_error::RunError;
 use super::stage_check::StageCheckError;
 use crate::recording::RecordingError;
-use crate::rig::calibration::CalibrationError;
-use crate::rig::devices::DevicesError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_excitation::ExcitationError;
 use bench_plant::PlantError;
+use bench_rig::calibration::CalibrationError;
+use bench_rig::devices::DevicesError;
 
 /// An experiment that was refused or that failed.
 #[derive(Debug, thiserror::Error)]

@@ -14,12 +14,12 @@
 use std::ops::Range;
 
 use super::closed_signals::ClosedSignals;
-use crate::rig::simulated::DisturbanceSpectra;
 use bench_base::numeric::{linspace, variance_interval};
 use bench_base::units::rad_s;
 use bench_control::ClosedLoop;
 use bench_identify::welch;
 use bench_identify::{IdentifyError, Signals};
+use bench_rig::simulated::DisturbanceSpectra;
 
 /// Length of a segment in seconds, in a record that is long enough.
 const SEGMENT_S: f64 = 2.0;

@@ -3,10 +3,10 @@
 use std::fmt;
 
 use super::plan_error::PlanError;
-use crate::rig::devices;
 use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText, Margins};
 use bench_plant::{LoopPlant, ModalModel};
+use bench_rig::devices;
 
 /// A loop that is refused: too small a margin, or unstable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Why the motor does not allow a run.
 
-use crate::rig::motor::MotorMemoryError;
+use bench_rig::motor::MotorMemoryError;
 
 /// A run that the motor does not allow, or whose wait was stopped. Nothing was moved.
 #[derive(Debug, thiserror::Error)]

@@ -5,11 +5,11 @@ use std::time::SystemTime;
 use super::error::ExperimentError;
 use super::loop_check::Stage;
 use super::plan_error::PlanError;
-use crate::rig::calibration::{CalibrationError, KnownDevices, load_calibration};
-use crate::rig::devices::{SIMULATED, probe};
 use bench_config::Config;
 use bench_control::ControllerText;
 use bench_excitation::ReferenceContext;
+use bench_rig::calibration::{CalibrationError, KnownDevices, load_calibration};
+use bench_rig::devices::{SIMULATED, probe};
 
 /// Refuses a configuration whose controller, reference or calibration cannot be used. Returns what needs attention.
 pub fn check_named_files(config: &Config) -> Result<Vec<String>, ExperimentError> {

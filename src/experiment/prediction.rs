@@ -1,10 +1,10 @@
 //! The extremes of an excitation by the model of the whole rig.
 
 use super::error::ExperimentError;
-use crate::rig::simulated;
 use bench_config::Config;
 use bench_excitation::{Excitation, Extremes};
 use bench_plant::DiscretePlant;
+use bench_rig::simulated;
 
 /// The model of the rig: plant with all its modes, amplifier and hold.
 pub fn rig_model(config: &Config) -> Result<DiscretePlant, ExperimentError> {

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use crate::recording::{Recording, RecordingError};
-use crate::rig::motor::ThermalModel;
 use crate::rt::record::{TickRecord, flag};
 use bench_base::numeric::larger;
 use bench_config::Config;
+use bench_rig::motor::ThermalModel;
 
 /// Figures of a run from the tick on in which the loop closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -1,13 +1,13 @@
 //! The plan of a minimum-time step: the plants for which it is planned, and its limits.
 
 use super::plan_error::PlanError;
-use crate::rig::simulated;
 use bench_config::{Config, MinimumTimeSettings, PlantSettings, SimSettings};
 use bench_control::{
     ClosedLoop, ControllerText, MinimumTime, SETTLING_BAND, StepLimits, StepPlant, StepTiming,
     minimum_time,
 };
 use bench_plant::LoopPlant;
+use bench_rig::simulated;
 
 /// Time in seconds after the last change of the reference over which the error is limited.
 const WATCHED_S: f64 = 0.3;

@@ -1,11 +1,11 @@
 //! The plan of a swept reference: its amplitudes, unless the user states them, and its extremes by the model.
 
 use super::plan_error::PlanError;
-use crate::rig::simulated;
 use bench_config::{Config, ReferenceSettings, validate};
 use bench_control::{ClosedLoop, ControllerText, SweptLimits, swept_reference_amplitudes};
 use bench_excitation::{Extremes, ReferenceContext, SweptReference};
 use bench_plant::LoopPlant;
+use bench_rig::simulated;
 
 /// The configuration with the amplitudes of a swept reference, and the predicted extremes of the run, both by the model of the
 /// whole rig. Another reference has no extremes, and its configuration is returned unchanged. Refuses a run that would trip

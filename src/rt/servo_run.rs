@@ -17,7 +17,7 @@ use super::request::NumberedRequest;
 use super::settling::Settling;
 use super::supervision::{LeaseWatch, StopFlags, Supervision};
 use super::tuning::Tuning;
-use crate::rig::calibration::Correction;
+use bench_rig::calibration::Correction;
 
 /// Progress of a running loop, for other threads.
 #[derive(Debug, Default)]

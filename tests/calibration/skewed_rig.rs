@@ -1,6 +1,6 @@
 //! A simulated stage with systematic errors of amplifier and probe.
-use bench::rig::simulated::SimulatedRig;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use bench_rig::simulated::SimulatedRig;
 use std::task::Poll;
 
 /// Errors of the devices: current = gain (command) + offset; reading = gain (position) + offset.

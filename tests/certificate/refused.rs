@@ -4,7 +4,7 @@ use bench::experiment::certificate::{
     Agreement, CertificateError, OpenRig, Subject, require_evidence, sha256,
 };
 use bench::experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
-use bench::rig::calibration::Calibration;
+use bench_rig::calibration::Calibration;
 use serde_json::json;
 
 use crate::certificate::altered::{

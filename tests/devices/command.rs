@@ -131,7 +131,7 @@ impl Device {
             ..Source::default()
         })
         .expect("the settings are valid");
-        bench::rig::devices::probe::open(&config.probe, config.servo.priority)
+        bench_rig::devices::probe::open(&config.probe, config.servo.priority)
             .expect("the probe is served")
     }
 

@@ -3,8 +3,6 @@ use std::time::Duration;
 
 use bench::experiment::{self, Plan, replay};
 use bench::recording::Recording;
-use bench::rig::devices::deferred::{Deferred, OutputTiming};
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::record::{EventKind, TickRecord};
 use bench::rt::servo::Request;
@@ -14,6 +12,8 @@ use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, MemoryEndpoint};
 use bench_hal::can::pdo::{Direction, cob_id, unpack};
 use bench_hal::{CurrentAmplifier, Rig};
+use bench_rig::devices::deferred::{Deferred, OutputTiming};
+use bench_rig::simulated::SimulatedRig;
 use bench_test_support::faulty_rig::{Fault, FaultyRig};
 use bench_test_support::loop_rig::{Bench, StillRig, endless, stage};
 
@@ -30,7 +30,7 @@ fn set_points(listener: &mut MemoryEndpoint) -> Vec<i16> {
 }
 
 fn set_point_id(config: &Config) -> Id {
-    let node = bench::rig::devices::can_amplifier(&config.amplifier.device)
+    let node = bench_rig::devices::can_amplifier(&config.amplifier.device)
         .expect("a drive")
         .address()
         .node;
@@ -167,14 +167,14 @@ fn rejects_a_computing_delay_of_two_periods_with_devices() {
         refused.to_string(),
         "loop.computing_delay_periods is 2, but with real devices a command is sent in its tick (0) or in the next one (1); set it to 0 or 1"
     );
-    assert!(bench::rig::devices::check(&config).is_err());
+    assert!(bench_rig::devices::check(&config).is_err());
     for periods in [0, 1] {
         config.servo.computing_delay_periods = periods;
-        assert!(bench::rig::devices::check(&config).is_ok());
+        assert!(bench_rig::devices::check(&config).is_ok());
     }
     let mut simulated = stage();
     simulated.servo.computing_delay_periods = 2;
-    assert!(bench::rig::devices::check(&simulated).is_ok());
+    assert!(bench_rig::devices::check(&simulated).is_ok());
 }
 
 #[test]

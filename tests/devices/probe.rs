@@ -7,8 +7,6 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use bench::experiment::Plan;
-use bench::rig::devices;
-use bench::rig::emulator::{EmulatedFault, FaultRequest, ProbeEndpoint, ProbeServer, Stage};
 use bench::rt::arming::State;
 use bench::rt::program::Program;
 use bench::rt::record::EventKind;
@@ -16,6 +14,8 @@ use bench::rt::servo::Request;
 use bench_config::{Config, Source, load};
 use bench_hal::serial::StatisticsHandle;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
+use bench_rig::devices;
+use bench_rig::emulator::{EmulatedFault, FaultRequest, ProbeEndpoint, ProbeServer, Stage};
 
 use crate::devices::rig::Bench;
 

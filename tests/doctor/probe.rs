@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use bench::rig::devices::probe::driver_settings;
 use bench_config::{Config, Source, load};
 use bench_hal::serial::emulator::Fault;
 use bench_hal::serial::{Protocol, SerialProbe};
+use bench_rig::devices::probe::driver_settings;
 use nix::fcntl::{Flock, FlockArg};
 use serde_json::Value;
 

@@ -5,9 +5,9 @@ use std::path::Path;
 use bench::experiment::{
     ExperimentError, MotorHandling, Plan, Run, RunSummary, Runner, Setup, close,
 };
-use bench::rig::motor::{Moment, MotorMemory};
 use bench_config::{Config, ExcitationKind, Source, load};
 use bench_excitation::AmplitudePoint;
+use bench_rig::motor::{Moment, MotorMemory};
 
 /// Continuous current of the motor: 26 N over 11.12 N/A.
 pub const LIMIT_A: f64 = 26.0 / 11.12;

@@ -2,7 +2,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bench::experiment::{MotorHandling, Plan, Runner, Setup};
-use bench::rig::motor::Moment;
+use bench_rig::motor::Moment;
 
 use crate::motor::common::{
     LIMIT_A, QUIET_S, SWEEP_S, TAU_S, hot, memory, now, pass, refusal, remembered, run, run_anew,

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench::model::study::{Block, Plan, Shard, StudyFile};
-use bench::rig::motor::{Moment, MotorMemory};
 use bench_config::{Config, Source, load};
 use bench_identify::verdict::Cnmp;
+use bench_rig::motor::{Moment, MotorMemory};
 
 use crate::random_inputs::damage::check_damaged;
 

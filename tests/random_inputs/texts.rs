@@ -2,9 +2,9 @@
 
 use std::time::SystemTime;
 
-use bench::rig::calibration::{KnownDevices, load_calibration};
 use bench_config::{Config, Source, load, whole};
 use bench_control::{ControllerText, LawInput};
+use bench_rig::calibration::{KnownDevices, load_calibration};
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};
 

@@ -3,7 +3,6 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 use std::time::Duration;
 
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, Realtime, TickTiming};
 use bench::rt::live_loop::run_to_end;
 use bench::rt::program::{Decision, Program, ProgramInput};
@@ -15,6 +14,7 @@ use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };
+use bench_rig::simulated::SimulatedRig;
 use rtrb::RingBuffer;
 
 use crate::safety::rig::{CurrentProgram, StillRig, interlocks, stage};

@@ -6,7 +6,6 @@ use std::time::Duration;
 
 use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench::recording::Recording;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::device_defect::DeviceDefect;
 use bench::rt::live_loop::{LiveLoop, LoopPanicked};
 use bench::rt::program::Program;
@@ -19,6 +18,7 @@ use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };
+use bench_rig::simulated::SimulatedRig;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::safety::faulty_rig::{Fault, FaultyRig};

@@ -4,8 +4,6 @@ use std::path::{Path, PathBuf};
 
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
-use bench::rig::calibration::Correction;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 use bench::rt::servo::Request;
@@ -16,6 +14,8 @@ use bench_config::{
 };
 use bench_excitation::{SineReference, StepReference};
 use bench_hal::Validity;
+use bench_rig::calibration::Correction;
+use bench_rig::simulated::SimulatedRig;
 
 use crate::safety::calibrated::calibration;
 use crate::safety::faulty_rig::{Fault, FaultyRig};

@@ -2,9 +2,9 @@
 use std::path::Path;
 
 use bench::experiment::{self, Plan};
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::thread::Pace;
 use bench_config::{Config, Sweep};
+use bench_rig::simulated::SimulatedRig;
 
 use crate::safety::rig::stage;
 
@@ -70,7 +70,7 @@ fn two_second_run_has_the_reference_digest() {
 /// The modules from the settings to a command.
 const COMMAND_PATH: [&str; 22] = [
     "src/rt",
-    "src/rig/simulated",
+    "crates/rig/src/simulated",
     "crates/excitation/src",
     "crates/excitation/src/command",
     "crates/excitation/src/reference",
@@ -204,7 +204,7 @@ fn tick_code_contains_no_lock_print_or_file_access() {
         "crates/excitation/src/reference/sine.rs",
         "crates/excitation/src/reference/step.rs",
         "crates/excitation/src/reference/swept.rs",
-        "src/rig/simulated",
+        "crates/rig/src/simulated",
     ];
     for (file, text) in tick.iter().chain(&others).flat_map(|of| sources(of)) {
         for (number, line) in lines(&text) {

@@ -1,5 +1,4 @@
 //! The end of a run: reference and current go to zero along ramps; a trip and a stop request cut the current at once.
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::program::{Control, Excite, Program};
 use bench::rt::record::{EventKind, TickRecord, flag};
@@ -9,6 +8,7 @@ use bench_config::Config;
 use bench_control::{Controller, ControllerText, SectionController};
 use bench_excitation::Reference;
 use bench_hal::Validity;
+use bench_rig::simulated::SimulatedRig;
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{Bench, CurrentProgram, endless, stage};

@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use bench::experiment::{self, Plan, Run, StopCause, replay};
 use bench::recording::Recording;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::arming::State;
 use bench::rt::record::{EventKind, Origin, Refusal, RequestEvent, RequestKind};
 use bench::rt::servo::Request;
 use bench::rt::supervision::{ArmLease, StopFlags};
 use bench::rt::thread::Pace;
+use bench_rig::simulated::SimulatedRig;
 
 use crate::safety::rig::{AmplifierCall, Bench, Log, LoggedRig, endless, stage};
 

@@ -4,7 +4,6 @@ use std::sync::mpsc::Sender;
 
 use bench::experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench::recording::Recording;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::program::{Control, Program};
 use bench::rt::record::{EventKind, Refusal, RequestKind, TickRecord};
 use bench::rt::servo::Request;
@@ -13,6 +12,7 @@ use bench::rt::tuning::{Factors, Tune, TuneError};
 use bench_config::{Config, ReferenceSettings};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
+use bench_rig::simulated::SimulatedRig;
 
 use crate::safety::rig::{Bench, StillRig, endless, stage};
 

@@ -7,12 +7,12 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use assert_no_alloc::assert_no_alloc;
-use bench::rig::devices::{self, Requirements};
-use bench::rig::emulator::{AmplifierServer, EventLog, ProbeEndpoint, ProbeServer, Stage};
 use bench_config::{Config, Source, load};
 use bench_hal::can::bus::{BusError, BusEvent, CanBus, Port, SystemHost};
 use bench_hal::can::{CanFrame, Id};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DisplacementProbe, Tick, Validity, blocking};
+use bench_rig::devices::{self, Requirements};
+use bench_rig::emulator::{AmplifierServer, EventLog, ProbeEndpoint, ProbeServer, Stage};
 
 use crate::system_calls::{Termination, allow_only, in_child_process};
 

@@ -3,7 +3,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use assert_no_alloc::assert_no_alloc;
-use bench::rig::simulated::SimulatedRig;
 use bench::rt::clock::{Clock, TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
 use bench::rt::program::{Decision, Program, ProgramInput};
@@ -14,6 +13,7 @@ use bench::rt::residual::Residuals;
 use bench::rt::servo::{Request, Servo};
 use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench_config::Config;
+use bench_rig::simulated::SimulatedRig;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};

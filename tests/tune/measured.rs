@@ -1,7 +1,6 @@
 //! Designs from measured responses: on the true plant they have what they promise.
 
 use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
-use bench::rig::simulated;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_control::tuning::{
@@ -10,6 +9,7 @@ use bench_control::tuning::{
 };
 use bench_plant::UnmodelledMode;
 use bench_plant::{Mode, SignalPath};
+use bench_rig::simulated;
 use bench_test_support::chirp_source::{config_at, sampled, true_loop};
 use nalgebra::{DMatrix, DVector};
 

@@ -3,10 +3,10 @@
 use bench::experiment::{AnalysisError, RunError};
 use bench::recording::RecordingError;
 use bench::report::ReportError;
-use bench::rig::devices::DevicesError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_plant::PlantError;
+use bench_rig::devices::DevicesError;
 
 /// Why a figure could not be made.
 #[derive(Debug, thiserror::Error)]

@@ -14,8 +14,8 @@ use crate::daemon::computations::Purpose;
 use crate::daemon::shared::{Daemon, DaemonConfig};
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
-use crate::rig::devices;
 use bench_config::{Config, Source, load, profiles};
+use bench_rig::devices;
 
 /// Findings of `bench doctor`.
 pub async fn doctor(

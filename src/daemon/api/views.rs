@@ -9,8 +9,8 @@ use crate::daemon::live::hub::{LoopView, Share, TripView};
 use crate::daemon::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcome};
 use crate::daemon::schedule::Now;
 use crate::daemon::shared::{Daemon, now};
-use crate::rig::devices::is_simulated;
 use bench_base::progress::Snapshot;
+use bench_rig::devices::is_simulated;
 
 /// Everything at one moment.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

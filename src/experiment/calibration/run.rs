@@ -11,13 +11,13 @@ use crate::experiment::run_summary::RunSummary;
 use crate::experiment::runner::{Runner, close};
 use crate::experiment::signals::abandon_on_signal;
 use crate::recording::Recording;
-use crate::rig::calibration::{
-    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
-};
 use bench_base::timestamp;
 use bench_config::{Config, ExcitationKind};
 use bench_excitation::{Extremes, Staircase};
 use bench_plant::{ModalModel, PlantError};
+use bench_rig::calibration::{
+    AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
+};
 
 /// A calibration and its runs.
 #[derive(Clone, Debug)]

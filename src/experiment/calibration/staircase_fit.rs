@@ -56,9 +56,9 @@ pub struct StaircaseFit {
     pub compliance_sigma_m_per_a: f64,
     /// Reading in metres at zero command, by the line.
     pub rest_m: f64,
-    /// See [`crate::rig::calibration::ChainCalibration::nonlinearity_ratio`].
+    /// See [`bench_rig::calibration::ChainCalibration::nonlinearity_ratio`].
     pub nonlinearity_ratio: f64,
-    /// See [`crate::rig::calibration::ChainCalibration::hysteresis_ratio`].
+    /// See [`bench_rig::calibration::ChainCalibration::hysteresis_ratio`].
     pub hysteresis_ratio: f64,
     /// RMS of the readings around the means of their levels, in metres.
     pub noise_rms_m: f64,

@@ -18,11 +18,11 @@ use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::response_points::points;
 use crate::experiment::stage_check::RestAfterCheck;
-use crate::rig::calibration::Calibration;
 use bench_base::decimal::Decimal;
 use bench_control::measured::{LowerMargin, MeasuredLoop, Stability};
 use bench_control::{ClosedLoop, ControllerText};
 use bench_plant::SignalPath;
+use bench_rig::calibration::Calibration;
 
 /// The evidence with which a loop closes. The names in JSON must not change.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -7,9 +7,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bench::experiment::Plan;
-use bench::rig::devices::deferred::OutputTiming;
-use bench::rig::devices::{Requirements, can_amplifier};
-use bench::rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
 use bench::rt::arming::{State, Trip};
 use bench::rt::program::Program;
 use bench::rt::record::{EventKind, LoopMessage};
@@ -18,6 +15,9 @@ use bench_config::{Config, Source, load};
 use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::faults::*;
 use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Validity};
+use bench_rig::devices::deferred::OutputTiming;
+use bench_rig::devices::{Requirements, can_amplifier};
+use bench_rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
 
 use crate::devices::rig::Bench;
 

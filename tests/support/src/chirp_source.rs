@@ -2,11 +2,11 @@
 
 use bench::experiment::MeasuredFrf;
 use bench::experiment::tuning::FrfSource;
-use bench::rig::simulated;
 use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
 use bench_identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
 use bench_plant::{LoopPlant, Mode};
+use bench_rig::simulated;
 use nalgebra::Complex;
 
 use crate::stage::Dice;

@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rig::calibration::Correction;
 use bench::rt::arming::State;
 use bench::rt::clock::{TickTiming, Virtual};
 use bench::rt::interlock::Interlocks;
@@ -21,6 +20,7 @@ use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
 };
+use bench_rig::calibration::Correction;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};

@@ -1,9 +1,9 @@
 //! The default excitation on the simulated stage, without loop and recording.
-use bench::rig::simulated::SimulatedRig;
 use bench_config::Config;
 use bench_excitation::{Chirp, Excitation};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use bench_identify::Signals;
+use bench_rig::simulated::SimulatedRig;
 
 /// Commands and readings of the chirp of a configuration.
 pub fn chirp(config: &Config) -> Signals {

@@ -10,7 +10,7 @@ use bench_hal::serial::{Mounting, Note, PortSettings, SerialError};
 use super::link::Link;
 use super::stage::Stage;
 use super::{EmulatedDevice, EmulatorError};
-use crate::rig::simulated::Sensor;
+use crate::simulated::Sensor;
 use bench_base::thread_priority::device_thread_setup;
 use bench_config::{Config, ProbeSettings};
 

@@ -11,7 +11,7 @@ use super::event_log::{EventLog, LogEntry, LogEvent};
 use super::fault::{AmplifierFault, EmulatedFault, FaultRequest};
 use super::stage::seconds;
 use super::{AmplifierServer, EmulatedDevice, EmulatorError, ProbeEndpoint, ProbeServer, Stage};
-use crate::rig::devices::can_amplifier;
+use crate::devices::can_amplifier;
 use bench_config::{AmplifierDevice, Config};
 
 /// The devices to emulate, and their interfaces.

@@ -38,7 +38,8 @@ pub use probe::{ProbeEndpoint, ProbeServer};
 pub use stage::Stage;
 
 /// A device that can be emulated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum EmulatedDevice {
     /// The amplifier, on a CAN interface

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::rig::simulated::LiveStage;
+use crate::simulated::LiveStage;
 use bench_config::Config;
 use bench_plant::PlantError;
 

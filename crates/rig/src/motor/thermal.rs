@@ -42,7 +42,7 @@ impl ThermalModel {
     /// The state after a time without current: thermal exp(-t/tau).
     ///
     /// ```
-    /// use bench::rig::motor::ThermalModel;
+    /// use bench_rig::motor::ThermalModel;
     ///
     /// let motor = ThermalModel { limit_a2: 4.0, time_constant_s: 10.0 };
     /// assert_eq!(motor.after(4.0, 0.0), 4.0);

@@ -36,7 +36,7 @@ pub use spectra::DisturbanceSpectra;
 ///
 /// ```
 /// use bench_config::{Source, load};
-/// use bench::rig::simulated::SimulatedRig;
+/// use bench_rig::simulated::SimulatedRig;
 /// use bench_hal::{DisplacementProbe, Tick, Validity};
 ///
 /// let config = load(&Source::default()).unwrap();

@@ -13,7 +13,7 @@ use super::event_log::{CurrentChange, CurrentMonitor, EventLog, LogEntry, LogEve
 use super::fault::AmplifierFault;
 use super::stage::{Stage, seconds};
 use super::{EmulatedDevice, EmulatorError};
-use crate::rig::devices::amplifier::{CanAddress, can_amplifier};
+use crate::devices::amplifier::{CanAddress, can_amplifier};
 use bench_base::thread_priority::device_thread_setup;
 use bench_config::AmplifierDevice;
 

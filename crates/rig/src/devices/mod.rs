@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 use bench_hal::serial::{Note, SerialProbe, StatisticsHandle};
 use bench_hal::{Devices, DisplacementProbe, Rig, Tick, Validity};
 
-use crate::rig::simulated::SimulatedRig;
+use crate::simulated::SimulatedRig;
 use bench_config::{AmplifierDevice, Config, ProbeDevice};
 use bench_plant::PlantError;
 
@@ -31,7 +31,7 @@ pub use probe::ProbeError;
 pub use reservation::{DeviceInUse, Reservation};
 
 /// How long a probe may take to give its first valid reading.
-pub(crate) const FIRST_READING: Duration = Duration::from_secs(2);
+pub const FIRST_READING: Duration = Duration::from_secs(2);
 /// Pause between two attempts to read it.
 const RETRY: Duration = Duration::from_millis(1);
 
@@ -172,7 +172,7 @@ fn wait_for_reading(probe: &mut SerialProbe) -> Result<(), DevicesError> {
 }
 
 /// Waits for a valid reading, at most [`FIRST_READING`]; returns the validity of the last reading.
-pub(crate) fn first_reading(probe: &mut SerialProbe) -> Validity {
+pub fn first_reading(probe: &mut SerialProbe) -> Validity {
     let begin = Instant::now();
     loop {
         let validity = probe.latest(Tick::default()).validity;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::moment::Moment;
 use super::thermal::ThermalModel;
-use crate::rig::devices::can_amplifier;
+use crate::devices::can_amplifier;
 use bench_base::atomic_file::write_durable;
 use bench_base::checkpoint::checksum;
 use bench_base::input_file::{self, MAX_SETTINGS_BYTES};
