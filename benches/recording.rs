@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::record::{LoopMessage, TickRecord};
+use bench_rt::record::{LoopMessage, TickRecord};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 /// Two minutes at 5 kHz.

@@ -2,13 +2,13 @@
 //!
 //! `cargo run --example own_control_law`
 
-use bench::rt::program::{Control, Program, ProgramInput};
 use bench_config::{Source, load};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 use bench_plant::{ModalModel, build};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::program::{Control, Program, ProgramInput};
 
 /// Position and velocity of the first driven mode are observed; the error is integrated.
 struct StateFeedback {

@@ -2,13 +2,13 @@
 //!
 //! `cargo run --example own_excitation`
 
-use bench::rt::arming::Trip;
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Excite, Program, ProgramInput};
 use bench_config::{Config, Source, load};
 use bench_excitation::{Excitation, Extremes};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick, blocking};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::Trip;
+use bench_rt::interlock::Interlocks;
+use bench_rt::program::{Excite, Program, ProgramInput};
 
 /// Pulses of alternating sign, each 1 ms long, their size halved from pulse to pulse.
 struct Pulses {

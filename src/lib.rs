@@ -6,8 +6,8 @@
 //!
 //! | to find | look in |
 //! |---|---|
-//! | the loop on one screen | [`rt::servo`] |
-//! | the interlocks and the arming state machine | [`rt::interlock`], [`rt::arming`] |
+//! | the loop on one screen | [`bench_rt::servo`] |
+//! | the interlocks and the arming state machine | [`bench_rt::interlock`], [`bench_rt::arming`] |
 //! | the fast and the slow controller | `bench-config/controllers/`, built by [`bench_control`] |
 //! | margins of a loop | [`bench_control::ClosedLoop`] |
 //! | modes, residues and zeros of a model | [`bench_plant`], [`bench_plant::zeros`] |
@@ -61,4 +61,3 @@ pub mod export;
 pub mod model;
 pub mod recording;
 pub mod report;
-pub mod rt;

@@ -13,7 +13,7 @@ fn main() -> ExitCode {
     cli::main().into()
 }
 
-/// Log lines go to standard error, with colours on a terminal only. `BENCH_LOG` chooses the level: `info`, or `bench::rt=debug,warn`.
+/// Log lines go to standard error, with colours on a terminal only. `BENCH_LOG` chooses the level: `info`, or `bench_rt=debug,warn`.
 fn start_log() {
     let chosen = std::env::var("BENCH_LOG")
         .ok()

@@ -4,14 +4,14 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bench::rt::interlock::Interlocks;
-use bench::rt::live_loop::LiveLoop;
-use bench::rt::publisher::Publisher;
-use bench::rt::request::RequestSender;
-use bench::rt::servo_run::{Connections, Progress, ServoRun};
-use bench::rt::thread::Pace;
 use bench_config::{Config, Source, load};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::interlock::Interlocks;
+use bench_rt::live_loop::LiveLoop;
+use bench_rt::publisher::Publisher;
+use bench_rt::request::RequestSender;
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
+use bench_rt::thread::Pace;
 use rtrb::RingBuffer;
 
 /// A test that waits longer than this has failed. It is not a requirement.

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::process::Command;
 
 use bench::recording::{Header, Recorder};
-use bench::rt::arming::{State, Trip};
-use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_hal::Validity;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_test_support::program::Bench;
 use serde_json::{Value, json};
 

@@ -24,8 +24,8 @@ mod supervisor;
 use std::error::Error;
 use std::process::ExitCode;
 
-use bench::rt::thread::Pace;
 use bench_config::{Source, load};
+use bench_rt::thread::Pace;
 use clap::Parser;
 
 use faults::{CASES, Schedule};

@@ -4,12 +4,12 @@ use std::error::Error;
 use std::thread::{JoinHandle, sleep};
 use std::time::{Duration, Instant};
 
-use bench::rt::clock::Realtime;
-use bench::rt::live_loop::run_to_end;
-use bench::rt::servo::Servo;
-use bench::rt::supervision::ArmLease;
-use bench::rt::thread::Pace;
 use bench_config::{Config, LoopSettings};
+use bench_rt::clock::Realtime;
+use bench_rt::live_loop::run_to_end;
+use bench_rt::servo::Servo;
+use bench_rt::supervision::ArmLease;
+use bench_rt::thread::Pace;
 
 use super::faults::{Period, Schedule};
 use super::recorder::{Report, joined};

@@ -7,10 +7,10 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use bench::recording::{Header, Recorder, RecordingError};
-use bench::rt::arming::State;
-use bench::rt::record::{Event, EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
-use bench::rt::thread::Pace;
 use bench_config::Config;
+use bench_rt::arming::State;
+use bench_rt::record::{Event, EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
+use bench_rt::thread::Pace;
 use rtrb::Consumer;
 use tempfile::TempDir;
 

@@ -3,11 +3,11 @@
 use std::task::Poll;
 use std::time::Duration;
 
-use bench::rt::thread::Pace;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Tick,
 };
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 use bench_test_support::faulty_rig::FaultyRig;
 
 use super::faults::{Injection, Period, Schedule};

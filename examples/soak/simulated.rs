@@ -2,8 +2,8 @@
 
 use std::error::Error;
 
-use bench::rt::clock::{Clock, Virtual};
-use bench::rt::servo::Servo;
+use bench_rt::clock::{Clock, Virtual};
+use bench_rt::servo::Servo;
 
 use super::faults::{Injection, Period};
 use super::recorder::{Report, joined};

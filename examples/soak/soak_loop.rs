@@ -5,15 +5,15 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 
 use bench::experiment::Plan;
-use bench::rt::interlock::Interlocks;
-use bench::rt::publisher::Publisher;
-use bench::rt::request::RequestSender;
-use bench::rt::servo::Servo;
-use bench::rt::servo_run::{Connections, Progress, ServoRun};
-use bench::rt::supervision::{ArmLease, LeaseWatch};
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::interlock::Interlocks;
+use bench_rt::publisher::Publisher;
+use bench_rt::request::RequestSender;
+use bench_rt::servo::Servo;
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
+use bench_rt::supervision::{ArmLease, LeaseWatch};
+use bench_rt::thread::Pace;
 use rtrb::RingBuffer;
 
 use super::faults::Schedule;

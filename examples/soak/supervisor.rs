@@ -2,8 +2,8 @@
 
 use std::error::Error;
 
-use bench::rt::program::Program;
-use bench::rt::request::{Request, RequestSender};
+use bench_rt::program::Program;
+use bench_rt::request::{Request, RequestSender};
 use rtrb::Consumer;
 
 use super::faults::Period;

@@ -17,10 +17,10 @@ use crate::experiment::{
     self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
     RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
-use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_rig::motor::{Moment, MotorMemory};
+use bench_rt::thread::Pace;
 
 /// Where and how to run.
 #[derive(Clone, Debug, clap::Args)]
@@ -283,7 +283,7 @@ fn realtime_text(timing: &TimingSummary) -> String {
 mod tests {
     use super::*;
     use crate::recording::Quantiles;
-    use crate::rt::thread::Scheduling;
+    use bench_rt::thread::Scheduling;
 
     #[test]
     fn timing_of_a_real_time_run_fits_80_columns() {

@@ -25,8 +25,8 @@ use crate::experiment::{
     RunReport, Stage, StopSignals,
 };
 use crate::recording::{RecordingError, Totals};
-use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
+use bench_rt::thread::Pace;
 
 /// Longest time between two renewals of the arm lease of a run.
 const RENEWAL: Duration = Duration::from_millis(250);

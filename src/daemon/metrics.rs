@@ -6,8 +6,8 @@ use std::time::Duration;
 use super::live::status::EDGES_US;
 use super::shared::Daemon;
 use crate::recording::free_bytes;
-use crate::rt::arming::State;
 use bench_rig::devices::{CanAmplifier, can_amplifier};
+use bench_rt::arming::State;
 
 /// Time in which the folder of the recordings answers.
 const FOLDER_TIME: Duration = Duration::from_secs(2);

@@ -14,11 +14,11 @@ use crate::experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
     RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
 };
-use crate::rt::supervision::{ArmLease, StopFlags};
-use crate::rt::thread::{Pace, Scheduling};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_rig::motor::Moment;
+use bench_rt::supervision::{ArmLease, StopFlags};
+use bench_rt::thread::{Pace, Scheduling};
 
 /// Pause between two attempts to open the devices, and between two checks of open devices without a command.
 const RETRY: Duration = Duration::from_secs(2);
@@ -71,7 +71,7 @@ pub struct RigStatus {
 pub struct Owner {
     messages: Option<Sender<Message>>,
     status: Arc<Mutex<RigStatus>>,
-    tuner: Sender<crate::rt::tuning::Tune>,
+    tuner: Sender<bench_rt::tuning::Tune>,
     recording_defect: RecordingDefect,
     trips: TripCount,
     thread: Option<JoinHandle<()>>,
@@ -122,7 +122,7 @@ impl Owner {
     }
 
     /// Sends changes of the run in progress to the loop.
-    pub fn tuner(&self) -> Sender<crate::rt::tuning::Tune> {
+    pub fn tuner(&self) -> Sender<bench_rt::tuning::Tune> {
         self.tuner.clone()
     }
 

@@ -141,7 +141,7 @@ fn rename(from: &Path, to: &Path) -> Result<(), RecordingError> {
 mod tests {
     use super::*;
     use crate::recording::{Header, Recorder};
-    use crate::rt::record::{LoopMessage, TickRecord};
+    use bench_rt::record::{LoopMessage, TickRecord};
 
     fn begin(folder: &Path) -> RunRecord {
         RunRecord::begin(folder, &Holder::this_process("a daemon")).expect("a record")

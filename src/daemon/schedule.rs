@@ -19,7 +19,7 @@ pub use super::hold::StopKind;
 use super::lease::{Keeper, LEASE, Lease};
 use super::run_entry::{Carrier, Command, Phase, RunEntry, RunOutcome, RunRequest};
 use super::secret::Secret;
-use crate::rt::supervision::StopFlags;
+use bench_rt::supervision::StopFlags;
 
 /// Commands that may wait at the same time.
 pub const MAX_QUEUED: usize = 100;

@@ -21,9 +21,9 @@ use crate::experiment::{
     Ending, ExperimentError, MotorError, RemoteError, Run, RunError, RunOrder, RunReport,
     RunSummary, close,
 };
-use crate::rt::record::Origin;
-use crate::rt::supervision::ArmLease;
 use bench_base::progress::Progress;
+use bench_rt::record::Origin;
+use bench_rt::supervision::ArmLease;
 
 /// Period of the progress reports.
 const PROGRESS: Duration = Duration::from_millis(100);

@@ -39,9 +39,9 @@ pub mod vesc;
 
 use std::path::Path;
 
-use crate::rt::thread::Pace;
 use bench_config::Config;
 use bench_rig::devices;
+use bench_rt::thread::Pace;
 
 pub use amplifier::{examine_canopen_drive, examine_vesc};
 pub use finding::{Finding, Severity, Subject};

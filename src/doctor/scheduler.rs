@@ -7,9 +7,9 @@ use nix::unistd::Pid;
 
 use super::finding::{Finding, Severity, Subject};
 use super::trial::Trial;
-use crate::rt::thread::{Pace, Scheduling};
 use bench_base::remedy;
 use bench_config::LoopSettings;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// The requested and the granted scheduling, and the limits that apply.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,7 +6,7 @@ use nix::time::{ClockId, clock_getres};
 
 use super::finding::{Finding, Subject, read_line};
 use super::scheduler::severity_limit;
-use crate::rt::thread::Pace;
+use bench_rt::thread::Pace;
 
 /// Facts about the system.
 #[derive(Clone, Debug, Default, PartialEq)]

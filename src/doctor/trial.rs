@@ -6,10 +6,10 @@ use rtrb::RingBuffer;
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-use crate::rt::clock::{Clock, Realtime, TickTiming};
-use crate::rt::publisher::Publisher;
-use crate::rt::thread::{Pace, Scheduling, become_realtime};
 use bench_config::LoopSettings;
+use bench_rt::clock::{Clock, Realtime, TickTiming};
+use bench_rt::publisher::Publisher;
+use bench_rt::thread::{Pace, Scheduling, become_realtime};
 
 /// Duration of the trial.
 const DURATION: Duration = Duration::from_secs(1);

@@ -1,7 +1,7 @@
 //! Reference and error of a recorded closed loop, tick by tick, for spectra and simulations.
 
 use crate::recording::{Recording, RecordingError};
-use crate::rt::record::{TickRecord, flag};
+use bench_rt::record::{TickRecord, flag};
 
 /// Largest number of ticks: 400 s at 5 kHz. Later ticks are left out.
 const MAX_TICKS: usize = 2_000_000;

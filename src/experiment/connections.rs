@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use rtrb::{Consumer, RingBuffer};
 
-use crate::rt::program::Program;
-use crate::rt::publisher::{EVENT_SLOTS, Publisher};
-use crate::rt::record::{LoopMessage, REQUESTS_PER_TICK};
-use crate::rt::request::RequestSender;
-use crate::rt::servo_run::{Connections, Progress};
+use bench_rt::program::Program;
+use bench_rt::publisher::{EVENT_SLOTS, Publisher};
+use bench_rt::record::{LoopMessage, REQUESTS_PER_TICK};
+use bench_rt::request::RequestSender;
+use bench_rt::servo_run::{Connections, Progress};
 
 /// The ends of a loop's [`Connections`] that stay outside the loop.
 pub(super) struct OutsideEnds {

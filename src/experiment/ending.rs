@@ -3,9 +3,9 @@
 use serde::{Serialize, Serializer};
 
 use crate::recording::Recording;
-use crate::rt::arming::Trip;
-use crate::rt::record::{Event, EventKind, RequestKind};
-use crate::rt::servo_run::RunOutcome;
+use bench_rt::arming::Trip;
+use bench_rt::record::{Event, EventKind, RequestKind};
+use bench_rt::servo_run::RunOutcome;
 
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,16 +17,16 @@ use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
 use crate::recording::{self, DiskWatch, Recorder, free_bytes};
-use crate::rt::device_defect::DeviceDefect;
-use crate::rt::interlock::Interlocks;
-use crate::rt::live_loop::LiveLoop;
-use crate::rt::program::Program;
-use crate::rt::request::{Request, RequestSender};
-use crate::rt::servo_run::{Connections, Progress, ServoRun};
-use crate::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
-use crate::rt::thread::{Pace, Scheduling};
-use crate::rt::tuning::Tune;
 use bench_config::{Config, LoopSettings, OnRecordingFailure};
+use bench_rt::device_defect::DeviceDefect;
+use bench_rt::interlock::Interlocks;
+use bench_rt::live_loop::LiveLoop;
+use bench_rt::program::Program;
+use bench_rt::request::{Request, RequestSender};
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
+use bench_rt::supervision::{ArmLease, LeaseWatch, StopFlags};
+use bench_rt::thread::{Pace, Scheduling};
+use bench_rt::tuning::Tune;
 
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;

@@ -3,9 +3,9 @@
 use super::loop_check::closed_loop_of;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
-use crate::rt::residual::{LoopPrediction, ResidualBound, Residuals};
 use bench_control::ControllerText;
 use bench_plant::{LoopPlant, ModalModel};
+use bench_rt::residual::{LoopPrediction, ResidualBound, Residuals};
 
 /// The monitor of a run, by the model of the configuration; `None` if the settings switch it off, and for the static steps of a
 /// calibration.

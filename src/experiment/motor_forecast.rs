@@ -6,13 +6,13 @@ use super::error::ExperimentError;
 use super::motor_error::MotorError;
 use super::motor_start::MotorStart;
 use super::plan::Plan;
-use crate::rt::program::ProgramInput;
-use crate::rt::tuning::Factors;
 use bench_plant::LoopPlant;
 use bench_rig::motor::{
     HeatPrediction, Moment, MotorMemory, MotorOrigin, MotorState, ThermalModel,
 };
 use bench_rig::simulated;
+use bench_rt::program::ProgramInput;
+use bench_rt::tuning::Factors;
 
 /// A waiting run starts when the state is this ratio of the largest allowed one: the currents of a run differ slightly from the
 /// predicted ones.

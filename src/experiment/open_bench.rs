@@ -7,10 +7,10 @@ use super::error::ExperimentError;
 use super::live_rig::LiveRig;
 use super::loop_check::Stage;
 use super::run_hooks::RunHooks;
-use crate::rt::device_defect::DeviceDefect;
-use crate::rt::thread::{Pace, Scheduling};
 use bench_config::Config;
 use bench_rig::devices::{self, Reservation};
+use bench_rt::device_defect::DeviceDefect;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// Which rig is opened, and how.
 #[derive(Clone, Copy, Debug)]

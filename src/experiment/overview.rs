@@ -2,7 +2,7 @@
 
 use super::error::ExperimentError;
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 
 /// Intervals of an overview: more than a plot has columns.
 const INTERVALS: u64 = 1500;

@@ -16,13 +16,13 @@ use super::reference_check::{self, PlannedReference};
 use super::stage_check::RestAfterCheck;
 use super::swept_reference;
 use crate::recording::Recording;
-use crate::rt::program::{Control, Excite, Program};
 use bench_config::{CampaignSettings, Config, PlantSettings, whole};
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;
 use bench_excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
 use bench_plant::ModalModel;
 use bench_rig::calibration::{Calibration, Correction};
+use bench_rt::program::{Control, Excite, Program};
 
 /// Name of the attachment with the controller.
 const CONTROLLER: &str = "controller.toml";

@@ -7,9 +7,9 @@ use super::analysis_error::AnalysisError;
 use super::plan::{KIND, RunKind};
 use super::signal_builder::{RunSignals, SignalBuilder};
 use crate::recording::{Preceding, Recording, RecordingError};
-use crate::rt::arming::State;
-use crate::rt::record::{TickRecord, flag};
 use bench_config::whole;
+use bench_rt::arming::State;
+use bench_rt::record::{TickRecord, flag};
 
 /// The signals of a run, or why it has none. `None` if they are not read, because the configuration does not precede the ticks in the
 /// file.

@@ -5,10 +5,10 @@ use std::task::Poll;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use rtrb::{Consumer, Producer, RingBuffer};
 
-use crate::rt::clock::{Clock, TickTiming};
-use crate::rt::publisher::Publisher;
-use crate::rt::record::{TickRecord, flag};
 use bench_rig::calibration::Correction;
+use bench_rt::clock::{Clock, TickTiming};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{TickRecord, flag};
 
 /// The record of a tick, and whether the amplifier caused a trip in it.
 #[derive(Clone, Copy, Default)]

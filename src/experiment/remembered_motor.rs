@@ -14,9 +14,9 @@ use super::plan::Plan;
 use super::run::Run;
 use super::run_error::RunError;
 use super::signals::stop_on_signal;
-use crate::rt::supervision::StopFlags;
 use bench_base::progress::Progress;
 use bench_rig::motor::{Moment, MotorMemory};
+use bench_rt::supervision::StopFlags;
 
 /// Longest time in seconds from the entry in the file to the first tick of the run.
 const ENABLING_S: f64 = 10.0;

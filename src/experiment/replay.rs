@@ -16,13 +16,13 @@ use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 use crate::recording::{Recording, RecordingError};
-use crate::rt::arming::{State, Trip};
-use crate::rt::clock::TickTiming;
-use crate::rt::program::Program;
-use crate::rt::publisher::SLOTS_PER_TICK;
-use crate::rt::record::{Event, EventKind, LoopMessage, Origin, RequestKind, TickRecord};
-use crate::rt::servo::{Request, Servo};
-use crate::rt::supervision::StopFlags;
+use bench_rt::arming::{State, Trip};
+use bench_rt::clock::TickTiming;
+use bench_rt::program::Program;
+use bench_rt::publisher::SLOTS_PER_TICK;
+use bench_rt::record::{Event, EventKind, LoopMessage, Origin, RequestKind, TickRecord};
+use bench_rt::servo::{Request, Servo};
+use bench_rt::supervision::StopFlags;
 
 /// A recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]

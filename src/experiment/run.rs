@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::description::Description;
 use super::motor_start::MotorStart;
 use crate::recording::{Recorder, RecordingError, Shortage, Totals};
-use crate::rt::record::Origin;
-use crate::rt::servo_run::RunOutcome;
-use crate::rt::thread::{Pace, Scheduling};
+use bench_rt::record::Origin;
+use bench_rt::servo_run::RunOutcome;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// A run that has ended; results can still be added to its recording.
 pub struct Run {

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use crate::recording::{Recording, RecordingError};
-use crate::rt::record::{TickRecord, flag};
 use bench_base::numeric::larger;
 use bench_config::Config;
 use bench_rig::motor::ThermalModel;
+use bench_rt::record::{TickRecord, flag};
 
 /// Figures of a run from the tick on in which the loop closed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]

@@ -8,9 +8,9 @@ use rtrb::{Consumer, RingBuffer};
 
 use super::run::StopCause;
 use crate::recording::LiveCopy;
-use crate::rt::record::LoopMessage;
-use crate::rt::supervision::{ArmLease, StopFlags};
-use crate::rt::tuning::Tune;
+use bench_rt::record::LoopMessage;
+use bench_rt::supervision::{ArmLease, StopFlags};
+use bench_rt::tuning::Tune;
 
 /// Slots of the ring of a live view: 1.6 s at 5 kHz.
 pub(super) const FEED_SLOTS: usize = 1 << 13;

@@ -14,12 +14,12 @@ use super::plan_error::PlanError;
 use super::remembered_motor::MotorHandling;
 use super::run::{RemoteRecording, Run, RunFile, StopCause};
 use crate::recording::Totals;
-use crate::rt::servo_run::RunOutcome;
-use crate::rt::thread::{Pace, Scheduling};
 use bench_base::progress::Progress;
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;
 use bench_rig::calibration::Calibration;
+use bench_rt::servo_run::RunOutcome;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// Everything that the owner of a rig needs for a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -10,8 +10,8 @@ use super::run_error::RunError;
 use crate::recording::{
     Header, MIN_FREE_BYTES, Recorder, RecordingError, lacks_space, predicted_bytes,
 };
-use crate::rt::thread::{Pace, Scheduling};
 use bench_base::timestamp;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// Creates the recording, with everything that is known before the first tick.
 pub(super) fn create_recording(

@@ -6,8 +6,8 @@ use super::description::Description;
 use super::ending::Ending;
 use super::run::{Run, StopCause};
 use crate::recording::{Quantiles, RecordingError};
-use crate::rt::arming::Trip;
-use crate::rt::thread::{Pace, Scheduling};
+use bench_rt::arming::Trip;
+use bench_rt::thread::{Pace, Scheduling};
 
 /// Counts, timing and ending of a run.
 #[derive(Clone, Debug, Serialize)]

@@ -10,12 +10,12 @@ use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
 use crate::recording::Health;
-use crate::rt::live_loop::{LiveLoop, LoopPanicked};
-use crate::rt::record::Origin;
-use crate::rt::request::{Request, RequestSender};
-use crate::rt::servo_run::{Progress, RunOutcome, ServoRun};
-use crate::rt::supervision::{ArmLease, StopFlags};
 use bench_config::OnRecordingFailure;
+use bench_rt::live_loop::{LiveLoop, LoopPanicked};
+use bench_rt::record::Origin;
+use bench_rt::request::{Request, RequestSender};
+use bench_rt::servo_run::{Progress, RunOutcome, ServoRun};
+use bench_rt::supervision::{ArmLease, StopFlags};
 
 /// Period of the supervisor.
 const SUPERVISION_PERIOD: Duration = Duration::from_millis(5);
@@ -137,7 +137,7 @@ mod tests {
 
     use super::*;
     use crate::recording::{self, DiskState, DiskWatch, Header, Recorder};
-    use crate::rt::record::{LoopMessage, TickRecord};
+    use bench_rt::record::{LoopMessage, TickRecord};
 
     #[test]
     fn each_shortage_ends_the_run_once_along_a_ramp() {

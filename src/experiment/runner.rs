@@ -23,11 +23,11 @@ use super::run_hooks::RunHooks;
 use super::run_order::{RigOwner, RunConditions, run_elsewhere};
 use super::stage_check::{PlannedStageCheck, StageCheck};
 use crate::recording::Recording;
-use crate::rt::thread::Pace;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_rig::calibration::{Calibration, KnownDevices, load_calibration};
 use bench_rig::motor::{Moment, MotorMemory};
+use bench_rt::thread::Pace;
 
 /// The rig on which a plan runs, its pace, and the folder for its recording.
 #[derive(Clone, Debug)]

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::analysis_error::AnalysisError;
-use crate::rt::record::TickRecord;
 use bench_base::running_stats::RunningStats;
 use bench_identify::joint::LoopSignals;
 use bench_identify::resampling::Readings;
 use bench_identify::{Signals, setpoint_timing};
+use bench_rt::record::TickRecord;
 
 /// Largest ratio of interpolated ticks: each of them adds an error.
 const FILLED_RATIO: f64 = 1e-3;

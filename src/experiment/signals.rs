@@ -13,8 +13,8 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot::error::RecvError;
 
 use super::run_error::RunError;
-use crate::rt::supervision::StopFlags;
 use bench_base::thread_priority::lower;
+use bench_rt::supervision::StopFlags;
 
 const START: &str = "start the analysis";
 /// Nice value of an analysis: less urgent than the recorder and everything else.

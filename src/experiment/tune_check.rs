@@ -6,8 +6,8 @@ use super::plan::Plan;
 use super::plan_error::PlanError;
 use super::reference_check;
 use super::swept_reference::closed_loop;
-use crate::rt::tuning::Factors;
 use bench_control::{ClosedLoop, ControllerText, TunedDesign};
+use bench_rt::tuning::Factors;
 
 /// A change that is refused. The run goes on as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -8,8 +8,8 @@ use super::file::Output;
 use super::rows::{self, Rows};
 use super::{ExportError, SIGNALS, Signal, Value};
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
 use bench_identify::{Frf, frf_csv};
+use bench_rt::record::TickRecord;
 
 pub(super) fn signals(recording: &Path, out: &mut Output) -> Result<Recording, ExportError> {
     writeln!(out, "{}", SIGNALS.map(|signal| signal.name).join(","))?;

@@ -16,9 +16,9 @@ use super::rows::{self, Rows};
 use super::sections::Sections;
 use super::{ExportError, SIGNALS, Signal, Value};
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
 use bench_base::units::rad_s;
 use bench_identify::Frf;
+use bench_rt::record::TickRecord;
 
 /// Types of data elements.
 const INT8: u32 = 1;

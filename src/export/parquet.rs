@@ -14,8 +14,8 @@ use super::file::Output;
 use super::rows::{self, Rows};
 use super::{ExportError, SIGNALS, Signal, Value};
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
 use bench_identify::{Frf, frf_csv};
+use bench_rt::record::TickRecord;
 
 /// Number of rows in a row group, which is in memory while it is written: 17 columns of 8 bytes each are 9 MB.
 const GROUP: usize = 1 << 16;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::ExportError;
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 
 /// Takes the ticks of a recording.
 pub(super) trait Rows {

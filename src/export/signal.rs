@@ -1,7 +1,7 @@
 //! The signals of a tick, with the unit in the name.
 
 use crate::recording::messages::Loop;
-use crate::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 
 /// What a real signal is, for the axes of formats that ask for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,7 +13,7 @@ use super::rows::{self, Rows};
 use super::sections::Sections;
 use super::{ExportError, Quantity, SIGNALS, Signal, Value};
 use crate::recording::Recording;
-use crate::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 
 /// Number of ordinates in a line.
 const PER_LINE: u64 = 4;

@@ -1,6 +1,6 @@
 //! The missing ticks between the recorded ones. Writer and reader count them by the same rule.
 
-use crate::rt::record::{Event, EventKind, TickRecord};
+use bench_rt::record::{Event, EventKind, TickRecord};
 
 /// Missing ticks between two successive records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,9 +4,9 @@
 use bench_hal::FaultText;
 
 use super::messages::{Event as Message, STATES, UnknownValue, unknown};
-use crate::rt::arming::{State, Trip};
-use crate::rt::record::{ClockTimes, Event, EventKind, Origin, Refusal, RequestEvent, RequestKind};
-use crate::rt::tuning::{Factors, Tune};
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{ClockTimes, Event, EventKind, Origin, Refusal, RequestEvent, RequestKind};
+use bench_rt::tuning::{Factors, Tune};
 
 impl From<&Event> for Message {
     fn from(event: &Event) -> Message {

@@ -7,8 +7,8 @@ use super::continuity::Continuity;
 use super::log_time::LogTime;
 use super::messages;
 use super::timing::Tally;
-use crate::rt::clock::scheduled_ns;
-use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench_rt::clock::scheduled_ns;
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 
 /// An encoded message.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Log times of the messages: the wall clock at the scheduled times of the ticks.
 
-use crate::rt::record::ClockTimes;
+use bench_rt::record::ClockTimes;
 
 /// Converts times since the loop started to nanoseconds since 1970.
 ///

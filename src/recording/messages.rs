@@ -13,8 +13,8 @@ use prost_types::DescriptorProto;
 use prost_types::field_descriptor_proto::Type;
 
 use super::descriptor;
-use crate::rt::arming::State;
-use crate::rt::record::TickRecord;
+use bench_rt::arming::State;
+use bench_rt::record::TickRecord;
 
 /// Rust type of a field.
 macro_rules! rust_type {
@@ -100,7 +100,7 @@ messages! {
         field "11" (int32) validity,
         /// Number of a [`State`].
         field "12" (int32) state,
-        /// Sum of [`crate::rt::record::flag`].
+        /// Sum of [`bench_rt::record::flag`].
         field "13" (uint32) flags,
         /// Scheduled ticks not served, directly before this one.
         field "14" (uint32) missed_ticks,

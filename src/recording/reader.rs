@@ -18,8 +18,8 @@ use super::summary::Summary;
 use super::walk::{Stop, Walk};
 use super::writer::{PERIOD_S, STARTED_NS};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
-use crate::rt::record::{Event, TickRecord};
 use bench_base::input_file;
+use bench_rt::record::{Event, TickRecord};
 
 /// Receives a tick of a recording, and what precedes it.
 pub type TickReceiver<'a> = dyn FnMut(&Preceding<'_>, &TickRecord) + 'a;
@@ -94,7 +94,7 @@ impl Recording {
     }
 
     /// As [`Recording::open`], but passes over each damage to the next intact record. [`Recording::damage`] and
-    /// [`Recording::missing_ticks`] tell what is missing; an [`EventKind::Lost`](crate::rt::record::EventKind::Lost) is among
+    /// [`Recording::missing_ticks`] tell what is missing; an [`EventKind::Lost`](bench_rt::record::EventKind::Lost) is among
     /// the events where messages are missing.
     pub fn salvage(path: &Path) -> Result<Recording, RecordingError> {
         let failed = |source| RecordingError::Read {

@@ -41,7 +41,7 @@ mod tests {
     use prost_types::field_descriptor_proto::Type;
 
     use super::*;
-    use crate::rt::record::TickRecord;
+    use bench_rt::record::TickRecord;
 
     #[test]
     fn schema_changes_only_on_purpose() {

@@ -10,7 +10,7 @@ use super::messages;
 use super::scanner::Scanner;
 use super::walk::{Stop, Walk};
 use super::{RecordingError, Topic};
-use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 
 /// A reader of the records of a file.
 pub(super) enum RecordReader {

@@ -10,8 +10,8 @@ use rtrb::{Consumer, Producer};
 
 use super::disk::{DiskWatch, Shortage, Space};
 use super::{Recorder, RecordingError};
-use crate::rt::record::LoopMessage;
 use bench_base::thread_priority::lower;
+use bench_rt::record::LoopMessage;
 
 /// Pause of the thread when the ring is empty: 5 ticks at 5 kHz, so the ring stays nearly empty and an idle recorder needs
 /// almost no processor time.

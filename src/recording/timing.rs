@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::continuity::Continuity;
 use super::messages::Timing;
-use crate::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 
 const SECOND_NS: u64 = 1_000_000_000;
 

@@ -21,9 +21,9 @@ use super::schema::descriptor_set;
 use super::sync::{Syncable, Syncing};
 use super::timing::{Quantiles, Tally};
 use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RecordingError, Topic};
-use crate::rt::clock::scheduled_ns;
-use crate::rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_base::locked::Locked;
+use bench_rt::clock::scheduled_ns;
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 
 /// A chunk is closed and written at every multiple of this scheduled time, at any rate: if the process is killed, at most
 /// 0.2 s is lost, the chunk and what is on the way to it. At 5 kHz a chunk holds 500 ticks, about 52 kB before compression.

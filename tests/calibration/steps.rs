@@ -4,13 +4,13 @@ use std::path::Path;
 use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench::experiment::{self, Plan};
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
 use bench_config::{Config, ScaleBy, Source, load};
 use bench_hal::Rig;
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 
 use crate::calibration::skewed_rig::{Skew, SkewedRig};
 

@@ -1,6 +1,6 @@
 //! `bench control` with a certificate, and with an override.
 use bench::recording::Recording;
-use bench::rt::record::EventKind;
+use bench_rt::record::EventKind;
 use bench_test_support::program::{Answer, Bench};
 
 use crate::certificate::stage::{SETTINGS, chirp};

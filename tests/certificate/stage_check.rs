@@ -5,10 +5,10 @@ use bench::experiment::stage_check::{
 };
 use bench::experiment::{self, ExperimentError, Plan};
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_hal::Rig;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 
 use crate::calibration::skewed_rig::{Skew, SkewedRig};
 use crate::certificate::stage::{config, plan};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use bench::experiment::replay;
 use bench::recording::Recording;
-use bench::rt::record::flag;
+use bench_rt::record::flag;
 use nalgebra::Complex;
 use serde_json::Value;
 

@@ -3,10 +3,6 @@ use std::time::Duration;
 
 use bench::experiment::{self, Plan, replay};
 use bench::recording::Recording;
-use bench::rt::arming::State;
-use bench::rt::record::{EventKind, TickRecord};
-use bench::rt::servo::Request;
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, MemoryEndpoint};
@@ -14,6 +10,10 @@ use bench_hal::can::pdo::{Direction, cob_id, unpack};
 use bench_hal::{CurrentAmplifier, Rig};
 use bench_rig::devices::deferred::{Deferred, OutputTiming};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::State;
+use bench_rt::record::{EventKind, TickRecord};
+use bench_rt::servo::Request;
+use bench_rt::thread::Pace;
 use bench_test_support::faulty_rig::{Fault, FaultyRig};
 use bench_test_support::loop_rig::{Bench, StillRig, endless, stage};
 

@@ -7,15 +7,15 @@ use std::task::Poll;
 use std::time::{Duration, Instant};
 
 use bench::experiment::Plan;
-use bench::rt::arming::State;
-use bench::rt::program::Program;
-use bench::rt::record::EventKind;
-use bench::rt::servo::Request;
 use bench_config::{Config, Source, load};
 use bench_hal::serial::StatisticsHandle;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, Devices};
 use bench_rig::devices;
 use bench_rig::emulator::{EmulatedFault, FaultRequest, ProbeEndpoint, ProbeServer, Stage};
+use bench_rt::arming::State;
+use bench_rt::program::Program;
+use bench_rt::record::EventKind;
+use bench_rt::servo::Request;
 
 use crate::devices::rig::Bench;
 

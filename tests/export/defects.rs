@@ -1,6 +1,6 @@
 //! Recordings of which something is missing: the file is written, a message says what it lacks, and the exit code is 3.
 
-use bench::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 use bench_test_support::program::{Answer, Bench};
 use serde_json::json;
 

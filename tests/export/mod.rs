@@ -12,9 +12,9 @@ use std::path::Path;
 use std::sync::OnceLock;
 
 use bench::recording::{Header, Recorder};
-use bench::rt::arming::State;
-use bench::rt::record::{LoopMessage, TickRecord};
 use bench_hal::Validity;
+use bench_rt::arming::State;
+use bench_rt::record::{LoopMessage, TickRecord};
 use bench_test_support::program::Bench;
 
 /// A tick of a run at 5 kHz. Every signal is a number that a text of 13 digits does not hold exactly.

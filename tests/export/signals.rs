@@ -1,6 +1,6 @@
 //! Time signals.
 
-use bench::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 use bench_test_support::program::Bench;
 use bench_test_support::truth;
 use serde_json::{Value, json};

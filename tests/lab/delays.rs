@@ -3,10 +3,10 @@ use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
 use bench::experiment::{Plan, closed_loop, run};
-use bench::rt::thread::Pace;
 use bench_config::{Config, ConfigError, Purpose, Source, load, profiles, schema};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 use nalgebra::Complex;
 
 const SIMULATED: [&str; 2] = [

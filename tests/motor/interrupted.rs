@@ -4,8 +4,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::experiment::{ExperimentError, MotorError, MotorHandling, Runner, Setup};
-use bench::rt::thread::Pace;
 use bench_rig::motor::{Moment, MotorOrigin};
+use bench_rt::thread::Pace;
 use bench_test_support::program::catches_interrupt;
 
 use crate::motor::common::{LIMIT_A, hot, memory, refusal, run};

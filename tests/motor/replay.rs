@@ -1,9 +1,9 @@
 //! The interlocks start with the heat of the motor, and a replay starts with the same heat.
 use bench::experiment::{Plan, replay, run};
 use bench::recording::Recording;
-use bench::rt::arming::Trip;
-use bench::rt::thread::Pace;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::Trip;
+use bench_rt::thread::Pace;
 
 use crate::motor::common::{LIMIT_A, hot};
 

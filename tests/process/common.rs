@@ -4,7 +4,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use bench::recording::Recording;
-use bench::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 use bench_test_support::program::{NO_DAEMON, until_frozen};
 
 /// A test that waits longer than this has failed. It is not a requirement.

@@ -3,7 +3,7 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use bench::recording::Recording;
-use bench::rt::record::flag;
+use bench_rt::record::flag;
 
 use crate::process::common::{
     AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr, stdout, without_daemon,

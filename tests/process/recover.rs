@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use bench::recording::Recording;
-use bench::rt::record::TickRecord;
+use bench_rt::record::TickRecord;
 use serde_json::Value;
 
 use crate::process::common::{AT_1_KHZ, bench, recording_in, stderr, stdout};

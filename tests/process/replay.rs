@@ -4,7 +4,7 @@ use std::process::Output;
 use std::time::Duration;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::record::{LoopMessage, TickRecord};
+use bench_rt::record::{LoopMessage, TickRecord};
 
 use crate::process::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr};
 

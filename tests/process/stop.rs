@@ -3,8 +3,8 @@ use std::path::Path;
 use std::process::Stdio;
 
 use bench::recording::Recording;
-use bench::rt::arming::State;
-use bench::rt::record::{Event, EventKind, RequestKind, TickRecord};
+use bench_rt::arming::State;
+use bench_rt::record::{Event, EventKind, RequestKind, TickRecord};
 
 use crate::process::common::{
     LongRun, RATE_HZ, Running, arguments_of, bench, recording_in, stderr, ticks, without_daemon,

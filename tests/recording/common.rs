@@ -3,11 +3,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bench::recording::{DiskState, DiskWatch, Header, Recorder, Totals};
-use bench::rt::arming::{State, Trip};
-use bench::rt::record::{
+use bench_hal::Validity;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{
     Event, EventKind, LoopMessage, Origin, RequestEvent, RequestKind, TickRecord,
 };
-use bench_hal::Validity;
 
 /// 5 kHz.
 pub const PERIOD_NS: u64 = 200_000;

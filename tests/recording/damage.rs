@@ -3,7 +3,7 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use bench::recording::{Header, MissingTicks, Recorder, Recording, RecordingError, recover};
-use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use proptest::prelude::*;
 
 use crate::recording::common::{CONFIG, bits, events_of, header, run, ticks_of, write};

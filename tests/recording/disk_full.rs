@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use bench::recording::{
     DiskState, DiskWatch, Health, Recorder, Recording, RecordingError, Shortage, spawn,
 };
-use bench::rt::record::LoopMessage;
+use bench_rt::record::LoopMessage;
 use rtrb::RingBuffer;
 
 use crate::recording::common::{disk_with_room, header, tick};

@@ -2,13 +2,13 @@
 use std::path::PathBuf;
 
 use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
-use bench::rt::arming::{State, Trip};
-use bench::rt::record::{
+use bench_hal::Validity;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{
     ClockTimes, Event, EventKind, LoopMessage, Origin, Refusal, RequestEvent, RequestKind,
     TickRecord,
 };
-use bench::rt::tuning::{Factors, Tune};
-use bench_hal::Validity;
+use bench_rt::tuning::{Factors, Tune};
 
 use crate::recording::common::{
     CONFIG, PERIOD_NS, STARTED_NS, bits, events_of, header, run, tick, ticks_of, write,

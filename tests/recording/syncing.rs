@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use bench::recording::{Recorder, Recording, Syncable};
-use bench::rt::record::LoopMessage;
+use bench_rt::record::LoopMessage;
 
 use crate::recording::common::{header, tick};
 

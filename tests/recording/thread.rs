@@ -2,7 +2,7 @@
 use std::time::{Duration, Instant};
 
 use bench::recording::{Recorder, Recording, spawn};
-use bench::rt::record::{Event, EventKind, LoopMessage};
+use bench_rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
 
 use crate::recording::common::{disk_with_room, header, run, tick};

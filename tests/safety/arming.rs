@@ -4,17 +4,17 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bench::experiment::{self, Plan};
-use bench::rt::arming::{State, Transition};
-use bench::rt::clock::Virtual;
-use bench::rt::live_loop::run_to_end;
-use bench::rt::program::{Decision, Program, ProgramInput};
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage, Origin, Refusal, RequestEvent};
-use bench::rt::request::RequestSender;
-use bench::rt::servo::{Request, Servo};
-use bench::rt::servo_run::{Connections, Progress, ServoRun};
-use bench::rt::thread::Pace;
 use bench_hal::{Rig, Validity};
+use bench_rt::arming::{State, Transition};
+use bench_rt::clock::Virtual;
+use bench_rt::live_loop::run_to_end;
+use bench_rt::program::{Decision, Program, ProgramInput};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{EventKind, LoopMessage, Origin, Refusal, RequestEvent};
+use bench_rt::request::RequestSender;
+use bench_rt::servo::{Request, Servo};
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
+use bench_rt::thread::Pace;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::safety::faulty_rig::Fault;

@@ -1,14 +1,14 @@
 //! Bumpless closing of the loop: neither a probe offset nor an old set-point causes a step of the current.
 use std::ops::Range;
 
-use bench::rt::arming::State;
-use bench::rt::program::{Control, Program, ProgramInput};
-use bench::rt::record::{TickRecord, flag};
-use bench::rt::servo::Request;
 use bench_config::{Config, ReferenceSettings};
 use bench_control::{ControlLaw, Controller, ControllerText, LawInput, SectionController};
 use bench_excitation::{HoldReference, Reference, ReferenceContext};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::State;
+use bench_rt::program::{Control, Program, ProgramInput};
+use bench_rt::record::{TickRecord, flag};
+use bench_rt::servo::Request;
 
 use crate::safety::faulty_rig::{Fault, FaultyRig};
 use crate::safety::rig::{Bench, stage};

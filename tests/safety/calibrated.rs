@@ -1,9 +1,9 @@
 //! The interlocks judge readings and set-points of the devices, whatever a calibration makes of them.
-use bench::rt::arming::Trip;
-use bench::rt::record::EventKind;
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, Correction, ProbeCalibration,
 };
+use bench_rt::arming::Trip;
+use bench_rt::record::EventKind;
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{AmplifierCall, Bench, endless, stage};

@@ -1,8 +1,8 @@
 //! The state Enabling: no amplifier is enabled blind, nothing waits, and a stop or a trip ends it at once.
-use bench::rt::arming::State;
-use bench::rt::record::{EventKind, Refusal, RequestKind};
-use bench::rt::servo::Request;
 use bench_hal::Validity;
+use bench_rt::arming::State;
+use bench_rt::record::{EventKind, Refusal, RequestKind};
+use bench_rt::servo::Request;
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{AmplifierCall, Bench, endless, stage};

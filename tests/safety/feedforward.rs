@@ -1,11 +1,11 @@
 //! The feedforward current: the interlocks judge the sum, the factor of the reference and the ramp at the end apply to it.
-use bench::rt::arming::{State, Trip};
-use bench::rt::program::{Control, Program, ProgramInput};
-use bench::rt::record::EventKind;
-use bench::rt::servo::Request;
-use bench::rt::tuning::{Factors, Tune};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::command::{CommandSource, LoopCommand};
+use bench_rt::arming::{State, Trip};
+use bench_rt::program::{Control, Program, ProgramInput};
+use bench_rt::record::EventKind;
+use bench_rt::servo::Request;
+use bench_rt::tuning::{Factors, Tune};
 
 use crate::safety::rig::{Bench, stage};
 

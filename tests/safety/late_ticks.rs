@@ -3,18 +3,18 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 use std::time::Duration;
 
-use bench::rt::clock::{Clock, Realtime, TickTiming};
-use bench::rt::live_loop::run_to_end;
-use bench::rt::program::{Decision, Program, ProgramInput};
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{LoopMessage, TickRecord, flag};
-use bench::rt::request::RequestSender;
-use bench::rt::servo::{Request, Servo};
-use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick,
 };
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::clock::{Clock, Realtime, TickTiming};
+use bench_rt::live_loop::run_to_end;
+use bench_rt::program::{Decision, Program, ProgramInput};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{LoopMessage, TickRecord, flag};
+use bench_rt::request::RequestSender;
+use bench_rt::servo::{Request, Servo};
+use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
 use rtrb::RingBuffer;
 
 use crate::safety::rig::{CurrentProgram, StillRig, interlocks, stage};

@@ -6,19 +6,19 @@ use std::time::Duration;
 
 use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench::recording::Recording;
-use bench::rt::device_defect::DeviceDefect;
-use bench::rt::live_loop::{LiveLoop, LoopPanicked};
-use bench::rt::program::Program;
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage, Refusal};
-use bench::rt::request::{Request, RequestSender};
-use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::device_defect::DeviceDefect;
+use bench_rt::live_loop::{LiveLoop, LoopPanicked};
+use bench_rt::program::Program;
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{EventKind, LoopMessage, Refusal};
+use bench_rt::request::{Request, RequestSender};
+use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
+use bench_rt::thread::Pace;
 use rtrb::{Consumer, RingBuffer};
 
 use crate::safety::faulty_rig::{Fault, FaultyRig};

@@ -5,11 +5,11 @@
 //! probe, a current that is not followed, heat) are in `trips`.
 use std::ops::Range;
 
-use bench::rt::arming::{State, Trip};
-use bench::rt::record::EventKind;
-use bench::rt::servo::Request;
 use bench_hal::Validity;
 use bench_rig::calibration::Correction;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::EventKind;
+use bench_rt::servo::Request;
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{AmplifierCall, Bench, CurrentProgram, stage};

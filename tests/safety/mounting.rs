@@ -1,10 +1,10 @@
 //! The gain of the mounting is applied in the driver: the travel is judged in the metres of the stage and of the probe.
 use bench::experiment::{Plan, run};
-use bench::rt::arming::Trip;
-use bench::rt::thread::Pace;
 use bench_config::{Config, Source, load};
 use bench_hal::{Reading, Tick, Validity};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::Trip;
+use bench_rt::thread::Pace;
 
 use crate::safety::rig::{interlocks, stage};
 

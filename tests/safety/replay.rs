@@ -4,10 +4,6 @@ use std::path::{Path, PathBuf};
 
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::arming::State;
-use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
-use bench::rt::servo::Request;
-use bench::rt::thread::Pace;
 use bench_config::{
     AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
     whole,
@@ -16,6 +12,10 @@ use bench_excitation::{SineReference, StepReference};
 use bench_hal::Validity;
 use bench_rig::calibration::Correction;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::State;
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
+use bench_rt::servo::Request;
+use bench_rt::thread::Pace;
 
 use crate::safety::calibrated::calibration;
 use crate::safety::faulty_rig::{Fault, FaultyRig};

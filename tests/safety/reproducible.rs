@@ -2,9 +2,9 @@
 use std::path::Path;
 
 use bench::experiment::{self, Plan};
-use bench::rt::thread::Pace;
 use bench_config::{Config, Sweep};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 
 use crate::safety::rig::stage;
 
@@ -69,7 +69,7 @@ fn two_second_run_has_the_reference_digest() {
 
 /// The modules from the settings to a command.
 const COMMAND_PATH: [&str; 22] = [
-    "src/rt",
+    "crates/rt/src",
     "crates/rig/src/simulated",
     "crates/excitation/src",
     "crates/excitation/src/command",
@@ -180,15 +180,15 @@ fn command_path_calls_no_platform_libm() {
 #[test]
 fn tick_code_contains_no_lock_print_or_file_access() {
     let tick = [
-        "src/rt/servo.rs",
-        "src/rt/interlock.rs",
-        "src/rt/arming.rs",
-        "src/rt/trip.rs",
-        "src/rt/following_error.rs",
-        "src/rt/clock.rs",
-        "src/rt/program.rs",
-        "src/rt/publisher.rs",
-        "src/rt/record.rs",
+        "crates/rt/src/servo.rs",
+        "crates/rt/src/interlock.rs",
+        "crates/rt/src/arming.rs",
+        "crates/rt/src/trip.rs",
+        "crates/rt/src/following_error.rs",
+        "crates/rt/src/clock.rs",
+        "crates/rt/src/program.rs",
+        "crates/rt/src/publisher.rs",
+        "crates/rt/src/record.rs",
     ];
     let others = [
         "crates/control/src/biquad.rs",

@@ -1,10 +1,10 @@
 //! Random sequences of requests and faults: current flows only in a run that was armed and started after the last trip.
 use std::ops::Range;
 
-use bench::rt::arming::State;
-use bench::rt::record::{Event, EventKind, flag};
-use bench::rt::servo::Request;
 use bench_hal::Validity;
+use bench_rt::arming::State;
+use bench_rt::record::{Event, EventKind, flag};
+use bench_rt::servo::Request;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 
@@ -238,7 +238,7 @@ fn virtual_pace_loses_no_message_with_a_full_request_ring() {
     bench.tick();
     let published = bench.all.len() - before;
     assert!(
-        published <= bench::rt::publisher::SLOTS_PER_TICK,
+        published <= bench_rt::publisher::SLOTS_PER_TICK,
         "{published} in one tick"
     );
     // Request and state for each request except the last, which waits; armed, running, trip, tripped; then the record.

@@ -4,13 +4,13 @@ use std::task::Poll;
 
 use bench::experiment::{Plan, replay, residuals, run};
 use bench::recording::Recording;
-use bench::rt::arming::Trip;
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::Decision;
-use bench::rt::thread::Pace;
 use bench_config::{Config, Source, load};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::Trip;
+use bench_rt::interlock::Interlocks;
+use bench_rt::program::Decision;
+use bench_rt::thread::Pace;
 
 use crate::safety::rig::interlocks;
 

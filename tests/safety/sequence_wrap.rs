@@ -1,7 +1,7 @@
 //! The count of a probe wraps without a trip, and without a reading that is taken for an old one.
-use bench::rt::arming::State;
-use bench::rt::servo::Request;
 use bench_hal::{Devices, DisplacementProbe, Reading, Tick};
+use bench_rt::arming::State;
+use bench_rt::servo::Request;
 
 use crate::safety::rig::{Bench, StillRig, endless, stage};
 

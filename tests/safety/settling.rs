@@ -1,14 +1,14 @@
 //! The end of a run: reference and current go to zero along ramps; a trip and a stop request cut the current at once.
-use bench::rt::arming::State;
-use bench::rt::program::{Control, Excite, Program};
-use bench::rt::record::{EventKind, TickRecord, flag};
-use bench::rt::servo::Request;
-use bench::rt::settling::{Settling, SettlingStep};
 use bench_config::Config;
 use bench_control::{Controller, ControllerText, SectionController};
 use bench_excitation::Reference;
 use bench_hal::Validity;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::State;
+use bench_rt::program::{Control, Excite, Program};
+use bench_rt::record::{EventKind, TickRecord, flag};
+use bench_rt::servo::Request;
+use bench_rt::settling::{Settling, SettlingStep};
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{Bench, CurrentProgram, endless, stage};

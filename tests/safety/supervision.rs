@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use bench::experiment::{self, Plan, Run, StopCause, replay};
 use bench::recording::Recording;
-use bench::rt::arming::State;
-use bench::rt::record::{EventKind, Origin, Refusal, RequestEvent, RequestKind};
-use bench::rt::servo::Request;
-use bench::rt::supervision::{ArmLease, StopFlags};
-use bench::rt::thread::Pace;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::State;
+use bench_rt::record::{EventKind, Origin, Refusal, RequestEvent, RequestKind};
+use bench_rt::servo::Request;
+use bench_rt::supervision::{ArmLease, StopFlags};
+use bench_rt::thread::Pace;
 
 use crate::safety::rig::{AmplifierCall, Bench, Log, LoggedRig, endless, stage};
 

@@ -4,15 +4,15 @@ use std::sync::mpsc::Sender;
 
 use bench::experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench::recording::Recording;
-use bench::rt::program::{Control, Program};
-use bench::rt::record::{EventKind, Refusal, RequestKind, TickRecord};
-use bench::rt::servo::Request;
-use bench::rt::thread::Pace;
-use bench::rt::tuning::{Factors, Tune, TuneError};
 use bench_config::{Config, ReferenceSettings};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::program::{Control, Program};
+use bench_rt::record::{EventKind, Refusal, RequestKind, TickRecord};
+use bench_rt::servo::Request;
+use bench_rt::thread::Pace;
+use bench_rt::tuning::{Factors, Tune, TuneError};
 
 use crate::safety::rig::{Bench, StillRig, endless, stage};
 

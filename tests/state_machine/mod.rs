@@ -15,8 +15,8 @@ mod test_loop;
 use std::cell::RefCell;
 use std::collections::HashMap;
 
-use bench::rt::arming::State;
 use bench_config::{Config, Source, load};
+use bench_rt::arming::State;
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseResult, TestRunner};
 

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use bench::rt::arming::State;
 use bench_config::Config;
+use bench_rt::arming::State;
 
 use crate::state_machine::sequence::{Fault, Faults, Load, Order, TickInputs};
 

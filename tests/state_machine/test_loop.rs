@@ -2,20 +2,20 @@
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::task::Poll;
 
-use bench::rt::clock::{TickTiming, Virtual};
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program, ProgramInput};
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
-use bench::rt::request::RequestSender;
-use bench::rt::servo::{Request, Servo};
-use bench::rt::servo_run::{Connections, Progress, ServoRun};
-use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
-use bench::rt::tuning::{Factors, Tune};
 use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick, Validity,
 };
+use bench_rt::clock::{TickTiming, Virtual};
+use bench_rt::interlock::Interlocks;
+use bench_rt::program::{Decision, Program, ProgramInput};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
+use bench_rt::request::RequestSender;
+use bench_rt::servo::{Request, Servo};
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
+use bench_rt::supervision::{ArmLease, LeaseWatch, StopFlags};
+use bench_rt::tuning::{Factors, Tune};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::state_machine::model::{Begun, RunSettings};

@@ -5,10 +5,10 @@
 //! `BENCH_MONITOR_SHARE` a share `interlock.model_error_share` other than 0.5, to find the margin.
 
 use bench::experiment::{Plan, closed_loop, run};
-use bench::rt::arming::Trip;
-use bench::rt::thread::Pace;
 use bench_config::{Config, ExcitationKind, PlantSettings, Source, load};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::arming::Trip;
+use bench_rt::thread::Pace;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 

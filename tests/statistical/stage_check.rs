@@ -6,10 +6,10 @@ use bench::experiment::certificate::{CertificateText, ResponseFile, certify};
 use bench::experiment::stage_check::{PlannedStageCheck, StageCheck};
 use bench::experiment::{self, Plan, Run, analyse};
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
 use bench_config::{Config, Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 
 /// The stage with the fast controller, D = +10 %, and a chirp of 40 s.
 fn config(more: &[String]) -> Config {

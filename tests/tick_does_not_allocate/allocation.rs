@@ -1,10 +1,10 @@
 //! No tick allocates.
 use assert_no_alloc::assert_no_alloc;
 use bench::experiment::{Plan, residuals};
-use bench::rt::clock::TickTiming;
-use bench::rt::servo::Request;
-use bench::rt::tuning::{Factors, Tune};
 use bench_hal::Tick;
+use bench_rt::clock::TickTiming;
+use bench_rt::servo::Request;
+use bench_rt::tuning::{Factors, Tune};
 
 use crate::faulty_rig::Fault;
 use crate::programs::programs;

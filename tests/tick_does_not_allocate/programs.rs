@@ -1,5 +1,4 @@
 //! Programs of every kind, each with a duration of about 1 s.
-use bench::rt::program::{Control, Excite, Program};
 use bench_config::{AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint};
 use bench_control::{ControlDesign, ControllerText};
 use bench_excitation::command::{CommandFilter, FilteredCommand, Taps};
@@ -7,6 +6,7 @@ use bench_excitation::{
     Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
     StepReference, SweptReference, ZeroCurrent,
 };
+use bench_rt::program::{Control, Excite, Program};
 
 /// Name of the program that commands zero current.
 pub const NO_CURRENT: &str = "no current";

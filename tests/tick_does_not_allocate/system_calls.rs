@@ -1,8 +1,8 @@
 //! No tick makes a system call: the loop runs in a child process in which the kernel allows none.
 use assert_no_alloc::assert_no_alloc;
-use bench::rt::clock::{Clock, Realtime, TickTiming};
-use bench::rt::servo::Request;
 use bench_config::{Config, Source, load};
+use bench_rt::clock::{Clock, Realtime, TickTiming};
+use bench_rt::servo::Request;
 
 use crate::faulty_rig::Fault;
 use crate::programs::programs;

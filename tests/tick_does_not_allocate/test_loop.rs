@@ -3,17 +3,17 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use assert_no_alloc::assert_no_alloc;
-use bench::rt::clock::{Clock, TickTiming, Virtual};
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program, ProgramInput};
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{EventKind, LoopMessage};
-use bench::rt::request::RequestSender;
-use bench::rt::residual::Residuals;
-use bench::rt::servo::{Request, Servo};
-use bench::rt::servo_run::{Connections, Progress, ServoRun};
 use bench_config::Config;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::clock::{Clock, TickTiming, Virtual};
+use bench_rt::interlock::Interlocks;
+use bench_rt::program::{Decision, Program, ProgramInput};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{EventKind, LoopMessage};
+use bench_rt::request::RequestSender;
+use bench_rt::residual::Residuals;
+use bench_rt::servo::{Request, Servo};
+use bench_rt::servo_run::{Connections, Progress, ServoRun};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};

@@ -18,7 +18,7 @@
 /// }
 ///
 /// assert!(Pulse.active(99) && !Pulse.active(100));
-/// // `bench::rt::program::Excite`(Pulse) is the program that runs it.
+/// // `bench_rt::program::Excite`(Pulse) is the program that runs it.
 /// ```
 pub trait Excitation: Send {
     /// The current in amperes; `tick` counts from 0. Called in the tick: must not allocate or block.

@@ -7,10 +7,10 @@ use super::FigureError;
 use super::model::Model;
 use bench::experiment::{self, Analysis, Plan, TrackingMetrics};
 use bench::recording::Recording;
-use bench::rt::record::{TickRecord, flag};
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_rig::devices;
+use bench_rt::record::{TickRecord, flag};
+use bench_rt::thread::Pace;
 
 /// Runs that several figures show; each is made once.
 #[derive(Debug)]

@@ -28,7 +28,7 @@ use crate::daemon::secret::Secret;
 use crate::daemon::shared::{Daemon, now};
 use crate::daemon::worker;
 use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
-use crate::rt::tuning::{Factors, Tune};
+use bench_rt::tuning::{Factors, Tune};
 
 /// The part of a path that names a command.
 #[derive(Debug, Deserialize, JsonSchema)]

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::recording::event_text;
-use crate::rt::record::{Event, EventKind};
+use bench_rt::record::{Event, EventKind};
 
 /// An event.
 #[derive(Clone, Debug, Serialize, JsonSchema)]

@@ -1,7 +1,7 @@
 //! Samples for clients: minimum and maximum of blocks of ticks, so that a spike of one tick is not lost.
 
-use crate::rt::record::{TickRecord, flag};
 use bench_hal::Validity;
+use bench_rt::record::{TickRecord, flag};
 
 /// Signals of a frame: reference, position and error in metres, current in amperes.
 pub const SIGNALS: usize = 4;

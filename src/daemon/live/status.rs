@@ -4,9 +4,9 @@ use hdrhistogram::Histogram;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::rt::arming::{State, Trip};
-use crate::rt::record::{TickRecord, flag};
 use bench_config::Config;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{TickRecord, flag};
 
 /// Upper edges of the bars of the histogram of the lateness, in microseconds; the last bar has no upper edge.
 pub const EDGES_US: [f64; 11] = [

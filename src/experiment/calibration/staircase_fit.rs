@@ -1,11 +1,11 @@
 //! Fits the recording of a staircase of static currents: compliance with its sign, rest position, linearity, hysteresis.
 
 use crate::recording::{Recording, RecordingError};
-use crate::rt::arming::State;
-use crate::rt::record::TickRecord;
 use bench_base::running_stats::RunningStats;
 use bench_config::{CalibrateSettings, ScaleBy};
 use bench_excitation::Staircase;
+use bench_rt::arming::State;
+use bench_rt::record::TickRecord;
 
 /// The stage must move by this many standard deviations of the mean of a level.
 const MIN_SIGMAS: f64 = 20.0;

@@ -21,9 +21,9 @@ use crate::experiment::plan::Plan;
 use crate::experiment::run::Run;
 use crate::experiment::runner::{Runner, Setup, close};
 use crate::recording::Recording;
-use crate::rt::arming::Trip;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_rt::arming::Trip;
 
 /// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.
 pub type RunPlan<'a> = dyn FnMut(Setup, &Plan, &'static str) -> Result<Run, ExperimentError> + 'a;

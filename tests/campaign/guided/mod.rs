@@ -13,10 +13,10 @@ use bench::experiment::campaign::{
 };
 use bench::experiment::{Plan, run};
 use bench::recording::Recording;
-use bench::rt::thread::Pace;
 use bench_config::{Config, Purpose, Source, load};
 use bench_hal::Validity;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::thread::Pace;
 
 use crate::campaign::faulty_rig::{Fault, FaultyRig};
 

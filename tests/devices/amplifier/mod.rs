@@ -7,10 +7,6 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bench::experiment::Plan;
-use bench::rt::arming::{State, Trip};
-use bench::rt::program::Program;
-use bench::rt::record::{EventKind, LoopMessage};
-use bench::rt::servo::Request;
 use bench_config::{Config, Source, load};
 use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::faults::*;
@@ -18,6 +14,10 @@ use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Val
 use bench_rig::devices::deferred::OutputTiming;
 use bench_rig::devices::{Requirements, can_amplifier};
 use bench_rig::emulator::{AmplifierServer, EmulatedFault, EventLog, FaultRequest, Stage};
+use bench_rt::arming::{State, Trip};
+use bench_rt::program::Program;
+use bench_rt::record::{EventKind, LoopMessage};
+use bench_rt::servo::Request;
 
 use crate::devices::rig::Bench;
 

@@ -3,11 +3,11 @@ mod amplifier;
 mod current;
 mod probe;
 
-use bench::rt::arming::{State, Trip};
-use bench::rt::record::{EventKind, flag};
-use bench::rt::servo::Request;
 use bench_config::Config;
 use bench_hal::Validity;
+use bench_rt::arming::{State, Trip};
+use bench_rt::record::{EventKind, flag};
+use bench_rt::servo::Request;
 
 use crate::safety::faulty_rig::Fault;
 use crate::safety::rig::{AmplifierCall, Bench, endless, stage};
@@ -99,7 +99,7 @@ fn assert_off_after_trip(bench: &Bench, at: u64, reason: &str) -> Trip {
         (reason, at),
         "{trip:?}"
     );
-    let tripped = |e: &bench::rt::record::Event| {
+    let tripped = |e: &bench_rt::record::Event| {
         e.tick == at
             && matches!(
                 e.kind,
@@ -127,7 +127,7 @@ fn first_trip(bench: &mut Bench, missed: u32) -> u64 {
     panic!("no trip");
 }
 
-fn constant() -> Box<dyn bench::rt::program::Program> {
+fn constant() -> Box<dyn bench_rt::program::Program> {
     endless(|_| SOME_A)
 }
 

@@ -102,7 +102,7 @@ fn repeated_measurement_trips_as_stale_independent_of_stated_age() {
 }
 
 /// A current step within the time in which the position may be constant.
-fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench::rt::program::Program> {
+fn stepping(from_a: f64, to_a: f64) -> Box<dyn bench_rt::program::Program> {
     endless(move |tick| if tick < AT + 50 { from_a } else { to_a })
 }
 

@@ -5,22 +5,22 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
 use bench::recording::{Header, Recorder, Recording};
-use bench::rt::arming::State;
-use bench::rt::clock::{TickTiming, Virtual};
-use bench::rt::interlock::Interlocks;
-use bench::rt::program::{Decision, Program, ProgramInput};
-use bench::rt::publisher::Publisher;
-use bench::rt::record::{Event, EventKind, LoopMessage, TickRecord};
-use bench::rt::request::RequestSender;
-use bench::rt::servo::{Request, Servo};
-use bench::rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
-use bench::rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use bench_config::{Config, Source, load};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
 };
 use bench_rig::calibration::Correction;
+use bench_rt::arming::State;
+use bench_rt::clock::{TickTiming, Virtual};
+use bench_rt::interlock::Interlocks;
+use bench_rt::program::{Decision, Program, ProgramInput};
+use bench_rt::publisher::Publisher;
+use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
+use bench_rt::request::RequestSender;
+use bench_rt::servo::{Request, Servo};
+use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
+use bench_rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use rtrb::{Consumer, RingBuffer};
 
 use crate::faulty_rig::{Fault, FaultyRig};

@@ -3,10 +3,10 @@ use std::path::{Path, PathBuf};
 
 use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
 use bench::recording::Recording;
-use bench::rt::servo_run::RunOutcome;
-use bench::rt::thread::Pace;
 use bench_config::Config;
 use bench_rig::simulated::SimulatedRig;
+use bench_rt::servo_run::RunOutcome;
+use bench_rt::thread::Pace;
 
 /// The recording of a run by `plan`, and how the run ended.
 pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {

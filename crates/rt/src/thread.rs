@@ -12,7 +12,8 @@ use bench_base::thread_priority::set_fifo;
 use bench_config::LoopSettings;
 
 /// `virtual` or `realtime`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
     /// Each tick starts immediately after the previous one: for simulation and tests.
@@ -89,7 +90,7 @@ impl Pace {
 
 /// Requests all system settings that prevent interruptions of the calling thread, which is the thread of the loop. Those of
 /// [`RunPrivileges`] are only tried, and given back.
-pub(crate) fn become_realtime(settings: &LoopSettings) -> Scheduling {
+pub fn become_realtime(settings: &LoopSettings) -> Scheduling {
     let mut scheduling = Scheduling::default();
     scheduling.try_memory();
     scheduling.try_idle_states();
