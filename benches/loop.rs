@@ -13,10 +13,10 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bench::experiment::{Plan, residuals, rig_model};
-use bench::recording::{self, DiskWatch, Header, Recorder};
 use bench_config::{Config, ControlSettings, Source, load};
 use bench_control::{Controller, ControllerText};
 use bench_hal::{Reading, Tick, Validity};
+use bench_recording::{DiskWatch, Header, Recorder};
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::clock::Virtual;
 use bench_rt::interlock::Interlocks;
@@ -232,9 +232,9 @@ fn recorded_run(config: &Config, plan: &Plan) -> (Duration, u64) {
     let path = folder.path().join("bench.mcap");
     let recorder = Recorder::create(&path, &header).expect("temporary file");
     let (mut servo, consumer) = started(config, plan);
-    let predicted_bytes = recording::predicted_bytes(u64::MAX);
+    let predicted_bytes = bench_recording::predicted_bytes(u64::MAX);
     let disk = DiskWatch::of(&path, predicted_bytes).expect("the file of the recording");
-    let recorder = recording::spawn(recorder, consumer, disk, None).expect("a thread");
+    let recorder = bench_recording::spawn(recorder, consumer, disk, None).expect("a thread");
     let start = Instant::now();
     run_to_end(
         &mut servo,

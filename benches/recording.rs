@@ -4,7 +4,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use bench::recording::{Header, Recorder, Recording};
+use bench_recording::{Header, Recorder, Recording};
 use bench_rt::record::{LoopMessage, TickRecord};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 

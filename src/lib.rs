@@ -59,5 +59,4 @@ pub mod doctor;
 pub mod experiment;
 pub mod export;
 pub mod model;
-pub mod recording;
 pub mod report;

@@ -7,9 +7,8 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 8] = [
+const ORDER: [&str; 7] = [
     "model",
-    "recording",
     "export",
     "experiment",
     "report",

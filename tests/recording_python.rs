@@ -5,8 +5,8 @@
 use std::path::Path;
 use std::process::Command;
 
-use bench::recording::{Header, Recorder};
 use bench_hal::Validity;
+use bench_recording::{Header, Recorder};
 use bench_rt::arming::{State, Trip};
 use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_test_support::program::Bench;

@@ -6,8 +6,8 @@ use std::hash::{DefaultHasher, Hasher};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use bench::recording::{Header, Recorder, RecordingError};
 use bench_config::Config;
+use bench_recording::{Header, Recorder, RecordingError};
 use bench_rt::arming::State;
 use bench_rt::record::{Event, EventKind, LoopMessage, Origin, RequestEvent, TickRecord};
 use bench_rt::thread::Pace;

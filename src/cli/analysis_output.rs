@@ -12,12 +12,12 @@ use crate::experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use crate::experiment::{
     AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
 };
-use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_recording::Recording;
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

@@ -18,7 +18,6 @@ use crate::experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
 };
-use crate::recording::Recording;
 use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
 };
@@ -27,6 +26,7 @@ use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
 use bench_identify::SIGMAS_95;
+use bench_recording::Recording;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

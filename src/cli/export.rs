@@ -10,7 +10,7 @@ use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use crate::experiment::{Ending, Plan, open_with_signals, recorded_frf};
 use crate::export::{ExportError, Format, Response, Target, write_response, write_signals};
-use crate::recording::Recording;
+use bench_recording::Recording;
 
 /// What is exported, and where it goes.
 #[derive(Clone, Debug, clap::Args)]

@@ -16,10 +16,10 @@ use super::run_options::{description_text, trip_text};
 use crate::experiment::{
     Description, Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals,
 };
-use crate::recording::Recording;
 use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_recording::Recording;
 
 /// The recording, and where the results go.
 #[derive(Clone, Debug, clap::Args)]

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::recording::{Cut, DamagedRange, MissingTicks, Recovered, recover};
+use bench_recording::{Cut, DamagedRange, MissingTicks, Recovered, recover};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]

@@ -9,7 +9,7 @@ use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::print_result;
 use crate::experiment::{Difference, replay};
-use crate::recording::{Cut, Recording};
+use bench_recording::{Cut, Recording};
 
 /// Which recording.
 #[derive(Clone, Debug, clap::Args)]

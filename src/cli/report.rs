@@ -12,7 +12,6 @@ use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use crate::experiment::run_comparison::RunResult;
 use crate::experiment::{Analysis, BasicResults, ControlRun, overview};
-use crate::recording::Recording;
 use crate::report::ReportError;
 use crate::report::run_pages::{
     BasicReport, BenchRun, ControlReport, comparison_page, page as analysed_page, plots,
@@ -20,6 +19,7 @@ use crate::report::run_pages::{
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_recording::Recording;
 
 /// The page on standard output instead of a file.
 const STANDARD_OUTPUT: &str = "-";

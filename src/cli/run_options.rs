@@ -282,7 +282,7 @@ fn realtime_text(timing: &TimingSummary) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::Quantiles;
+    use bench_recording::Quantiles;
     use bench_rt::thread::Scheduling;
 
     #[test]

@@ -18,7 +18,6 @@ use crate::experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
     recorded_disturbance,
 };
-use crate::recording::Recording;
 use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
@@ -30,6 +29,7 @@ use bench_control::tuning::{
     Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
 };
 use bench_plant::SignalPath;
+use bench_recording::Recording;
 
 /// What is designed, and for which plants.
 #[derive(Clone, Debug, clap::Args)]

@@ -17,13 +17,13 @@ use crate::experiment::sequential::{
     first_shot_config, until_decided,
 };
 use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
-use crate::recording::Recording;
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
 use bench_config::Config;
 use bench_identify::verdict::MAX_LOOKS;
+use bench_recording::Recording;
 
 /// Options of a sequential experiment.
 #[derive(Clone, Debug, clap::Args)]

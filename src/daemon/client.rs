@@ -24,8 +24,8 @@ use crate::experiment::{
     ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
     RunReport, Stage, StopSignals,
 };
-use crate::recording::{RecordingError, Totals};
 use bench_base::progress::Progress;
+use bench_recording::{RecordingError, Totals};
 use bench_rt::thread::Pace;
 
 /// Longest time between two renewals of the arm lease of a run.

@@ -9,7 +9,7 @@ use foxglove::{
 use tokio::runtime::Handle;
 
 use super::live::hub::Viewer;
-use crate::recording::{EncodedMessage, Topic, descriptor_set};
+use bench_recording::{EncodedMessage, Topic, descriptor_set};
 
 /// Messages that a slow viewer may be behind; then the oldest ones are left out for it. 3 s at 5 kHz.
 const BACKLOG: usize = 16_384;

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::live::status::EDGES_US;
 use super::shared::Daemon;
-use crate::recording::free_bytes;
+use bench_recording::free_bytes;
 use bench_rig::devices::{CanAmplifier, can_amplifier};
 use bench_rt::arming::State;
 

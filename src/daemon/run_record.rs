@@ -4,8 +4,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::recording::{Recording, RecordingError, recover};
 use bench_base::lock_file::{Holder, LockError, LockFile};
+use bench_recording::{Recording, RecordingError, recover};
 
 /// The file of the record, in the folder of the recordings.
 const FILE: &str = ".bench-daemon.lock";
@@ -140,7 +140,7 @@ fn rename(from: &Path, to: &Path) -> Result<(), RecordingError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::{Header, Recorder};
+    use bench_recording::{Header, Recorder};
     use bench_rt::record::{LoopMessage, TickRecord};
 
     fn begin(folder: &Path) -> RunRecord {

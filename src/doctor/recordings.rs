@@ -6,7 +6,7 @@ use nix::unistd::{AccessFlags, eaccess};
 use serde::Serialize;
 
 use super::finding::{Finding, Subject};
-use crate::recording::{MIN_FREE_BYTES, free_bytes, nearest_existing, predicted_bytes};
+use bench_recording::{MIN_FREE_BYTES, free_bytes, nearest_existing, predicted_bytes};
 
 /// Facts about the folder.
 #[derive(Clone, Debug, PartialEq)]

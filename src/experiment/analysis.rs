@@ -14,7 +14,6 @@ use super::read_run::{ReadSignals, is_closed_loop, is_of_run};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
 use super::signal_builder::{RunSignals, SignalBuilder};
-use crate::recording::Recording;
 use bench_config::Config;
 use bench_identify::delay::excess_delay;
 use bench_identify::linearity::Linearity;
@@ -22,6 +21,7 @@ use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use bench_identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
 use bench_identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use bench_plant::{ModalModel, Mode, Sign};
+use bench_recording::Recording;
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;

@@ -1,11 +1,11 @@
 //! Why a recording cannot be analysed.
 
 use super::plan_error::PlanError;
-use crate::recording::RecordingError;
 use bench_control::ControllerError;
 use bench_control::measured::MeasuredLoopError;
 use bench_identify::IdentifyError;
 use bench_plant::PlantError;
+use bench_recording::RecordingError;
 
 /// Why a recording gives no frequency response.
 #[derive(Debug, thiserror::Error)]

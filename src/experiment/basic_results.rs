@@ -4,8 +4,8 @@ use super::calibration::{StaircaseResult, staircase};
 use super::campaign::RestPosition;
 use super::plan::RunKind;
 use super::stage_check::StageCheck;
-use crate::recording::Recording;
 use bench_config::Config;
+use bench_recording::Recording;
 
 /// What a run without a frequency response has found.
 #[derive(Clone, Debug)]

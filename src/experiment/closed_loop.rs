@@ -8,10 +8,10 @@ use super::plan::Plan;
 use super::plan_error::PlanError;
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::response_points::margins_of_loop;
-use crate::recording::Recording;
 use bench_config::{Config, ReferenceSettings};
 use bench_control::ClosedLoop;
 use bench_identify::joint::{self, JointEstimate, LoopSignals};
+use bench_recording::Recording;
 
 /// Estimates plant and loop by the instrumental-variable method, with the reference as the instrument.
 pub(super) fn estimate_loop(

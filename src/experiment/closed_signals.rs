@@ -1,6 +1,6 @@
 //! Reference and error of a recorded closed loop, tick by tick, for spectra and simulations.
 
-use crate::recording::{Recording, RecordingError};
+use bench_recording::{Recording, RecordingError};
 use bench_rt::record::{TickRecord, flag};
 
 /// Largest number of ticks: 400 s at 5 kHz. Later ticks are left out.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use crate::recording::Recording;
+use bench_recording::Recording;
 
 /// Most characters of a name.
 const MAX_NAME: usize = 200;

@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer};
 
-use crate::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::arming::Trip;
 use bench_rt::record::{Event, EventKind, RequestKind};
 use bench_rt::servo_run::RunOutcome;

@@ -9,11 +9,11 @@ use super::motor_error::MotorError;
 use super::plan_error::PlanError;
 use super::run_error::RunError;
 use super::stage_check::StageCheckError;
-use crate::recording::RecordingError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_excitation::ExcitationError;
 use bench_plant::PlantError;
+use bench_recording::RecordingError;
 use bench_rig::calibration::CalibrationError;
 use bench_rig::devices::DevicesError;
 

@@ -16,8 +16,8 @@ use super::run_error::RunError;
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
-use crate::recording::{self, DiskWatch, Recorder, free_bytes};
 use bench_config::{Config, LoopSettings, OnRecordingFailure};
+use bench_recording::{DiskWatch, Recorder, free_bytes};
 use bench_rt::device_defect::DeviceDefect;
 use bench_rt::interlock::Interlocks;
 use bench_rt::live_loop::LiveLoop;
@@ -196,7 +196,7 @@ impl PreparedRun<'_> {
         }
         rig.hooks.recording_defect.clear();
         let copy = rig.hooks.live_copy(self.plan.config.servo.period_s());
-        let recorder = recording::spawn(self.recorder, records, disk, copy);
+        let recorder = bench_recording::spawn(self.recorder, records, disk, copy);
         let recorder = recorder.map_err(RunError::Create)?;
         let mut supervisor = Supervisor {
             requests,

@@ -12,7 +12,6 @@ use super::analysis_error::AnalysisError;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
 use super::read_run::{ReadSignals, open_with_signals};
-use crate::recording::{Recording, RecordingError};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_control::ClosedLoop;
@@ -21,6 +20,7 @@ use bench_identify::delay::excess_delay;
 use bench_identify::frf_csv::{self, FrfCsvError};
 use bench_identify::{Estimate, Frf, FrfDatum};
 use bench_plant::LoopPlant;
+use bench_recording::{Recording, RecordingError};
 
 /// The phases are compared with the model up to this multiple of its highest mode.
 const LAST_MODE: f64 = 1.2;

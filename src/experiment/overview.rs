@@ -1,7 +1,7 @@
 //! A whole run as minima and maxima of short intervals: what a plot can show, with constant memory.
 
 use super::error::ExperimentError;
-use crate::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 /// Intervals of an overview: more than a plot has columns.

@@ -15,12 +15,12 @@ use super::plan_error::PlanError;
 use super::reference_check::{self, PlannedReference};
 use super::stage_check::RestAfterCheck;
 use super::swept_reference;
-use crate::recording::Recording;
 use bench_config::{CampaignSettings, Config, PlantSettings, whole};
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;
 use bench_excitation::{Extremes, StageCheckSettings, StageCheckSignal, Staircase, ZeroCurrent};
 use bench_plant::ModalModel;
+use bench_recording::Recording;
 use bench_rig::calibration::{Calibration, Correction};
 use bench_rt::program::{Control, Excite, Program};
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use super::analysis_error::AnalysisError;
 use super::plan::{KIND, RunKind};
 use super::signal_builder::{RunSignals, SignalBuilder};
-use crate::recording::{Preceding, Recording, RecordingError};
 use bench_config::whole;
+use bench_recording::{Preceding, Recording, RecordingError};
 use bench_rt::arming::State;
 use bench_rt::record::{TickRecord, flag};
 

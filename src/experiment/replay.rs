@@ -15,7 +15,7 @@ use super::live_rig::servo_run;
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
-use crate::recording::{Recording, RecordingError};
+use bench_recording::{Recording, RecordingError};
 use bench_rt::arming::{State, Trip};
 use bench_rt::clock::TickTiming;
 use bench_rt::program::Program;

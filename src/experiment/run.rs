@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::description::Description;
 use super::motor_start::MotorStart;
-use crate::recording::{Recorder, RecordingError, Shortage, Totals};
+use bench_recording::{Recorder, RecordingError, Shortage, Totals};
 use bench_rt::record::Origin;
 use bench_rt::servo_run::RunOutcome;
 use bench_rt::thread::{Pace, Scheduling};

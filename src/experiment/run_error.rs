@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::plan_error::PlanError;
-use crate::recording::{MIN_FREE_BYTES, RecordingError};
+use bench_recording::{MIN_FREE_BYTES, RecordingError};
 
 /// A run that was refused, or that failed.
 #[derive(Debug, thiserror::Error)]

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use crate::recording::{Recording, RecordingError};
 use bench_base::numeric::larger;
 use bench_config::Config;
+use bench_recording::{Recording, RecordingError};
 use bench_rig::motor::ThermalModel;
 use bench_rt::record::{TickRecord, flag};
 

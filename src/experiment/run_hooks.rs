@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rtrb::{Consumer, RingBuffer};
 
 use super::run::StopCause;
-use crate::recording::LiveCopy;
+use bench_recording::LiveCopy;
 use bench_rt::record::LoopMessage;
 use bench_rt::supervision::{ArmLease, StopFlags};
 use bench_rt::tuning::Tune;

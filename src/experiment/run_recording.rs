@@ -7,10 +7,10 @@ use std::time::SystemTime;
 use super::file_name;
 use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, OVERRIDE, Plan};
 use super::run_error::RunError;
-use crate::recording::{
+use bench_base::timestamp;
+use bench_recording::{
     Header, MIN_FREE_BYTES, Recorder, RecordingError, lacks_space, predicted_bytes,
 };
-use bench_base::timestamp;
 use bench_rt::thread::{Pace, Scheduling};
 
 /// Creates the recording, with everything that is known before the first tick.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::description::Description;
 use super::ending::Ending;
 use super::run::{Run, StopCause};
-use crate::recording::{Quantiles, RecordingError};
+use bench_recording::{Quantiles, RecordingError};
 use bench_rt::arming::Trip;
 use bench_rt::thread::{Pace, Scheduling};
 

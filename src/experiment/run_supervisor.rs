@@ -9,8 +9,8 @@ use super::run::StopCause;
 use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
-use crate::recording::Health;
 use bench_config::OnRecordingFailure;
+use bench_recording::Health;
 use bench_rt::live_loop::{LiveLoop, LoopPanicked};
 use bench_rt::record::Origin;
 use bench_rt::request::{Request, RequestSender};
@@ -136,7 +136,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::recording::{self, DiskState, DiskWatch, Header, Recorder};
+    use bench_recording::{DiskState, DiskWatch, Header, Recorder};
     use bench_rt::record::{LoopMessage, TickRecord};
 
     #[test]
@@ -213,7 +213,7 @@ mod tests {
             size_bytes,
         };
         let disk = DiskWatch::over(Box::new(move || state), 1000);
-        let recorder = recording::spawn(recorder, records, disk, None).unwrap();
+        let recorder = bench_recording::spawn(recorder, records, disk, None).unwrap();
         let health = recorder.health();
         assert_eq!(recorder.join().unwrap().ticks(), 1000, "all are recorded");
         health

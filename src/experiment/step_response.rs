@@ -4,10 +4,10 @@ use super::error::ExperimentError;
 use super::loop_check::closed_loop_of;
 use super::plan::Plan;
 use super::tracking::{TrackingMetrics, tracking_metrics};
-use crate::recording::Recording;
 use bench_control::{ClosedLoop, StepMetrics, step_metrics};
 use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand};
 use bench_excitation::{Reference, StepOfReference};
+use bench_recording::Recording;
 use bench_rt::record::flag;
 
 /// Largest number of ticks of a step: 200 s at 5 kHz.

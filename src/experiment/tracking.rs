@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::sine_response::{SineMeter, SineResponse};
-use crate::recording::{Recording, RecordingError};
 use bench_base::running_stats::RunningStats;
 use bench_config::{ControlSettings, LoopSettings};
 use bench_control::{SETTLING_BAND, StepMeter, StepMetrics};
+use bench_recording::{Recording, RecordingError};
 use bench_rt::record::{TickRecord, flag};
 
 /// How well a closed loop followed its reference.

@@ -7,8 +7,8 @@ use std::path::Path;
 use super::file::Output;
 use super::rows::{self, Rows};
 use super::{ExportError, SIGNALS, Signal, Value};
-use crate::recording::Recording;
 use bench_identify::{Frf, frf_csv};
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 pub(super) fn signals(recording: &Path, out: &mut Output) -> Result<Recording, ExportError> {

@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
-use crate::recording::RecordingError;
+use bench_recording::RecordingError;
 
 /// Why a file was not exported.
 #[derive(Debug, thiserror::Error)]

@@ -15,9 +15,9 @@ use super::response::Response;
 use super::rows::{self, Rows};
 use super::sections::Sections;
 use super::{ExportError, SIGNALS, Signal, Value};
-use crate::recording::Recording;
 use bench_base::units::rad_s;
 use bench_identify::Frf;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 /// Types of data elements.

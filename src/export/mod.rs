@@ -29,7 +29,7 @@ pub use file::Target;
 pub use response::Response;
 pub use signal::{Quantity, SIGNALS, Signal, Value};
 
-use crate::recording::{Recording, RecordingError};
+use bench_recording::{Recording, RecordingError};
 use file::write_new;
 
 /// Format of a file.

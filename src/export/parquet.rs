@@ -13,8 +13,8 @@ use ::parquet::schema::types::{Type, TypePtr};
 use super::file::Output;
 use super::rows::{self, Rows};
 use super::{ExportError, SIGNALS, Signal, Value};
-use crate::recording::Recording;
 use bench_identify::{Frf, frf_csv};
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 /// Number of rows in a row group, which is in memory while it is written: 17 columns of 8 bytes each are 9 MB.

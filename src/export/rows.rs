@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::ExportError;
-use crate::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 /// Takes the ticks of a recording.

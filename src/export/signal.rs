@@ -1,6 +1,6 @@
 //! The signals of a tick, with the unit in the name.
 
-use crate::recording::messages::Loop;
+use bench_recording::messages::Loop;
 use bench_rt::record::TickRecord;
 
 /// What a real signal is, for the axes of formats that ask for it.

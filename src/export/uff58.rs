@@ -12,7 +12,7 @@ use super::response::Response;
 use super::rows::{self, Rows};
 use super::sections::Sections;
 use super::{ExportError, Quantity, SIGNALS, Signal, Value};
-use crate::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 
 /// Number of ordinates in a line.

@@ -2,7 +2,7 @@
 use std::path::Path;
 
 use assert_cmd::Command;
-use bench::recording::Recording;
+use bench_recording::Recording;
 use serde_json::Value;
 
 fn bench(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {

@@ -3,9 +3,9 @@ use std::path::Path;
 
 use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench::experiment::{self, Plan};
-use bench::recording::Recording;
 use bench_config::{Config, ScaleBy, Source, load};
 use bench_hal::Rig;
+use bench_recording::Recording;
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };

@@ -3,10 +3,10 @@ use std::process::Command;
 
 use bench::experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
 use bench::experiment::{self, Plan, analyse};
-use bench::recording::Recording;
 use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, SIGMAS_95};
 use bench_plant::{ModalModel, build};
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;
 use serde_json::Value;

@@ -1,5 +1,5 @@
 //! `bench control` with a certificate, and with an override.
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::EventKind;
 use bench_test_support::program::{Answer, Bench};
 

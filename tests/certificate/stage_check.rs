@@ -4,9 +4,9 @@ use bench::experiment::stage_check::{
     PhaseComparison, PlannedStageCheck, StageCheck, StageCheckError, StaticComparison,
 };
 use bench::experiment::{self, ExperimentError, Plan};
-use bench::recording::Recording;
 use bench_config::Config;
 use bench_hal::Rig;
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;
 

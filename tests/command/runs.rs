@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::path::Path;
 
 use bench::experiment::replay;
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::flag;
 use nalgebra::Complex;
 use serde_json::Value;

@@ -1,7 +1,7 @@
 //! A daemon that is killed: the next one is disarmed, says why it started, and recovers the recording.
 use std::path::{Path, PathBuf};
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 
 use crate::daemon::common::Daemon;
 

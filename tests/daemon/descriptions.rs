@@ -18,7 +18,7 @@ fn recording(folder: &Path) -> PathBuf {
 }
 
 fn described(path: &Path) -> [Option<String>; 3] {
-    let recording = bench::recording::Recording::open(path).expect("a recording");
+    let recording = bench_recording::Recording::open(path).expect("a recording");
     let found = bench::experiment::Description::of(&recording);
     [found.name, found.note, found.operator]
 }

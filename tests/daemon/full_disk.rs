@@ -1,6 +1,6 @@
 //! A run whose recording cannot be written: it ends, or goes on unrecorded. A limit of the size of files takes the place of a full
 //! disk: every write beyond it fails.
-use bench::recording::Recording;
+use bench_recording::Recording;
 use serde_json::Value;
 
 use crate::daemon::common::Daemon;

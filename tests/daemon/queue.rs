@@ -74,11 +74,11 @@ fn run_under_a_lease_is_tuned_and_settles_at_a_stop() {
 fn recorded_events(daemon: &Daemon, run: &Value) -> Vec<String> {
     let file = run["recording"].as_str().expect("a recording");
     let recording =
-        bench::recording::Recording::open(&daemon.recordings().join(file)).expect("readable");
+        bench_recording::Recording::open(&daemon.recordings().join(file)).expect("readable");
     recording
         .events()
         .iter()
-        .map(bench::recording::event_text)
+        .map(bench_recording::event_text)
         .collect()
 }
 
@@ -160,7 +160,7 @@ fn killed_command_stops_control() {
         .path()
         .join("recordings")
         .join(run["recording"].as_str().expect("a recording"));
-    let recording = bench::recording::Recording::open(&file).expect("a complete recording");
+    let recording = bench_recording::Recording::open(&file).expect("a complete recording");
     assert!(!recording.truncated());
 }
 
@@ -252,12 +252,12 @@ fn sigterm_settles_the_run_and_completes_its_recording() {
         .filter(|path| path.extension().is_some_and(|e| e == "mcap"))
         .collect();
     assert_eq!(mcap.len(), 1);
-    let recording = bench::recording::Recording::open(&mcap[0]).expect("a complete recording");
+    let recording = bench_recording::Recording::open(&mcap[0]).expect("a complete recording");
     assert!(!recording.truncated(), "the file has its end");
     let events: Vec<String> = recording
         .events()
         .iter()
-        .map(bench::recording::event_text)
+        .map(bench_recording::event_text)
         .collect();
     assert!(
         events.iter().any(|event| event == "settling -> disarmed"),

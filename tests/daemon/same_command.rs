@@ -233,7 +233,7 @@ fn daemon_checks_certificate_and_stage_of_an_order_and_records_the_reason_of_an_
     let path = folder
         .path()
         .join(report["recording"].as_str().expect("a path"));
-    let recording = bench::recording::Recording::open(&path).expect("a recording");
+    let recording = bench_recording::Recording::open(&path).expect("a recording");
     let recorded = recording.metadata().get("override").map(String::as_str);
     assert_eq!(recorded, Some(reason));
 }

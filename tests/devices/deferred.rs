@@ -2,12 +2,12 @@
 use std::time::Duration;
 
 use bench::experiment::{self, Plan, replay};
-use bench::recording::Recording;
 use bench_config::Config;
 use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, MemoryEndpoint};
 use bench_hal::can::pdo::{Direction, cob_id, unpack};
 use bench_hal::{CurrentAmplifier, Rig};
+use bench_recording::Recording;
 use bench_rig::devices::deferred::{Deferred, OutputTiming};
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::State;

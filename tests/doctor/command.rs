@@ -128,7 +128,7 @@ fn json_has_findings_and_figures_in_si_units() {
     // The chirp: 2 + 110 + 8 s at 5 kHz.
     assert_eq!(
         report["recordings"]["needed_bytes"],
-        600_000 * bench::recording::BYTES_PER_TICK
+        600_000 * bench_recording::BYTES_PER_TICK
     );
     assert!(
         report["control"]["modulus_margin"].is_f64()
@@ -275,7 +275,7 @@ fn recorded_tick_size_is_within_the_disk_space_estimate() {
             .len();
         let per_tick = bytes / run["ticks"].as_u64().unwrap();
         assert!(
-            (40..=bench::recording::BYTES_PER_TICK).contains(&per_tick),
+            (40..=bench_recording::BYTES_PER_TICK).contains(&per_tick),
             "{command}: {per_tick} bytes"
         );
     }

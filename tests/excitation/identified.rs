@@ -1,9 +1,9 @@
 //! Multisine, binary sequence and stepped sine each give the response of the rig and its modes.
 use bench::experiment::{Analysis, replay};
-use bench::recording::Recording;
 use bench_config::Config;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::Cnmp;
+use bench_recording::Recording;
 use nalgebra::Complex;
 use serde_json::json;
 

@@ -2,8 +2,8 @@
 use std::path::{Path, PathBuf};
 
 use bench::experiment::{Analysis, Plan};
-use bench::recording::Recording;
 use bench_config::{Config, Purpose, Source, load};
+use bench_recording::Recording;
 
 use crate::excitation::simulated;
 

@@ -11,8 +11,8 @@ mod targets;
 use std::path::Path;
 use std::sync::OnceLock;
 
-use bench::recording::{Header, Recorder};
 use bench_hal::Validity;
+use bench_recording::{Header, Recorder};
 use bench_rt::arming::State;
 use bench_rt::record::{LoopMessage, TickRecord};
 use bench_test_support::program::Bench;

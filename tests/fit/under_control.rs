@@ -2,11 +2,11 @@
 use std::f64::consts::TAU;
 
 use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
-use bench::recording::Recording;
 use bench_config::{Config, ReferenceSettings, Source, load};
 use bench_excitation::SweptReference;
 use bench_identify::verdict::Cnmp;
 use bench_plant::LoopPlant;
+use bench_recording::Recording;
 use bench_rig::simulated::modes as simulated_modes;
 use bench_rt::arming::State;
 

@@ -3,11 +3,11 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use bench::experiment::{Plan, analyse};
-use bench::recording::{Header, Recorder, Recording};
 use bench_config::Config;
 use bench_excitation::{Chirp, Excitation};
 use bench_hal::Validity;
 use bench_plant::Mode;
+use bench_recording::{Header, Recorder, Recording};
 use bench_rig::simulated::{self, LiveStage};
 use bench_rt::arming::State;
 use bench_rt::record::{LoopMessage, TickRecord, flag};

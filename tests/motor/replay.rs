@@ -1,6 +1,6 @@
 //! The interlocks start with the heat of the motor, and a replay starts with the same heat.
 use bench::experiment::{Plan, replay, run};
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::Trip;
 use bench_rt::thread::Pace;

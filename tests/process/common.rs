@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 use bench_test_support::program::{NO_DAEMON, until_frozen};
 

@@ -2,7 +2,7 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::flag;
 
 use crate::process::common::{

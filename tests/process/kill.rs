@@ -1,7 +1,7 @@
 //! SIGKILL: the program cannot react, and the written part of the recording is still readable.
 use std::time::Duration;
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 

@@ -3,7 +3,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 use serde_json::Value;
 

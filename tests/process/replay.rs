@@ -3,7 +3,7 @@ use std::path::Path;
 use std::process::Output;
 use std::time::Duration;
 
-use bench::recording::{Header, Recorder, Recording};
+use bench_recording::{Header, Recorder, Recording};
 use bench_rt::record::{LoopMessage, TickRecord};
 
 use crate::process::common::{AT_1_KHZ, NO_OVERRUN_LIMIT, Running, bench, recording_in, stderr};

@@ -2,7 +2,7 @@
 use std::path::Path;
 use std::process::Stdio;
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rt::arming::State;
 use bench_rt::record::{Event, EventKind, RequestKind, TickRecord};
 

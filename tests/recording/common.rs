@@ -2,8 +2,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bench::recording::{DiskState, DiskWatch, Header, Recorder, Totals};
 use bench_hal::Validity;
+use bench_recording::{DiskState, DiskWatch, Header, Recorder, Totals};
 use bench_rt::arming::{State, Trip};
 use bench_rt::record::{
     Event, EventKind, LoopMessage, Origin, RequestEvent, RequestKind, TickRecord,

@@ -2,7 +2,7 @@
 use std::path::Path;
 use std::sync::LazyLock;
 
-use bench::recording::{Header, MissingTicks, Recorder, Recording, RecordingError, recover};
+use bench_recording::{Header, MissingTicks, Recorder, Recording, RecordingError, recover};
 use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use proptest::prelude::*;
 

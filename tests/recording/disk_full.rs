@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-use bench::recording::{
+use bench_recording::{
     DiskState, DiskWatch, Health, Recorder, Recording, RecordingError, Shortage, spawn,
 };
 use bench_rt::record::LoopMessage;

@@ -1,8 +1,8 @@
 //! Recorded data are read back unchanged; missing data are counted.
 use std::path::PathBuf;
 
-use bench::recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench_hal::Validity;
+use bench_recording::{Gap, Recorder, Recording, RecordingError, recover};
 use bench_rt::arming::{State, Trip};
 use bench_rt::record::{
     ClockTimes, Event, EventKind, LoopMessage, Origin, Refusal, RequestEvent, RequestKind,

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
-use bench::recording::{Recorder, Recording, Syncable};
+use bench_recording::{Recorder, Recording, Syncable};
 use bench_rt::record::LoopMessage;
 
 use crate::recording::common::{header, tick};

@@ -1,7 +1,7 @@
 //! The thread that writes messages from the ring to the disk.
 use std::time::{Duration, Instant};
 
-use bench::recording::{Recorder, Recording, spawn};
+use bench_recording::{Recorder, Recording, spawn};
 use bench_rt::record::{Event, EventKind, LoopMessage};
 use rtrb::RingBuffer;
 

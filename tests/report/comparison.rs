@@ -1,6 +1,6 @@
 //! `bench report`, and the plans of `bench control` and `bench calibrate`.
 
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_test_support::program::Bench;
 use serde_json::Value;
 

@@ -1,7 +1,7 @@
 //! The report that `bench control` writes after each run.
 
 use bench::experiment::{ControlRun, Plan, control_run};
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_test_support::program::Bench;
 use serde_json::{Value, json};
 

@@ -5,11 +5,11 @@ use std::task::Poll;
 use std::time::Duration;
 
 use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
-use bench::recording::Recording;
 use bench_config::Config;
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::device_defect::DeviceDefect;
 use bench_rt::live_loop::{LiveLoop, LoopPanicked};

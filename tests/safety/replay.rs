@@ -3,13 +3,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
-use bench::recording::{Header, Recorder, Recording};
 use bench_config::{
     AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
     whole,
 };
 use bench_excitation::{SineReference, StepReference};
 use bench_hal::Validity;
+use bench_recording::{Header, Recorder, Recording};
 use bench_rig::calibration::Correction;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::State;

@@ -3,9 +3,9 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
 use bench::experiment::{Plan, replay, residuals, run};
-use bench::recording::Recording;
 use bench_config::{Config, Source, load};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::Trip;
 use bench_rt::interlock::Interlocks;

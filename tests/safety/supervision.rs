@@ -3,7 +3,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use bench::experiment::{self, Plan, Run, StopCause, replay};
-use bench::recording::Recording;
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::State;
 use bench_rt::record::{EventKind, Origin, Refusal, RequestEvent, RequestKind};

@@ -8,9 +8,9 @@ use bench::experiment::sequential::{
     SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
 };
 use bench::experiment::{Plan, Runner, Setup};
-use bench::recording::Recording;
 use bench_config::Config;
 use bench_identify::verdict::{Cnmp, MAX_LOOKS};
+use bench_recording::Recording;
 use bench_test_support::identified::{config, truth};
 use bench_test_support::program::{Bench, near, number};
 use bench_test_support::sequences::{decided, sequence};

@@ -5,9 +5,9 @@ use std::path::Path;
 use bench::experiment::certificate::{CertificateText, ResponseFile, certify};
 use bench::experiment::stage_check::{PlannedStageCheck, StageCheck};
 use bench::experiment::{self, Plan, Run, analyse};
-use bench::recording::Recording;
 use bench_config::{Config, Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;
 

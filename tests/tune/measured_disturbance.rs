@@ -1,8 +1,8 @@
 //! The disturbance of a recorded closed loop that held its position.
 
 use bench::experiment::tuning::recorded_disturbance;
-use bench::recording::Recording;
 use bench_control::tuning::{DesignOptions, DesignTask, NamedPlant, RigModel};
+use bench_recording::Recording;
 use bench_test_support::program::Bench;
 
 use crate::tune::stage::{config, options, requirements};

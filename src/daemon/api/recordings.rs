@@ -19,7 +19,7 @@ use crate::daemon::computations::Purpose;
 use crate::daemon::shared::Daemon;
 use crate::daemon::worker;
 use crate::experiment::ErrorKind;
-use crate::recording::Recording;
+use bench_recording::Recording;
 
 /// Most recordings on one page: the curves of more cannot be distinguished.
 const MAX_COMPARED: usize = 12;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::recording::event_text;
+use bench_recording::event_text;
 use bench_rt::record::{Event, EventKind};
 
 /// An event.

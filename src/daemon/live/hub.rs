@@ -17,11 +17,11 @@ use super::response::ResponseView;
 use super::status::{LatenessTotals, Status};
 pub use super::status::{LoopView, Share, TripView};
 use crate::experiment::{Feed, FeedSender, FeedSource, RunKind};
-use crate::recording::{EncodedMessage, LiveEncoder};
 use bench_base::thread_priority::lower;
 use bench_base::timestamp::unix_ns;
 use bench_config::Config;
 use bench_identify::GrowingResponse;
+use bench_recording::{EncodedMessage, LiveEncoder};
 use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord, flag};
 
 /// Period of the thread.

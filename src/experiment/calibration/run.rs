@@ -10,11 +10,11 @@ use crate::experiment::prediction::{extremes, predicted_extremes};
 use crate::experiment::run_summary::RunSummary;
 use crate::experiment::runner::{Runner, close};
 use crate::experiment::signals::abandon_on_signal;
-use crate::recording::Recording;
 use bench_base::timestamp;
 use bench_config::{Config, ExcitationKind};
 use bench_excitation::{Extremes, Staircase};
 use bench_plant::{ModalModel, PlantError};
+use bench_recording::Recording;
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };

@@ -1,9 +1,9 @@
 //! Fits the recording of a staircase of static currents: compliance with its sign, rest position, linearity, hysteresis.
 
-use crate::recording::{Recording, RecordingError};
 use bench_base::running_stats::RunningStats;
 use bench_config::{CalibrateSettings, ScaleBy};
 use bench_excitation::Staircase;
+use bench_recording::{Recording, RecordingError};
 use bench_rt::arming::State;
 use bench_rt::record::TickRecord;
 

@@ -7,10 +7,10 @@ use crate::experiment::analysis::{Analysis, analyse};
 use crate::experiment::analysis_error::AnalysisError;
 use crate::experiment::run::Run;
 use crate::experiment::sequential::Sequence;
-use crate::recording::{Recording, RecordingError};
 use bench_config::Config;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::Cnmp;
+use bench_recording::{Recording, RecordingError};
 
 /// Verdict, modes and zeros of the chirps at one point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::error::CampaignError;
-use crate::recording::{Recording, RecordingError};
 use bench_base::running_stats::RunningStats;
 use bench_hal::Validity;
+use bench_recording::{Recording, RecordingError};
 use bench_rt::record::flag;
 
 /// Number of segments whose means are compared.

@@ -20,9 +20,9 @@ use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::Plan;
 use crate::experiment::run::Run;
 use crate::experiment::runner::{Runner, Setup, close};
-use crate::recording::Recording;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_recording::Recording;
 use bench_rt::arming::Trip;
 
 /// Makes one run of a guided campaign, for example with a [`Runner`] whose progress is shown. The last argument names the phase.

@@ -10,10 +10,10 @@ use crate::experiment::analysis::Analysis;
 use crate::experiment::ending::Ending;
 use crate::experiment::plan::{CALIBRATION, KIND, RunKind};
 use crate::experiment::plan_error::PlanError;
-use crate::recording::Recording;
 use bench_config::Config;
 use bench_control::ControllerText;
 use bench_identify::Frf;
+use bench_recording::Recording;
 
 /// The file of a frequency response.
 #[derive(Clone, Copy, Debug)]

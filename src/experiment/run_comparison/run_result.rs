@@ -9,10 +9,10 @@ use crate::experiment::description::Description;
 use crate::experiment::ending::Ending;
 use crate::experiment::error::ExperimentError;
 use crate::experiment::plan::{Plan, RunKind};
-use crate::recording::Recording;
 use bench_config::Config;
 use bench_identify::modal::{FittedMode, ModalFit};
 use bench_identify::verdict::Cnmp;
+use bench_recording::Recording;
 
 /// A recorded run with its results.
 #[derive(Clone, Debug)]

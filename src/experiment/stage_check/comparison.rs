@@ -22,8 +22,8 @@ use super::error::StageCheckError;
 use super::estimate::{Measured, ShotResponse, estimate};
 use super::figures::{PhaseComparison, StaticComparison};
 use super::shot::{Expected, Shot};
-use crate::recording::Recording;
 use bench_identify::Signals;
+use bench_recording::Recording;
 
 /// Allowed difference in standard deviations.
 const SIGMAS: f64 = 3.0;

@@ -9,8 +9,8 @@ use crate::experiment::loop_check::closed_loop_of;
 use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::prediction::extremes;
-use crate::recording::Recording;
 use bench_excitation::StageCheckSignal;
+use bench_recording::Recording;
 
 /// The check of the stage before a closed loop.
 #[derive(Clone, Debug)]

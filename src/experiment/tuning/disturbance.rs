@@ -15,11 +15,11 @@ use crate::experiment::loop_check::closed_loop_of;
 use crate::experiment::plan::Plan;
 use crate::experiment::plan_error::PlanError;
 use crate::experiment::tracking::steady_tick;
-use crate::recording::{Recording, RecordingError};
 use bench_base::units::rad_s;
 use bench_control::ControllerText;
 use bench_control::tuning::DisturbanceSpectrum;
 use bench_excitation::ReferenceSettings;
+use bench_recording::{Recording, RecordingError};
 
 /// Least length of the steady state in seconds: ten segments of the spectrum, which give each band to about 30 %.
 const LEAST_STEADY_S: f64 = 10.0;

@@ -7,13 +7,13 @@ use crate::experiment::calibration::StaircaseResult;
 use crate::experiment::campaign::RestPosition;
 use crate::experiment::stage_check::{PhaseComparison, StageCheck};
 use crate::experiment::{BasicResults, Overview};
-use crate::recording::Recording;
 use crate::report::ReportError;
 use crate::report::conditions::lines;
 use crate::report::html::{escaped, facts, row, section};
 use crate::report::number::plain;
 use bench_config::Config;
 use bench_identify::Estimate;
+use bench_recording::Recording;
 
 /// A recorded run with its results.
 #[derive(Clone, Copy, Debug)]

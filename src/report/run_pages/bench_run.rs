@@ -5,7 +5,6 @@ use super::loop_pictures::MeasuredLoop;
 use super::page::{delay_ms, named, table_section, with_interval};
 use super::{Plot, PlotKind, RecordReport, run_facts};
 use crate::experiment::{Analysis, ClosedResponses, Description};
-use crate::recording::Recording;
 use crate::report::conditions::lines;
 use crate::report::html::row;
 use crate::report::number::{angular_frequency, significant};
@@ -14,6 +13,7 @@ use bench_config::Config;
 use bench_excitation::AmplitudeCurve;
 use bench_identify::Unit;
 use bench_identify::modal::MeasurementChain;
+use bench_recording::Recording;
 
 const LOOP_CAPTION: &str = "L = P C from error to displacement: measured, with a band of two sigma, and by the model. Dotted: |L| = 1 \
     and -180 degrees.";

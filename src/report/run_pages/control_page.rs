@@ -4,7 +4,6 @@ use super::comparison::step_picture;
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
 use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
-use crate::recording::Recording;
 use crate::report::conditions::{joined, lines};
 use crate::report::html::{facts, note, row, section};
 use crate::report::number::{interval, plain};
@@ -14,6 +13,7 @@ use crate::report::{
 };
 use bench_config::Config;
 use bench_identify::SIGMAS_95;
+use bench_recording::Recording;
 
 const SIGNALS_CAPTION: &str =
     "The whole run. Each column reaches from minimum to maximum, so that no spike is left out.";

@@ -2,10 +2,10 @@
 
 use super::page::{self, named};
 use crate::experiment::{Description, Ending, TripSummary};
-use crate::recording::{Recording, event_text};
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::{joined, plant_conditions};
 use bench_config::{Config, SettingDifference, changed_settings};
+use bench_recording::{Recording, event_text};
 
 /// Entries of the recording's metadata that the page shows.
 const METADATA: [&str; 11] = [

@@ -12,9 +12,9 @@ use bench::experiment::campaign::{
     PointResult, Question, Reply, RestPosition, StageModel, analyse_point, visit_order,
 };
 use bench::experiment::{Plan, run};
-use bench::recording::Recording;
 use bench_config::{Config, Purpose, Source, load};
 use bench_hal::Validity;
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;
 

@@ -10,8 +10,8 @@ use std::path::Path;
 
 use bench::experiment::Plan;
 use bench::experiment::run_comparison::{Comparison, Difference, RunResult};
-use bench::recording::Recording;
 use bench_config::{Config, Purpose, Source, load};
+use bench_recording::Recording;
 
 use crate::simulated;
 

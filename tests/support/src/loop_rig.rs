@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
-use bench::recording::{Header, Recorder, Recording};
 use bench_config::{Config, Source, load};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, FaultText, Reading, Rig,
     Tick, Validity,
 };
+use bench_recording::{Header, Recorder, Recording};
 use bench_rig::calibration::Correction;
 use bench_rt::arming::State;
 use bench_rt::clock::{TickTiming, Virtual};

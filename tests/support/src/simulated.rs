@@ -2,8 +2,8 @@
 use std::path::{Path, PathBuf};
 
 use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
-use bench::recording::Recording;
 use bench_config::Config;
+use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::servo_run::RunOutcome;
 use bench_rt::thread::Pace;
