@@ -11,9 +11,9 @@
 //! | the fast and the slow controller | `bench-config/controllers/`, built by [`bench_control`] |
 //! | margins of a loop | [`bench_control::ClosedLoop`] |
 //! | modes, residues and zeros of a model | [`bench_plant`], [`bench_plant::zeros`] |
-//! | Tables 3-1 to 3-4 of the thesis | `crates/plant/src/zeros/tables.rs`, `sequence.rs` |
-//! | two close modes: veering, conditions and propositions of Chapter 4 | [`model::veering`] |
-//! | tolerances: the probability of CNMP zeros | [`model::study`] |
+//! | Tables 3-1 to 3-4 of the thesis | `crates/thesis/src/tables.rs`, `sequence.rs` |
+//! | two close modes: veering, conditions and propositions of Chapter 4 | [`bench_thesis::veering`] |
+//! | tolerances: the probability of CNMP zeros | [`bench_study`] |
 //! | excitations, references, and their prediction | [`bench_excitation`] |
 //! | the simulated stage | [`bench_rig::simulated`] |
 //! | real devices, their emulators, calibration | [`bench_rig::devices`], [`bench_rig::emulator`], [`bench_rig::calibration`] |
@@ -58,5 +58,4 @@ pub mod daemon;
 pub mod doctor;
 pub mod experiment;
 pub mod export;
-pub mod model;
 pub mod report;

@@ -7,11 +7,11 @@ use super::outcome::Outcome;
 use crate::experiment::campaign::CampaignError;
 use crate::experiment::tuning::TuneSourceError;
 use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
-use crate::model::study::StudyError;
 use bench_base::remedy;
 use bench_control::tuning::TuneError;
 use bench_identify::IdentifyError;
 use bench_identify::external_csv::ExternalCsvError;
+use bench_study::StudyError;
 
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]

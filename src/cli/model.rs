@@ -23,7 +23,7 @@ use super::error::CliError;
 use super::help::GLOSSARY;
 use super::options::BenchOptions;
 use super::outcome::Outcome;
-use crate::model::veering::report::VeeringPoint;
+use bench_thesis::veering::report::VeeringPoint;
 
 /// What to compute.
 #[derive(Clone, Debug, clap::Args)]

@@ -4,7 +4,7 @@ use super::ReportError;
 use super::chart::colours::{BLUE, Colour, GREY, VERMILION};
 use super::chart::{Chart, Pen, Row, Scale, sheet_svg};
 use super::ellipse::Ellipse;
-use crate::model::veering::QuadrantDiagram;
+use bench_thesis::veering::QuadrantDiagram;
 
 /// Height of a chart in pixels, and the values that it shows around the unit circle; the captions are below the circle.
 const HEIGHT: f64 = 365.0;

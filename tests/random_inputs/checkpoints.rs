@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
-use bench::model::study::{Block, Plan, Shard, StudyFile};
 use bench_config::{Config, Source, load};
 use bench_identify::verdict::Cnmp;
 use bench_rig::motor::{Moment, MotorMemory};
+use bench_study::{Block, Plan, Shard, StudyFile};
 
 use crate::random_inputs::damage::check_damaged;
 

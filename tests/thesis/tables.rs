@@ -5,10 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use bench_plant::zeros::{
-    MmpLocation, ModalSum, ModalTerm, Sequence, StepResponse, TABLES, TableRow, ZeroCounts,
-    table_of,
-};
+use bench_plant::zeros::{ModalSum, ModalTerm, ZeroCounts};
+use bench_thesis::{MmpLocation, Sequence, StepResponse, TABLES, TableRow, table_of};
 use serde_json::{Value, json};
 
 use crate::program::Draw;

@@ -8,7 +8,7 @@ use super::plane::plane;
 use super::{Comparison, Content, FigureError, Runs};
 use bench::report::colours::{BLUE, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Symbol};
-use bench_plant::zeros::{bandwidth_rad_s, guaranteed_peak, opening_angle};
+use bench_thesis::{bandwidth_rad_s, guaranteed_peak, opening_angle};
 
 /// The circle of all zeros at which the band up to w0 subtends an angle Theta: centre w0/tan Theta, radius w0/sin
 /// Theta.

@@ -4,12 +4,12 @@ use super::bode::{Curve, bode};
 use super::content::signed;
 use super::model::{Model, even, response};
 use super::{Comparison, Content, FigureError, Runs};
-use bench::model::veering::{Loci, ModesAt};
 use bench::report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
 use bench_config::{PlantSettings, Sr4dofSettings};
 use bench_plant::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
 use bench_plant::{ModalModel, Mode};
+use bench_thesis::veering::{Loci, ModesAt};
 
 const TAU: f64 = std::f64::consts::TAU;
 /// Length of a beam of the stage in metres.

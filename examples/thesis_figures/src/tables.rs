@@ -7,10 +7,8 @@ use super::content::signed;
 use super::model::Model;
 use super::{Comparison, Content, FigureError, Runs};
 use bench_config::{PlantSettings, XySettings};
-use bench_plant::zeros::{
-    MmpLocation, ModalSum, ModalTerm, Sequence, TABLES, Table, TableRow, ZeroCounts,
-    phase_drop_deg, table_of, undamped_zeros,
-};
+use bench_plant::zeros::{ModalSum, ModalTerm, ZeroCounts, phase_drop_deg, undamped_zeros};
+use bench_thesis::{MmpLocation, Sequence, TABLES, Table, TableRow, table_of};
 
 const TAU: f64 = std::f64::consts::TAU;
 

@@ -10,7 +10,8 @@ use super::Profiled;
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
 use bench_config::Purpose;
-use bench_plant::zeros::{Bound, Demand, PlantSummary, damped_zeros, undamped_zeros};
+use bench_plant::zeros::{damped_zeros, undamped_zeros};
+use bench_thesis::{Bound, Demand, PlantSummary};
 
 /// The demands on the loop.
 #[derive(Clone, Debug, clap::Args)]

@@ -9,8 +9,8 @@ use super::super::error::CliError;
 use super::super::output::print_result;
 use super::conditions_text::text;
 use super::sweep::CloseModesArgs;
-use crate::model::veering::report::ConditionsReport;
-use crate::model::veering::{
+use bench_thesis::veering::report::ConditionsReport;
+use bench_thesis::veering::{
     Loci, Sample, Trajectory, as_configured, meeting_pair, require_meeting,
 };
 

@@ -2,12 +2,12 @@
 
 use super::super::table::{table, wrap};
 use super::{evenly_spread_rows, meeting_text};
-use crate::model::veering::conditions::Condition;
-use crate::model::veering::propositions::Proposition;
-use crate::model::veering::report::{
+use bench_base::decimal::Decimal;
+use bench_thesis::veering::conditions::Condition;
+use bench_thesis::veering::propositions::Proposition;
+use bench_thesis::veering::report::{
     Assumptions, ConditionRow, ConditionsReport, Explanation, PredictionTally, SideReport,
 };
-use bench_base::decimal::Decimal;
 
 pub(super) fn text(profile: &str, vary: &str, conditions: &ConditionsReport) -> String {
     let here = match &conditions.here {

@@ -3,7 +3,7 @@
 use super::super::error::CliError;
 use super::super::output::print_result;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
-use bench_plant::zeros::CriticalDamping;
+use bench_thesis::CriticalDamping;
 
 /// Two close modes and a double integrator (Eq. 3-15).
 #[derive(Clone, Debug, clap::Args)]

@@ -15,8 +15,9 @@ use bench_base::decimal::Decimal;
 use bench_config::{Config, Purpose};
 use bench_plant::ModalModel;
 use bench_plant::zeros::{
-    ClosedForm, KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
+    KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
+use bench_thesis::ClosedForm;
 
 /// The setting that varies, and the zeros to follow.
 #[derive(Clone, Debug, clap::Args)]

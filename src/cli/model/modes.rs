@@ -7,7 +7,8 @@ use super::super::table::table;
 use super::Profiled;
 use bench_base::decimal::Decimal;
 use bench_config::Purpose;
-use bench_plant::zeros::{ModeSummary, PlantSummary, Zero};
+use bench_plant::zeros::Zero;
+use bench_thesis::{ModeSummary, PlantSummary};
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;

@@ -9,10 +9,10 @@ use super::super::error::CliError;
 use super::super::output::print_result;
 use super::placement_text::text;
 use super::sweep::CloseModesArgs;
-use crate::model::veering::placement::{Chosen, Path, PlacementReport, Placements};
-use crate::model::veering::{Loci, QuadrantDiagram, meeting_pair, require_meeting};
 use crate::report::{QuadrantPanel, quadrants_svg};
 use bench_plant::{Port, PortWeights, ports};
+use bench_thesis::veering::placement::{Chosen, Path, PlacementReport, Placements};
+use bench_thesis::veering::{Loci, QuadrantDiagram, meeting_pair, require_meeting};
 
 /// The setting that varies, and the placements to try.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,9 +1,9 @@
 //! The text of `bench model placement`.
 
 use super::super::table::{table, wrap};
-use crate::model::veering::QuadrantSummary;
-use crate::model::veering::placement::{MIN_REMAINDER_RATIO, Placement, PlacementReport, Trial};
 use bench_base::decimal::Decimal;
+use bench_thesis::veering::QuadrantSummary;
+use bench_thesis::veering::placement::{MIN_REMAINDER_RATIO, Placement, PlacementReport, Trial};
 
 /// Placements that are listed; the JSON has all.
 const LISTED: usize = 16;

@@ -5,8 +5,9 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::Profiled;
 use bench_config::Purpose;
-use bench_plant::zeros::{SequenceReport, TableRow, ZeroCounts};
+use bench_plant::zeros::ZeroCounts;
 use bench_plant::{ModalModel, build};
+use bench_thesis::{SequenceReport, TableRow};
 
 pub(super) fn run(options: &BenchOptions) -> Result<(), CliError> {
     let config = options.load(Purpose::Model, &[])?;

@@ -14,9 +14,8 @@ use bench_base::numeric::linspace;
 use bench_base::quantity::{OfTime, si};
 use bench_config::{Config, Purpose};
 use bench_plant::ModalModel;
-use bench_plant::zeros::{
-    ModalSum, Sequence, StepFeatures, StepPrediction, StepResponse, ZeroCounts,
-};
+use bench_plant::zeros::{ModalSum, ZeroCounts};
+use bench_thesis::{Sequence, StepFeatures, StepPrediction, StepResponse};
 
 /// The table of the response.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,7 +1,7 @@
 //! The text of `bench model study`.
 
 use super::super::table::{table, wrap};
-use crate::model::study::{Answer, Counted, Deviation, Effect, Interaction, Probability, Varied};
+use bench_study::{Answer, Counted, Deviation, Effect, Interaction, Probability, Varied};
 
 pub(super) fn text(answer: &Answer) -> String {
     let shard = answer.shard.as_ref();

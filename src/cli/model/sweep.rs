@@ -2,11 +2,11 @@
 
 use super::super::error::CliError;
 use super::super::options::BenchOptions;
-use crate::model::veering::PairError;
 use bench_base::numeric::linspace;
 use bench_base::quantity::{Quantity, QuantityError};
 use bench_config::{Config, OptionSetting, Purpose};
 use bench_plant::Structure;
+use bench_thesis::veering::PairError;
 
 /// The setting that varies, and its values. Defaults and limits differ between the commands: see `mut_arg` there.
 #[derive(Clone, Debug, clap::Args)]

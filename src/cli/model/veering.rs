@@ -10,12 +10,12 @@ use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::sweep::CloseModesArgs;
 use super::{evenly_spread_rows, meeting_text};
-use crate::model::veering::report::{Shares, VeeringReport};
-use crate::model::veering::{Loci, ModesAt, close_pair};
 use crate::report::{Picture, ReportError, plant_conditions, veering_caption, veering_svg};
 use bench_base::decimal::Decimal;
 use bench_base::units::hz;
 use bench_config::{Config, Purpose};
+use bench_thesis::veering::report::{Shares, VeeringReport};
+use bench_thesis::veering::{Loci, ModesAt, close_pair};
 
 /// The setting that varies, and the two modes.
 #[derive(Clone, Debug, clap::Args)]

@@ -6,7 +6,7 @@ use crate::report::chart::colours::{BLUE, GREY, INK};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::frequency_text;
 use bench_base::numeric::linspace;
-use bench_plant::zeros::{StepFeatures, StepResponse};
+use bench_thesis::{StepFeatures, StepResponse};
 
 const HEIGHT: f64 = 420.0;
 const MICRO: f64 = 1e6;

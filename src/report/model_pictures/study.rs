@@ -1,9 +1,9 @@
 //! A tolerance study: the probability of each number of CNMP pairs, and the share of each setting in its variance.
 
-use crate::model::study::{Answer, Counted, Probability};
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, Colour, INK, ORANGE};
 use crate::report::chart::{Chart, Pen, Row, Scale, sheet_svg};
+use bench_study::{Answer, Counted, Probability};
 
 const HISTOGRAM_HEIGHT: f64 = 300.0;
 const PERCENT: f64 = 100.0;

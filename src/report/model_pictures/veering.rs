@@ -1,12 +1,12 @@
 //! Two close modes as a setting varies: their frequencies, and those of all modes.
 
 use super::{colour, setting_label, setting_text};
-use crate::model::veering::report::{VeeringPoint, VeeringReport};
 use crate::report::ReportError;
 use crate::report::chart::colours::INK;
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
 use crate::report::labels::frequency_text;
 use crate::report::number::significant;
+use bench_thesis::veering::report::{VeeringPoint, VeeringReport};
 
 const HEIGHT: f64 = 400.0;
 /// Smallest gap that is written.

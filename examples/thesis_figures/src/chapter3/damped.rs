@@ -6,10 +6,8 @@ use super::super::plane::{Part, changes, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Symbol};
-use bench_plant::zeros::{
-    Crossing, Locus, LocusPlane, ModalTerm, critical_damping, touching_damping,
-    two_mode_break_points,
-};
+use bench_plant::zeros::{Crossing, Locus, LocusPlane, ModalTerm};
+use bench_thesis::{critical_damping, touching_damping, two_mode_break_points};
 
 const KEY_V: &str = "plant.modes.v.residue_per_kg";
 const KEY_R: &str = "plant.modes.R.residue_per_kg";

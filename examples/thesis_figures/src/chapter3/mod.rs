@@ -11,7 +11,8 @@ pub(crate) use two_modes::{fig_3_2, fig_3_3, fig_3_4, fig_3_5, fig_3_6, fig_3_8}
 use super::FigureError;
 use super::model::{even, geometric};
 use bench::report::{Chart, Pen, Scale};
-use bench_plant::zeros::{ModalSum, ModalTerm, Sequence, StepFeatures, StepResponse};
+use bench_plant::zeros::{ModalSum, ModalTerm};
+use bench_thesis::{Sequence, StepFeatures, StepResponse};
 
 const W: &str = "Frequency (rad/s)";
 

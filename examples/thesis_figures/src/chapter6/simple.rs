@@ -11,7 +11,7 @@ use nalgebra::Complex;
 use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
 use bench::report::{Chart, Pen, Scale};
 use bench_control::{ClosedLoop, ControllerText, Margins};
-use bench_plant::zeros::sign_sequence;
+use bench_thesis::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";
 const COLOURS: [Colour; 4] = [BLUE, VERMILION, GREEN, PURPLE];

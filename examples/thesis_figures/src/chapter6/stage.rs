@@ -11,7 +11,8 @@ use super::loops::{closed, closed_loop, open, sensitivity, step};
 use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
 use bench::report::{Chart, Mark, Pen, Scale};
 use bench_control::{ControllerText, Margins, continuous_response, step_metrics};
-use bench_plant::zeros::{cnmp_pairs, sign_sequence, undamped_zeros};
+use bench_plant::zeros::{cnmp_pairs, undamped_zeros};
+use bench_thesis::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";
 const TAU: f64 = std::f64::consts::TAU;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{ModalSum, ModalTerm};
+use bench_plant::zeros::{ModalSum, ModalTerm};
 
 /// The two real s at which the zeros of two damped modes meet as the ratio of their residues varies, Eq. (3-14):
 ///
@@ -181,7 +181,7 @@ fn nearer(to: f64, [a, b]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::zeros::{ModalSum, ZeroCounts};
+    use bench_plant::zeros::{ModalSum, ZeroCounts};
     use proptest::prelude::*;
 
     /// The largest real part of a complex zero of Eq. (3-15) over all sizes of the residues (golden section about the

@@ -12,9 +12,9 @@ use std::f64::consts::{PI, TAU};
 
 use serde::Serialize;
 
-use super::{ModalSum, ModalTerm, ZeroCounts};
 use bench_base::numeric::bisect;
 use bench_base::units::hz;
+use bench_plant::zeros::{ModalSum, ModalTerm, ZeroCounts};
 
 /// Samples in the shortest period.
 const SAMPLES_PER_PERIOD: f64 = 64.0;
@@ -285,7 +285,7 @@ fn one_less_cosine(term: &ModalTerm, time_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::zeros::ZeroCounts;
+    use bench_plant::zeros::ZeroCounts;
 
     fn sum(parts: &[(f64, f64, f64)]) -> ModalSum {
         let term = |&(omega_rad_s, damping_ratio, residue_per_kg): &_| ModalTerm {

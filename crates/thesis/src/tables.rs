@@ -17,8 +17,9 @@
 
 use serde::Serialize;
 
-use super::{ModalSum, Sequence, ZeroCounts, sign_sequence};
-use crate::{ModalModel, PlantError};
+use crate::{Sequence, sign_sequence};
+use bench_plant::zeros::{ModalSum, ZeroCounts};
+use bench_plant::{ModalModel, PlantError};
 
 /// The resonances between which a pair of MMP zeros lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

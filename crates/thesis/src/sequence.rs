@@ -12,8 +12,8 @@
 
 use std::fmt;
 
-use super::{ModalSum, ModalTerm, ZeroKind};
-use crate::{ModalModel, PlantError, Sign};
+use bench_plant::zeros::{ModalSum, ModalTerm, ZeroKind};
+use bench_plant::{ModalModel, PlantError, Sign};
 
 /// The signs of the modes that can be observed, lowest frequency first: `+-+`.
 pub fn sign_sequence(modal: &ModalModel) -> String {

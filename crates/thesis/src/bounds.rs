@@ -6,7 +6,7 @@
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::Zero;
+use bench_plant::zeros::Zero;
 
 /// Theta of Eq. (1-2) in radians, 0 to pi: atan((w0 - y)/x) + atan((w0 + y)/x).
 pub fn opening_angle(zero_rad_s: Complex<f64>, omega_0_rad_s: f64) -> f64 {

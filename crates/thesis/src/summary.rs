@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::bounds::{Bound, Demand};
-use super::kinds::{Zero, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
 use super::sequence::{dominant_sequence, sign_sequence};
-use crate::{ModalModel, Mode, PlantError, PlantSettings, Sign, build};
 use bench_base::units::hz;
+use bench_plant::zeros::{Zero, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros};
+use bench_plant::{ModalModel, Mode, PlantError, PlantSettings, Sign, build};
 
 /// One mode.
 #[derive(Clone, Debug, PartialEq, Serialize)]
