@@ -24,7 +24,7 @@
 //! | short chirps until the verdict is certain | [`experiment::sequential`] |
 //! | a grid of chirps | [`experiment::campaign`] |
 //! | recordings compared with each other | [`experiment::run_comparison`] |
-//! | signals and responses as files of other programs | [`export`] |
+//! | signals and responses as files of other programs | [`bench_export`] |
 //! | plots and pages of runs, loops and the model | [`report`] |
 //! | figures and tables of the thesis | `examples/thesis_figures/` |
 //!
@@ -57,5 +57,4 @@ pub mod cli;
 pub mod daemon;
 pub mod doctor;
 pub mod experiment;
-pub mod export;
 pub mod report;

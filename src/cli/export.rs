@@ -9,7 +9,7 @@ use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use crate::experiment::{Ending, Plan, open_with_signals, recorded_frf};
-use crate::export::{ExportError, Format, Response, Target, write_response, write_signals};
+use bench_export::{ExportError, Format, Response, Target, write_response, write_signals};
 use bench_recording::Recording;
 
 /// What is exported, and where it goes.

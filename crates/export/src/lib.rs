@@ -33,7 +33,8 @@ use bench_recording::{Recording, RecordingError};
 use file::write_new;
 
 /// Format of a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum Format {
     /// Text, a line for each tick, with the unit in the name of each column
