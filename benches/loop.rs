@@ -12,9 +12,9 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bench::experiment::{Plan, residuals, rig_model};
 use bench_config::{Config, ControlSettings, Source, load};
 use bench_control::{Controller, ControllerText};
+use bench_experiment::{Plan, residuals, rig_model};
 use bench_hal::{Reading, Tick, Validity};
 use bench_recording::{DiskWatch, Header, Recorder};
 use bench_rig::simulated::SimulatedRig;

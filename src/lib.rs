@@ -20,10 +20,10 @@
 //! | estimation of a frequency response | [`bench_identify`] |
 //! | modal fit and model order | [`bench_identify::modal`] |
 //! | the decision about CNMP zeros | [`bench_identify::verdict`] |
-//! | one run: plan, run, analyse, replay | [`experiment`] |
-//! | short chirps until the verdict is certain | [`experiment::sequential`] |
-//! | a grid of chirps | [`experiment::campaign`] |
-//! | recordings compared with each other | [`experiment::run_comparison`] |
+//! | one run: plan, run, analyse, replay | [`bench_experiment`] |
+//! | short chirps until the verdict is certain | [`bench_experiment::sequential`] |
+//! | a grid of chirps | [`bench_experiment::campaign`] |
+//! | recordings compared with each other | [`bench_experiment::run_comparison`] |
 //! | signals and responses as files of other programs | [`bench_export`] |
 //! | plots and pages of runs, loops and the model | [`report`] |
 //! | figures and tables of the thesis | `examples/thesis_figures/` |
@@ -56,5 +56,4 @@
 pub mod cli;
 pub mod daemon;
 pub mod doctor;
-pub mod experiment;
 pub mod report;

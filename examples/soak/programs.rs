@@ -2,9 +2,9 @@
 
 use std::error::Error;
 
-use bench::experiment::Plan;
 use bench_config::{AmplitudePoint, Config, ReferenceSettings};
 use bench_excitation::{HoldReference, SineReference, StepReference};
+use bench_experiment::Plan;
 use bench_rt::program::{Decision, Program, ProgramInput};
 
 use super::faults::{Current, Injection, Period, Schedule};

@@ -4,8 +4,8 @@ use std::error::Error;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 
-use bench::experiment::Plan;
 use bench_config::Config;
+use bench_experiment::Plan;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::interlock::Interlocks;
 use bench_rt::publisher::Publisher;

@@ -12,13 +12,13 @@ use super::output::{print_result, print_text, warn};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, exit, run_text};
 use super::table::wrap;
-use crate::experiment::calibration::{self, CalibrationPlan};
-use crate::experiment::{PlanLimits, RunSummary, Runner};
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_base::quantity::Current;
 use bench_config::{Config, OptionSetting, Purpose, warnings};
 use bench_excitation::Extremes;
+use bench_experiment::calibration::{self, CalibrationPlan};
+use bench_experiment::{PlanLimits, RunSummary, Runner};
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };

@@ -14,15 +14,15 @@ use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use super::value_range::{ValueRange, asymmetries, operating_points};
-use crate::experiment::campaign::{
-    Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
-};
-use crate::experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
 use crate::report::campaign_picture;
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, Ratio, si};
 use bench_config::{Config, Purpose, profiles};
+use bench_experiment::campaign::{
+    Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
+};
+use bench_experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
 use bench_rig::devices;
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.

@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::run_options::description_text;
 use super::table::{labelled, table, wrap};
-use crate::experiment::Description;
-use crate::experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use bench_base::decimal::Decimal;
+use bench_experiment::Description;
+use bench_experiment::campaign::{ComparedPoint, Evaluation, Offset, Recommendation, Tolerances};
 use bench_identify::verdict::Cnmp;
 
 /// The JSON object of the command.

@@ -13,7 +13,7 @@ use super::{
     export, identify, linearity, margins, model, recover, remote, replay, report, resume, serve,
     tune,
 };
-use crate::experiment::survive_file_size_limit;
+use bench_experiment::survive_file_size_limit;
 
 /// Identifies and controls a precision-motion stage.
 ///

@@ -1,11 +1,11 @@
 //! The result of `bench compare` as text.
 
 use super::table::{labelled, table, wrap};
-use crate::experiment::run_comparison::{
-    Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
-};
 use crate::report::number::interval;
 use bench_base::decimal::Decimal;
+use bench_experiment::run_comparison::{
+    Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
+};
 use bench_identify::Estimate;
 use bench_identify::verdict::Cnmp;
 

@@ -12,8 +12,8 @@ use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
-use crate::experiment::check_named_files;
 use bench_config::{Config, Purpose, profiles};
+use bench_experiment::check_named_files;
 use bench_settings::files::{find, own};
 
 /// What to do with the configuration.

@@ -8,7 +8,7 @@ use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use crate::daemon::client::{DaemonOwner, rig_of, running_daemon};
 use crate::daemon::{Command, OnDisconnect, RunRequest};
-use crate::experiment::{RigOwner, Stage};
+use bench_experiment::{RigOwner, Stage};
 
 /// Where runs are made.
 #[derive(Clone, Debug, Default, clap::Args)]

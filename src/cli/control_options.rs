@@ -10,9 +10,9 @@ use super::error::CliError;
 use super::help::{default_value, with_setting};
 use super::options::{BenchOptions, given};
 use super::run_options::RunOptions;
-use crate::experiment::certificate::OverrideReason;
 use bench_base::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
 use bench_config::OptionSetting;
+use bench_experiment::certificate::OverrideReason;
 
 /// A setting of a reference without its option.
 type Default = (&'static str, Value);

@@ -12,12 +12,6 @@ use super::margins::text as margins_text;
 use super::output::warn;
 use super::run_options::run_text;
 use super::table::{labelled, table};
-use crate::experiment::certificate::{Agreement, Condition, Evidence};
-use crate::experiment::stage_check::RestAfterCheck;
-use crate::experiment::{
-    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
-    abandon_on_signal, control_run, run_figures, tracking_metrics,
-};
 use crate::report::run_pages::{
     AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
 };
@@ -25,6 +19,12 @@ use bench_base::decimal::Decimal;
 use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
+use bench_experiment::certificate::{Agreement, Condition, Evidence};
+use bench_experiment::stage_check::RestAfterCheck;
+use bench_experiment::{
+    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
+    abandon_on_signal, control_run, run_figures, tracking_metrics,
+};
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
 

@@ -2,7 +2,7 @@
 
 use super::arguments::arguments;
 use crate::daemon::client::is_started_by_daemon;
-use crate::experiment::{Description, Invocation, operator_name, run_name, run_note};
+use bench_experiment::{Description, Invocation, operator_name, run_name, run_note};
 
 /// Name, note and operator of a run.
 #[derive(Clone, Debug, Default, clap::Args)]

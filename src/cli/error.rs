@@ -4,13 +4,25 @@ use clap::error::ContextKind;
 use serde::Serialize;
 
 use super::outcome::Outcome;
-use crate::experiment::campaign::CampaignError;
-use crate::experiment::tuning::TuneSourceError;
-use crate::experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use bench_base::remedy;
+use bench_config::ConfigError;
+use bench_control::ControllerError;
 use bench_control::tuning::TuneError;
+use bench_excitation::ExcitationError;
+use bench_experiment::campaign::CampaignError;
+use bench_experiment::certificate::CertificateDefects;
+use bench_experiment::stage_check::StageCheckError;
+use bench_experiment::tuning::TuneSourceError;
+use bench_experiment::{
+    AnalysisError, FrfError, MarginError, MotorError, PlanError, RemoteError, RunError,
+};
+use bench_experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use bench_identify::IdentifyError;
 use bench_identify::external_csv::ExternalCsvError;
+use bench_plant::PlantError;
+use bench_recording::RecordingError;
+use bench_rig::calibration::CalibrationError;
+use bench_rig::devices::DevicesError;
 use bench_study::StudyError;
 
 /// Why a command failed.
@@ -45,11 +57,36 @@ pub enum CliError {
     Failed(String),
 }
 
-impl<E: Into<ExperimentError>> From<E> for CliError {
-    fn from(error: E) -> Self {
-        CliError::Experiment(error.into())
-    }
+/// Errors that are those of an experiment.
+macro_rules! experiment_errors {
+    ($($error:ty),* $(,)?) => {
+        $(impl From<$error> for CliError {
+            fn from(error: $error) -> Self {
+                CliError::Experiment(error.into())
+            }
+        })*
+    };
 }
+
+experiment_errors!(
+    ExperimentError,
+    PlanError,
+    MarginError,
+    CertificateDefects,
+    StageCheckError,
+    ExcitationError,
+    PlantError,
+    DevicesError,
+    CalibrationError,
+    MotorError,
+    RunError,
+    RecordingError,
+    AnalysisError,
+    FrfError,
+    RemoteError,
+    ConfigError,
+    ControllerError,
+);
 
 impl From<CampaignError> for CliError {
     fn from(error: CampaignError) -> Self {

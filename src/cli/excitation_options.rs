@@ -5,9 +5,9 @@ use toml::{Table, Value};
 use super::error::CliError;
 use super::help::with_setting;
 use super::options::given;
-use crate::experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 use bench_base::quantity::{Current, Frequency};
 use bench_config::{Config, OptionSetting};
+use bench_experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 
 /// Frequency band and amplitude.
 #[derive(Clone, Debug, clap::Args)]

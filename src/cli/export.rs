@@ -8,7 +8,7 @@ use super::error::CliError;
 use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
-use crate::experiment::{Ending, Plan, open_with_signals, recorded_frf};
+use bench_experiment::{Ending, Plan, open_with_signals, recorded_frf};
 use bench_export::{ExportError, Format, Response, Target, write_response, write_signals};
 use bench_recording::Recording;
 

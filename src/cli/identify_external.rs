@@ -11,12 +11,12 @@ use super::linearity_output;
 use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{
     ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
 };
 use bench_base::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
+use bench_experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
 use bench_identify::external_csv::{self, Columns, Sampling};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;

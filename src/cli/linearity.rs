@@ -18,10 +18,6 @@ use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, run_text};
 use super::table::{labelled, table, wrap};
-use crate::experiment::linearity::{
-    self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
-};
-use crate::experiment::{self, Run, RunSummary, Runner};
 use crate::report::MagnitudeAxis;
 use crate::report::number::interval;
 use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
@@ -29,6 +25,10 @@ use bench_base::progress::Progress;
 use bench_base::quantity::Ratio;
 use bench_config::{Config, OptionSetting, Purpose};
 use bench_excitation::Extremes;
+use bench_experiment::linearity::{
+    self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
+};
+use bench_experiment::{Run, RunSummary, Runner};
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 
 /// Odd lines, one of each group of four omitted.
@@ -192,7 +192,7 @@ fn finish(
         run: summary,
         outputs,
     };
-    experiment::close(run, &finished)?;
+    bench_experiment::close(run, &finished)?;
     Ok(finished)
 }
 

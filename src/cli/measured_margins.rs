@@ -8,7 +8,6 @@ use super::analysis_output::in_folder;
 use super::error::CliError;
 use super::output::warn;
 use super::table::wrap;
-use crate::experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use crate::report::number::interval;
 use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
 use crate::report::{crossing_count, place};
@@ -18,6 +17,7 @@ use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
 };
+use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use bench_identify::Estimate;
 
 /// The margins with a measured plant, and the files of the loop.

@@ -57,7 +57,7 @@ mod tune_values;
 mod until_decided;
 mod value_range;
 
-pub use crate::experiment::ErrorKind;
+pub use bench_experiment::ErrorKind;
 pub use command::{Cli, main, run};
 pub use error::CliError;
 pub use outcome::Outcome;

@@ -7,8 +7,8 @@ use std::time::Duration;
 use super::error::CliError;
 use super::output::print_message;
 use super::table::wrap;
-use crate::experiment::campaign::{Operator, Question, Reply};
 use bench_base::quantity::Quantity;
+use bench_experiment::campaign::{Operator, Question, Reply};
 
 /// Interval of checks for Ctrl-C while waiting for an answer.
 const CHECK_INTERVAL: Duration = Duration::from_millis(100);

@@ -1,8 +1,8 @@
 //! The plan of a run as text.
 
 use super::table::labelled;
-use crate::experiment::{ExcitationPlan, MotorSummary, PlanLimits};
 use bench_excitation::{AmplitudePoint, Extremes};
+use bench_experiment::{ExcitationPlan, MotorSummary, PlanLimits};
 
 /// Extremes with their limits, and the amplitude over frequency.
 pub(super) fn text(plan: &ExcitationPlan) -> String {

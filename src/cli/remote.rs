@@ -15,7 +15,7 @@ use super::outcome::Outcome;
 use super::output::{print_message, print_note, print_text};
 use crate::daemon::http_client::{Ask, HttpError, Target, json as answer, send};
 use crate::daemon::{Hold, OutputPiece};
-use crate::experiment::StopSignals;
+use bench_experiment::StopSignals;
 
 /// Period of the renewals of the arm lease.
 const RENEWAL: Duration = Duration::from_secs(3);

@@ -8,7 +8,7 @@ use super::error::CliError;
 use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::experiment::{Difference, replay};
+use bench_experiment::{Difference, replay};
 use bench_recording::{Cut, Recording};
 
 /// Which recording.

@@ -14,7 +14,7 @@ use super::remote::{ask, in_runtime, tcp_target};
 use super::table::wrap;
 use crate::daemon::client::running_daemon;
 use crate::daemon::http_client::Target;
-use crate::experiment::operator_name;
+use bench_experiment::operator_name;
 
 /// Pause between two attempts to take the lease.
 const RETRY: Duration = Duration::from_millis(250);

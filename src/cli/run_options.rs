@@ -13,12 +13,12 @@ use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
-use crate::experiment::{
+use bench_base::progress::Progress;
+use bench_config::Config;
+use bench_experiment::{
     self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
     RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
 };
-use bench_base::progress::Progress;
-use bench_config::Config;
 use bench_rig::motor::{Moment, MotorMemory};
 use bench_rt::thread::Pace;
 
@@ -170,7 +170,7 @@ pub(super) fn close(
     json: bool,
     text: &str,
 ) -> Result<(), CliError> {
-    let results = experiment::close(run, report)?;
+    let results = bench_experiment::close(run, report)?;
     print_text(if json { &results } else { text })
 }
 

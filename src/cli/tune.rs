@@ -14,10 +14,6 @@ use super::tune_plants::{ModelOptions, model_plants};
 use super::tune_values::{
     GoalName, factor, gain_margin, margin, phase_margin_deg, positive, sensitivity_limit,
 };
-use crate::experiment::tuning::{
-    DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
-    recorded_disturbance,
-};
 use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
@@ -27,6 +23,10 @@ use bench_config::{Config, OptionSetting, Purpose};
 use bench_control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, MarginDisc, PlantFigures,
     Requirements, RigModel, SensitivityLimit, Tolerances, bound_of, design, evaluate, loop_curves,
+};
+use bench_experiment::tuning::{
+    DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
+    recorded_disturbance,
 };
 use bench_plant::SignalPath;
 use bench_recording::Recording;

@@ -6,13 +6,13 @@ use super::error::CliError;
 use super::options::BenchOptions;
 use super::output::warn;
 use super::table::{table, wrap};
-use crate::experiment::campaign::recorded_points;
-use crate::experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
 use bench_base::progress::Progress;
 use bench_base::units::UM_PER_M;
 use bench_config::Config;
 use bench_control::measured::Stability;
 use bench_control::tuning::{Goal, MeasuredPlant};
+use bench_experiment::campaign::recorded_points;
+use bench_experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
 use bench_identify::verdict::Cnmp;
 
 /// Where the plants come from.

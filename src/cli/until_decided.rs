@@ -12,16 +12,16 @@ use super::output::print_text;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, run_text};
 use super::table::wrap;
-use crate::experiment::sequential::{
-    Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, default_max_motion_s,
-    first_shot_config, until_decided,
-};
-use crate::experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use crate::report::MagnitudeAxis;
 use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
 use bench_config::Config;
+use bench_experiment::sequential::{
+    Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, default_max_motion_s,
+    first_shot_config, until_decided,
+};
+use bench_experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use bench_identify::verdict::MAX_LOOKS;
 use bench_recording::Recording;
 

@@ -20,11 +20,11 @@ use super::run_entry::RunRequest;
 use super::schedule::StopKind;
 use super::session_messages::{FromCommand, FromDaemon, MAX_MESSAGE_BYTES, OpenCommand};
 use super::socket::{TICKET_VARIABLE, default_socket, sockets};
-use crate::experiment::{
+use bench_base::progress::Progress;
+use bench_experiment::{
     ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
     RunReport, Stage, StopSignals,
 };
-use bench_base::progress::Progress;
 use bench_recording::{RecordingError, Totals};
 use bench_rt::thread::Pace;
 

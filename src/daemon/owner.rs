@@ -10,12 +10,12 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::same_rig::require_same_rig;
 use super::warnings::copy_warnings;
-use crate::experiment::{
+use bench_base::progress::Progress;
+use bench_config::Config;
+use bench_experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
     RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
 };
-use bench_base::progress::Progress;
-use bench_config::Config;
 use bench_rig::motor::Moment;
 use bench_rt::supervision::{ArmLease, StopFlags};
 use bench_rt::thread::{Pace, Scheduling};

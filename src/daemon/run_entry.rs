@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::hold::StopKind;
 use super::secret::Secret;
-use crate::experiment::{Description, operator_name, run_name, run_note};
 use bench_base::progress::Progress;
+use bench_experiment::{Description, operator_name, run_name, run_note};
 use bench_rt::supervision::StopFlags;
 
 /// Commands that may be queued.

@@ -2,8 +2,8 @@
 
 use toml::Value;
 
-use crate::experiment::{ExperimentError, Stage};
 use bench_config::Config;
+use bench_experiment::{ExperimentError, Stage};
 
 /// The tables of the settings that belong to the devices. The daemon answers for their limits, so that an order cannot change them.
 const TABLES: [&str; 5] = ["loop", "motor", "amplifier", "probe", "interlock"];

@@ -26,7 +26,7 @@ use super::schedule::{NewEntry, StopKind};
 use super::secret::Secret;
 use super::shared::{Daemon, Parts};
 use super::start::{ServeError, ServeOptions, Started};
-use crate::experiment::{FeedSender, StopSignals};
+use bench_experiment::{FeedSender, StopSignals};
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);

@@ -17,11 +17,11 @@ use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome};
 use super::schedule::{EndedRun, NewEntry, Schedule, ScheduleError, StopKind};
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
 use super::shared::Daemon;
-use crate::experiment::{
+use bench_base::progress::Progress;
+use bench_experiment::{
     Ending, ExperimentError, MotorError, RemoteError, Run, RunError, RunOrder, RunReport,
     RunSummary, close,
 };
-use bench_base::progress::Progress;
 use bench_rt::record::Origin;
 use bench_rt::supervision::ArmLease;
 

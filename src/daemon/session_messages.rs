@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::run_entry::RunRequest;
 use super::schedule::StopKind;
-use crate::experiment::{RemoteError, RunOrder, RunReport};
+use bench_experiment::{RemoteError, RunOrder, RunReport};
 use bench_recording::Totals;
 
 /// Largest message of a command in bytes. The largest parts of a message are the text of a reference (some 20 bytes a tick) and the

@@ -15,9 +15,9 @@ use super::live::hub::LiveHub;
 use super::output::RunOutput;
 use super::owner::Owner;
 use super::schedule::{Now, Schedule};
-use crate::experiment::Plan;
 use bench_base::timestamp::unix_ns;
 use bench_config::{Config, Source};
+use bench_experiment::Plan;
 
 /// Commands whose output is kept.
 const KEPT_OUTPUTS: usize = 100;

@@ -19,8 +19,8 @@ use super::run_entry::{Command, RunRequest};
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
-use crate::experiment::option_in;
 use bench_config::{Source, texts_of_set};
+use bench_experiment::option_in;
 
 /// Longest time of a computation without motion.
 const COMPUTATION: Duration = Duration::from_secs(60);

@@ -2,8 +2,8 @@
 
 use super::finding::{Finding, Severity, Subject};
 use super::report::Report;
-use crate::experiment::{ExperimentError, MotorError, MotorForecast, Plan};
 use bench_config::Config;
+use bench_experiment::{ExperimentError, MotorError, MotorForecast, Plan};
 use bench_rig::devices;
 use bench_rig::motor::{Moment, MotorMemory};
 

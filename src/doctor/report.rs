@@ -9,8 +9,8 @@ use super::finding::{Finding, Severity, Subject};
 use super::readings::Readings;
 use super::recordings::Space;
 use super::trial::Lateness;
-use crate::experiment::MotorSummary;
 use bench_control::Margins;
+use bench_experiment::MotorSummary;
 
 /// The result of an examination; the JSON object of `bench doctor`.
 #[derive(Clone, Debug, Default, Serialize)]

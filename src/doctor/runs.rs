@@ -1,13 +1,13 @@
 //! The checks of the commands: whether `bench chirp` and `bench control` accept the configuration.
 
 use super::finding::{Finding, Subject};
-use crate::experiment::certificate::require_evidence;
-use crate::experiment::{
-    ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
-};
 use bench_config::Config;
 use bench_control::Margins;
 use bench_excitation::Excitation;
+use bench_experiment::certificate::require_evidence;
+use bench_experiment::{
+    ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
+};
 use bench_rig::devices;
 
 /// The results of the checks of the commands.

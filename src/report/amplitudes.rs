@@ -4,7 +4,7 @@ use super::ReportError;
 use super::chart::colours::{BLUE, Colour, GREY, VERMILION};
 use super::chart::{Chart, Mark, Pen, Row, Scale, SeriesPoint, sheet_svg};
 use super::labels::frequency_text;
-use crate::experiment::linearity::ModeOverAmplitude;
+use bench_experiment::linearity::ModeOverAmplitude;
 use bench_identify::linearity::{BandLinearity, Linearity};
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 

@@ -4,8 +4,8 @@ use super::chart::{Chart, Mark, Pen, Row, Scale, Symbol, colours, sheet_svg};
 use super::error::ReportError;
 use colours::{BLUE, Colour, GREEN, INK, PAPER, VERMILION};
 
-use crate::experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use bench_base::decimal::Decimal;
+use bench_experiment::campaign::{CHI2_95, Evaluation, Offset, ends};
 use bench_identify::verdict::Cnmp;
 use bench_plant::PlantError;
 use bench_plant::zeros::cnmp_map;

@@ -2,9 +2,9 @@
 
 use super::html::{document_with_plots, escaped, facts, note, picture, row, section, table};
 use super::number::interval;
-use crate::experiment::tuning::{DesignCertificate, FrfEvidence, ModeRole};
 use bench_base::units::UM_PER_M;
 use bench_control::tuning::{Binding, PlantFigures};
+use bench_experiment::tuning::{DesignCertificate, FrfEvidence, ModeRole};
 
 const FIGURES_NOTE: &str = "Margin: modulus margin, the smallest distance of L from -1 with everything that the plant lacks at its \
     most unfavourable phase. Slope: largest frequency w_s in rad/s with |S(jw)| ≤ 0.707 w/w_s for all w ≤ w_s. Bandwidth: in rad/s, up \

@@ -3,7 +3,7 @@
 use super::ReportError;
 use super::chart::colours::{BLUE, GREEN, GREY, ORANGE, PURPLE, VERMILION};
 use super::chart::{Chart, Mark, Pen, Row, Scale, SeriesPoint, sheet_svg};
-use crate::experiment::{ErrorSpectrum, PredictedSpectrum};
+use bench_experiment::{ErrorSpectrum, PredictedSpectrum};
 
 /// Heights of the frames for the spectrum and for the RMS in pixels.
 const SPECTRUM_HEIGHT: f64 = 320.0;

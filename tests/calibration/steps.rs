@@ -1,9 +1,9 @@
 //! The static steps: the fit estimates the errors of the rig.
 use std::path::Path;
 
-use bench::experiment::calibration::{StaircaseError, StaircaseFit, fit};
-use bench::experiment::{self, Plan};
 use bench_config::{Config, ScaleBy, Source, load};
+use bench_experiment::Plan;
+use bench_experiment::calibration::{StaircaseError, StaircaseFit, fit};
 use bench_hal::Rig;
 use bench_recording::Recording;
 use bench_rig::calibration::{
@@ -27,7 +27,8 @@ fn recorded(rig: Box<dyn Rig>, config: &Config, folder: &Path) -> Recording {
 }
 
 fn recording_of(plan: &Plan, rig: Box<dyn Rig>, folder: &Path) -> Recording {
-    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let run =
+        bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     assert!(run.ended.completed, "{:?}", run.ended);
     run.finish("{}").expect("a good disk");

@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench_config::{Source, load};
+use bench_experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench_identify::verdict::Cnmp;
 use serde_json::Value;
 

@@ -1,6 +1,6 @@
 //! The required load, against the static equilibrium of the stage with nonlinear constraints.
-use bench::experiment::campaign::{Load, StageModel};
 use bench_config::{Config, PlantSettings, Purpose, Source, Sr4dofSettings, load};
+use bench_experiment::campaign::{Load, StageModel};
 
 fn config(sets: &[&str]) -> Config {
     let sets = sets.iter().map(|set| set.to_string()).collect();

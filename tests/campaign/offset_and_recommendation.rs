@@ -1,5 +1,5 @@
 //! Offset and recommendation for CNMP regions given in closed form.
-use bench::experiment::campaign::{
+use bench_experiment::campaign::{
     Judgement, Region, Tolerances, disagreeing, estimate_offset, recommend,
 };
 

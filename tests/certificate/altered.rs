@@ -2,10 +2,10 @@
 
 use std::time::{Duration, SystemTime};
 
-use bench::experiment::certificate::{
+use bench_experiment::certificate::{
     CertificateError, Evidence, OpenRig, require_evidence, sha256,
 };
-use bench::experiment::{DeviceNames, ExperimentError, Plan, Stage};
+use bench_experiment::{DeviceNames, ExperimentError, Plan, Stage};
 use serde_json::{Value, json};
 
 /// The devices with which the certificate was made.

@@ -1,8 +1,8 @@
 //! What a completed chirp leaves.
 use std::process::Command;
 
-use bench::experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
-use bench::experiment::{self, Plan, analyse};
+use bench_experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
+use bench_experiment::{Plan, analyse};
 use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, SIGMAS_95};
 use bench_plant::{ModalModel, build};
@@ -129,7 +129,7 @@ fn recorded(plan: impl FnOnce(bench_config::Config) -> Plan, more: &[&str]) -> R
     let folder = tempfile::tempdir().expect("a folder");
     let config = config(more);
     let rig = Box::new(SimulatedRig::new(&config).expect("a rig"));
-    let run = experiment::run(
+    let run = bench_experiment::run(
         &plan(config),
         rig,
         Pace::Virtual,

@@ -1,7 +1,7 @@
 //! The lower bound of the modulus margin of a measured loop.
-use bench::experiment::closed_loop;
 use bench_control::ClosedLoop;
 use bench_control::measured::{LowerMargin, MeasuredLoop, ResponsePoint, Stability};
+use bench_experiment::closed_loop;
 
 use crate::certificate::stage::config;
 

@@ -1,9 +1,9 @@
 //! Each defect of a certificate is refused on devices, with its remedy.
 
-use bench::experiment::certificate::{
+use bench_experiment::certificate::{
     Agreement, CertificateError, OpenRig, Subject, require_evidence, sha256,
 };
-use bench::experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
+use bench_experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
 use bench_rig::calibration::Calibration;
 use serde_json::json;
 

@@ -2,8 +2,8 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use bench::experiment::Plan;
 use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::Plan;
 use bench_test_support::program::run_in;
 use serde_json::Value;
 use tempfile::TempDir;

@@ -1,10 +1,10 @@
 //! The check of the stage before a loop closes: it accepts the stage of the certificate and finds another one.
-use bench::experiment::certificate::sha256;
-use bench::experiment::stage_check::{
+use bench_config::Config;
+use bench_experiment::certificate::sha256;
+use bench_experiment::stage_check::{
     PhaseComparison, PlannedStageCheck, StageCheck, StageCheckError, StaticComparison,
 };
-use bench::experiment::{self, ExperimentError, Plan};
-use bench_config::Config;
+use bench_experiment::{ExperimentError, Plan};
 use bench_hal::Rig;
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
@@ -24,7 +24,7 @@ fn checked_of(plan: &Plan, rig: Box<dyn Rig>) -> StageCheck {
         .expect("a plan")
         .expect("a check");
     let folder = tempfile::tempdir().expect("a folder");
-    let run = experiment::run(
+    let run = bench_experiment::run(
         &planned.plan,
         rig,
         Pace::Virtual,

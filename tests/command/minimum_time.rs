@@ -17,7 +17,7 @@ fn taps(taps: &bench_excitation::command::Taps) -> Value {
 }
 
 /// The configuration at an operating point, as a question for Python.
-fn question(bench: &Bench, plan: &bench::experiment::Plan, case: (f64, f64, bool)) -> Value {
+fn question(bench: &Bench, plan: &bench_experiment::Plan, case: (f64, f64, bool)) -> Value {
     let (point_m, ratio, has_unmodelled) = case;
     let mut config = bench.json("config show");
     if !has_unmodelled {

@@ -7,8 +7,8 @@ mod plans;
 mod refused;
 mod runs;
 
-use bench::experiment::Plan;
 use bench_config::{Config, OptionSetting, Purpose, Source, load};
+use bench_experiment::Plan;
 use bench_test_support::{program, truth};
 
 /// The stage with the fast controller and these settings.

@@ -1,7 +1,7 @@
 //! Planned filters against an independent simulation.
 
-use bench::experiment::closed_loop;
 use bench_control::ClosedLoop;
+use bench_experiment::closed_loop;
 use nalgebra::Complex;
 
 use crate::command::{config, plan};

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use bench::experiment::replay;
+use bench_experiment::replay;
 use bench_recording::Recording;
 use bench_rt::record::flag;
 use nalgebra::Complex;

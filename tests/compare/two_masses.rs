@@ -1,6 +1,6 @@
 //! Chirps of a stage of two masses with other noise or another spring.
 
-use bench::experiment::run_comparison::{Comparison, Difference};
+use bench_experiment::run_comparison::{Comparison, Difference};
 
 use crate::compare::compared::{
     GUIDE_N_PER_M, config, differences, mean_square_ratio, modes, of_equal_stages, result,

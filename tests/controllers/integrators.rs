@@ -1,8 +1,8 @@
 //! Controllers with two integrators: the loop follows a ramp without error.
 
-use bench::experiment::closed_loop;
 use bench_config::{Purpose, Source, load};
 use bench_control::ClosedLoop;
+use bench_experiment::closed_loop;
 
 use crate::controllers::program::Bench;
 

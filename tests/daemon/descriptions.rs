@@ -19,7 +19,7 @@ fn recording(folder: &Path) -> PathBuf {
 
 fn described(path: &Path) -> [Option<String>; 3] {
     let recording = bench_recording::Recording::open(path).expect("a recording");
-    let found = bench::experiment::Description::of(&recording);
+    let found = bench_experiment::Description::of(&recording);
     [found.name, found.note, found.operator]
 }
 

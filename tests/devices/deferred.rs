@@ -1,8 +1,8 @@
 //! The configured computing delay of one period on devices: a set-point is sent in the tick after the one that computed it.
 use std::time::Duration;
 
-use bench::experiment::{self, Plan, replay};
 use bench_config::Config;
+use bench_experiment::{Plan, replay};
 use bench_hal::can::Id;
 use bench_hal::can::bus::{BusEvent, CanBus, MemoryEndpoint};
 use bench_hal::can::pdo::{Direction, cob_id, unpack};
@@ -112,7 +112,7 @@ fn closed_loop(config: &Config, enforced: bool) -> Vec<TickRecord> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let plan = Plan::control(config.clone()).expect("a plan");
     let rig = simulated(config, enforced);
-    let run = experiment::run(&plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {});
+    let run = bench_experiment::run(&plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {});
     let run = run.expect("a run");
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");

@@ -1,5 +1,5 @@
 //! N repetitions of a chirp, or N times the periods of a multisine, reduce the error by sqrt(N).
-use bench::experiment::Analysis;
+use bench_experiment::Analysis;
 
 use crate::excitation::rig::{SILENT, analysed, config, of_kind};
 

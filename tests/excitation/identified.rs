@@ -1,6 +1,6 @@
 //! Multisine, binary sequence and stepped sine each give the response of the rig and its modes.
-use bench::experiment::{Analysis, replay};
 use bench_config::Config;
+use bench_experiment::{Analysis, replay};
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::Cnmp;
 use bench_recording::Recording;

@@ -1,5 +1,5 @@
 //! Noise and geometric nonlinearity are distinguished by the omitted lines of a multisine and by several amplitudes.
-use bench::experiment::Analysis;
+use bench_experiment::Analysis;
 use bench_identify::linearity::Cause;
 use bench_identify::modal::FittedMode;
 use serde_json::Value;

@@ -1,8 +1,8 @@
 //! The simulated stage at 1 kHz, and runs on it.
 use std::path::{Path, PathBuf};
 
-use bench::experiment::{Analysis, Plan};
 use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::{Analysis, Plan};
 use bench_recording::Recording;
 
 use crate::excitation::simulated;

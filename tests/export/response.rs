@@ -1,6 +1,6 @@
 //! Frequency responses.
 
-use bench::experiment::{Plan, open_with_signals, recorded_frf};
+use bench_experiment::{Plan, open_with_signals, recorded_frf};
 use bench_identify::Frf;
 use bench_test_support::program::Bench;
 use bench_test_support::truth;

@@ -1,9 +1,9 @@
 //! Identification in closed loop with the fast controller: plant, loop, modes and zeros equal those of the open loop.
 use std::f64::consts::TAU;
 
-use bench::experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench_config::{Config, ReferenceSettings, Source, load};
 use bench_excitation::SweptReference;
+use bench_experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench_identify::verdict::Cnmp;
 use bench_plant::LoopPlant;
 use bench_recording::Recording;
@@ -160,7 +160,7 @@ fn planned_sweep_stays_within_travel_and_current() {
             && (predicted_extremes.current_a / current_a - 1.0).abs() < 0.02
     );
     assert_eq!(
-        bench::experiment::replay(&recording)
+        bench_experiment::replay(&recording)
             .expect("a replay")
             .different,
         0

@@ -2,8 +2,8 @@
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 
-use bench::experiment::{Plan, closed_loop, run};
 use bench_config::{Config, ConfigError, Purpose, Source, load, profiles, schema};
+use bench_experiment::{Plan, closed_loop, run};
 use bench_hal::{CurrentAmplifier, DisplacementProbe, Tick};
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;

@@ -1,6 +1,6 @@
 //! A chirp over the simulated chain of the profile `lab`, against the closed form.
-use bench::experiment::{Analysis, Plan};
 use bench_config::Config;
+use bench_experiment::{Analysis, Plan};
 use bench_plant::Mode;
 use bench_rig::simulated::modes as simulated_modes;
 use nalgebra::Complex;

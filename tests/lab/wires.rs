@@ -2,9 +2,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use bench::experiment::{Plan, analyse};
 use bench_config::Config;
 use bench_excitation::{Chirp, Excitation};
+use bench_experiment::{Plan, analyse};
 use bench_hal::Validity;
 use bench_plant::Mode;
 use bench_recording::{Header, Recorder, Recording};

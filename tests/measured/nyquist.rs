@@ -1,7 +1,7 @@
 //! The count of unstable poles by the curve, against the eigenvalues of the closed loop.
 
-use bench::experiment::{MeasuredFrf, closed_loop, measured_margins};
 use bench_control::measured::Stability;
+use bench_experiment::{MeasuredFrf, closed_loop, measured_margins};
 
 use crate::measured::program::Draw;
 use crate::measured::sampled::{config, frf};

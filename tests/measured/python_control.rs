@@ -1,6 +1,6 @@
 //! The margins of the same data by python-control.
 
-use bench::experiment::closed_loop;
+use bench_experiment::closed_loop;
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use serde_json::{Value, json};
 

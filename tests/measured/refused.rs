@@ -1,8 +1,8 @@
 //! FRFs that do not belong to the loop, or do not contain its margins, are refused with a remedy.
 
-use bench::experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
 use bench_config::Config;
 use bench_control::ClosedLoop;
+use bench_experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
 use bench_identify::Frf;
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 

@@ -2,11 +2,11 @@
 use std::cell::Cell;
 use std::path::Path;
 
-use bench::experiment::{
-    ExperimentError, MotorHandling, Plan, Run, RunSummary, Runner, Setup, close,
-};
 use bench_config::{Config, ExcitationKind, Source, load};
 use bench_excitation::AmplitudePoint;
+use bench_experiment::{
+    ExperimentError, MotorHandling, Plan, Run, RunSummary, Runner, Setup, close,
+};
 use bench_rig::motor::{Moment, MotorMemory};
 
 /// Continuous current of the motor: 26 N over 11.12 N/A.

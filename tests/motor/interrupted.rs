@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::experiment::{ExperimentError, MotorError, MotorHandling, Runner, Setup};
+use bench_experiment::{ExperimentError, MotorError, MotorHandling, Runner, Setup};
 use bench_rig::motor::{Moment, MotorOrigin};
 use bench_rt::thread::Pace;
 use bench_test_support::program::catches_interrupt;

@@ -1,5 +1,5 @@
 //! The interlocks start with the heat of the motor, and a replay starts with the same heat.
-use bench::experiment::{Plan, replay, run};
+use bench_experiment::{Plan, replay, run};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::Trip;

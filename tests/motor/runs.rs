@@ -1,7 +1,7 @@
 //! Runs in a row, with the clock of the test.
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use bench::experiment::{MotorHandling, Plan, Runner, Setup};
+use bench_experiment::{MotorHandling, Plan, Runner, Setup};
 use bench_rig::motor::Moment;
 
 use crate::motor::common::{

@@ -1,5 +1,5 @@
 //! Runs on the simulated stage: the motor is cold in each process and needs no file.
-use bench::experiment::{Runner, Setup};
+use bench_experiment::{Runner, Setup};
 use bench_recording::Recording;
 
 use crate::motor::common::{hot, run};

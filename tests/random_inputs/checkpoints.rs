@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use bench::experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench_config::{Config, Source, load};
+use bench_experiment::campaign::{Grid, GridPoint, Method, PointResult, Store};
 use bench_identify::verdict::Cnmp;
 use bench_rig::motor::{Moment, MotorMemory};
 use bench_study::{Block, Plan, Shard, StudyFile};

@@ -2,10 +2,10 @@
 
 use std::f64::consts::TAU;
 
-use bench::experiment::linearity::{ModeOverAmplitude, compare_modes};
 use bench::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench::report::{AmplitudeOverview, ReportError, amplitudes_svg};
 use bench_config::{Source, load};
+use bench_experiment::linearity::{ModeOverAmplitude, compare_modes};
 use bench_identify::modal::{Estimate, FittedMode};
 
 use crate::report::svg;

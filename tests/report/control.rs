@@ -1,6 +1,6 @@
 //! The report that `bench control` writes after each run.
 
-use bench::experiment::{ControlRun, Plan, control_run};
+use bench_experiment::{ControlRun, Plan, control_run};
 use bench_recording::Recording;
 use bench_test_support::program::Bench;
 use serde_json::{Value, json};

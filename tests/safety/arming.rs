@@ -3,7 +3,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::experiment::{self, Plan};
+use bench_experiment::Plan;
 use bench_hal::{Rig, Validity};
 use bench_rt::arming::{State, Transition};
 use bench_rt::clock::Virtual;
@@ -467,7 +467,7 @@ fn amplifier_is_not_enabled_without_a_recording() {
         for pace in [Pace::Virtual, Pace::Realtime] {
             let rig = LoggedRig::new(StillRig::default());
             let log = Arc::clone(&rig.log);
-            let error = experiment::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
+            let error = bench_experiment::run(&plan, Box::new(rig), pace, out, &mut |_, _| {})
                 .err()
                 .expect("no recording");
             assert!(error.to_string().contains("nothing was moved"), "{error}");

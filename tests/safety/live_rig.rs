@@ -4,8 +4,8 @@ use std::sync::{Arc, Mutex};
 use std::task::Poll;
 use std::time::Duration;
 
-use bench::experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench_config::Config;
+use bench_experiment::{LiveRig, Plan, Run, Runner, Setup, replay};
 use bench_hal::{
     AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Rig, Tick, Validity,
 };

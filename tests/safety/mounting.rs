@@ -1,6 +1,6 @@
 //! The gain of the mounting is applied in the driver: the travel is judged in the metres of the stage and of the probe.
-use bench::experiment::{Plan, run};
 use bench_config::{Config, Source, load};
+use bench_experiment::{Plan, run};
 use bench_hal::{Reading, Tick, Validity};
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::Trip;

@@ -2,12 +2,12 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use bench::experiment::{self, Plan, ReplayError, Replayed, RunKind, replay};
 use bench_config::{
     AmplitudePoint, Config, DampingPoint, DampingSettings, PlantSettings, ReferenceSettings, Sweep,
     whole,
 };
 use bench_excitation::{SineReference, StepReference};
+use bench_experiment::{Plan, ReplayError, Replayed, RunKind, replay};
 use bench_hal::Validity;
 use bench_recording::{Header, Recorder, Recording};
 use bench_rig::calibration::Correction;
@@ -46,7 +46,8 @@ fn control(controller: &str) -> Plan {
 fn record(plan: &Plan, faults: &[(Range<u64>, Fault)], folder: &Path) -> PathBuf {
     let rig = SimulatedRig::new(&plan.config).expect("a rig");
     let rig = Box::new(FaultyRig::new(rig, faults));
-    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let run =
+        bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     path
@@ -122,7 +123,7 @@ fn recording_with_refused_damping_is_read_replayed_and_identified() {
     let recording = Recording::open(&path).expect("a recording");
     let read = Plan::of(&recording).expect("a plan");
     assert_eq!(read.config.plant, plan.config.plant);
-    let analysis = experiment::analyse(&recording, &read.config).expect("an analysis");
+    let analysis = bench_experiment::analyse(&recording, &read.config).expect("an analysis");
     assert!(analysis.frf.len() > 100, "{}", analysis.frf.len());
 }
 

@@ -1,8 +1,8 @@
 //! The same seed and settings give the same run, bit for bit, on any machine.
 use std::path::Path;
 
-use bench::experiment::{self, Plan};
 use bench_config::{Config, Sweep};
+use bench_experiment::Plan;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::thread::Pace;
 
@@ -31,8 +31,8 @@ fn chirp(sweep: Sweep, seed: u64) -> Plan {
 fn digest(plan: &Plan) -> u64 {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
-    let run =
-        experiment::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {}).expect("a run");
+    let run = bench_experiment::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {})
+        .expect("a run");
     assert!(run.ended.completed, "{:?}", run.ended);
     run.finish("{}").expect("a good disk").loop_digest
 }

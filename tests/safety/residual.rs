@@ -2,8 +2,8 @@
 use std::sync::{Arc, Mutex};
 use std::task::Poll;
 
-use bench::experiment::{Plan, replay, residuals, run};
 use bench_config::{Config, Source, load};
+use bench_experiment::{Plan, replay, residuals, run};
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;

@@ -2,7 +2,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::experiment::{self, Plan, Run, StopCause, replay};
+use bench_experiment::{Plan, Run, StopCause, replay};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::State;
@@ -174,7 +174,7 @@ fn run_with_hanging_supervisor(folder: &std::path::Path) -> Run {
             hang_until_disabled(&log);
         }
     };
-    experiment::run(&plan, Box::new(rig), Pace::Realtime, folder, &mut watch).expect("a run")
+    bench_experiment::run(&plan, Box::new(rig), Pace::Realtime, folder, &mut watch).expect("a run")
 }
 
 #[test]

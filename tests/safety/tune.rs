@@ -2,10 +2,10 @@
 use std::f64::consts::TAU;
 use std::sync::mpsc::Sender;
 
-use bench::experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench_config::{Config, ReferenceSettings};
 use bench_control::{ControlLaw, LawInput};
 use bench_excitation::Reference;
+use bench_experiment::{LiveRig, Plan, Stage, TuneRefusal, check_tune, closed_loop, replay};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::program::{Control, Program};

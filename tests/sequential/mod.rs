@@ -4,11 +4,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bench::experiment::sequential::{
+use bench_config::Config;
+use bench_experiment::sequential::{
     SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
 };
-use bench::experiment::{Plan, Runner, Setup};
-use bench_config::Config;
+use bench_experiment::{Plan, Runner, Setup};
 use bench_identify::verdict::{Cnmp, MAX_LOOKS};
 use bench_recording::Recording;
 use bench_test_support::identified::{config, truth};

@@ -4,8 +4,8 @@
 //! By default a few cells with few seeds. `BENCH_COVERAGE_SEEDS=200 cargo test --features statistical --test statistical coverage --
 //! --nocapture` measures all cells and prints the table.
 
-use bench::experiment::{Analysis, Plan};
 use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::{Analysis, Plan};
 use bench_identify::Estimate;
 use bench_identify::verdict::zeros;
 use bench_plant::zeros::damped_zeros;

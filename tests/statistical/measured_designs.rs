@@ -2,13 +2,13 @@
 //!
 //! `BENCH_TUNE_SEEDS=50` designs for 50 seeds; without it for a few.
 
-use bench::experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_control::tuning::{
     Design, DesignOptions, DesignTask, Effort, Goal, MeasuredPlant, NamedPlant, Requirements,
     RigModel, Tolerances, design,
 };
+use bench_experiment::tuning::{FrfSource, IdentifiedFrf, evidence};
 use bench_test_support::chirp_source::{config_at, measured, true_loop};
 use bench_test_support::seeds::over_seeds;
 

@@ -1,8 +1,8 @@
 //! Coverage of the 95 % intervals of margins from measured responses.
 
-use bench::experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
 use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerText};
+use bench_experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
 use bench_identify::{Estimate, response};
 use bench_plant::LoopPlant;
 use bench_rig::simulated;

@@ -4,8 +4,8 @@
 //! `BENCH_MONITOR_TICKS=100000000` runs 10^8 ticks, the default is 4 million; `BENCH_MONITOR_SEED` sets the seed, and
 //! `BENCH_MONITOR_SHARE` a share `interlock.model_error_share` other than 0.5, to find the margin.
 
-use bench::experiment::{Plan, closed_loop, run};
 use bench_config::{Config, ExcitationKind, PlantSettings, Source, load};
+use bench_experiment::{Plan, closed_loop, run};
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::arming::Trip;
 use bench_rt::thread::Pace;
@@ -59,7 +59,7 @@ impl Draw {
         config.control.duration_s = 4.0;
         if self.between(0.0, 1.0) < 0.5 || config.title.contains("XY") {
             config.excitation.kind = *self.one_of(ExcitationKind::ALL);
-            bench::experiment::predicted_extremes(&config).ok()?;
+            bench_experiment::predicted_extremes(&config).ok()?;
             return Some(Plan::chirp(config));
         }
         let size = format!("{:e}", self.between(1e-6, 100e-6));

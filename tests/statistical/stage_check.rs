@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use bench::experiment::certificate::{CertificateText, ResponseFile, certify};
-use bench::experiment::stage_check::{PlannedStageCheck, StageCheck};
-use bench::experiment::{self, Plan, Run, analyse};
 use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::certificate::{CertificateText, ResponseFile, certify};
+use bench_experiment::stage_check::{PlannedStageCheck, StageCheck};
+use bench_experiment::{Plan, Run, analyse};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
@@ -25,7 +25,7 @@ fn config(more: &[String]) -> Config {
 fn run(plan: &Plan, rig: &Config, folder: &Path) -> Recording {
     let rig = Box::new(SimulatedRig::new(rig).expect("a rig"));
     let run: Run =
-        experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+        bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     Recording::open(&path).expect("a recording")

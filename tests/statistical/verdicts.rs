@@ -1,7 +1,7 @@
 //! Verdicts on the simulated stage at random operating points and asymmetries: none is wrong, and few are undecided.
 
-use bench::experiment::Analysis;
 use bench_config::Config;
+use bench_experiment::Analysis;
 use bench_identify::modal::Estimate;
 use bench_identify::verdict::Cnmp;
 use bench_test_support::identified::{analysed, config, model, stands_for, truth};

@@ -1,6 +1,6 @@
 //! No tick allocates.
 use assert_no_alloc::assert_no_alloc;
-use bench::experiment::{Plan, residuals};
+use bench_experiment::{Plan, residuals};
 use bench_hal::Tick;
 use bench_rt::clock::TickTiming;
 use bench_rt::servo::Request;

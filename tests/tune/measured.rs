@@ -1,12 +1,12 @@
 //! Designs from measured responses: on the true plant they have what they promise.
 
-use bench::experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_control::tuning::{
     Design, DesignOptions, DesignPlant, DesignTask, Effort, Goal, IdentifiedResponse,
     MeasuredPlant, NamedPlant, RigModel, Tolerances, design, evaluate,
 };
+use bench_experiment::tuning::{FrfSource, IdentifiedFrf, ModeRole, evidence};
 use bench_plant::UnmodelledMode;
 use bench_plant::{Mode, SignalPath};
 use bench_rig::simulated;

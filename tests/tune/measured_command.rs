@@ -1,6 +1,6 @@
 //! `bench tune --frf` and `--campaign` at the process boundary.
 
-use bench::experiment::certificate::sha256;
+use bench_experiment::certificate::sha256;
 use bench_test_support::program::{Bench, number};
 
 const QUICK: &str = "--order 4 --without-bound --frequency-tolerance 0 --damping-factor 1";

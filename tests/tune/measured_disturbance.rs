@@ -1,7 +1,7 @@
 //! The disturbance of a recorded closed loop that held its position.
 
-use bench::experiment::tuning::recorded_disturbance;
 use bench_control::tuning::{DesignOptions, DesignTask, NamedPlant, RigModel};
+use bench_experiment::tuning::recorded_disturbance;
 use bench_recording::Recording;
 use bench_test_support::program::Bench;
 

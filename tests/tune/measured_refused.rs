@@ -1,7 +1,7 @@
 //! Responses that give no plant for a design are refused with a remedy.
 
-use bench::experiment::tuning::{FrfSource, IdentifiedFrf, TuneSourceError, evidence};
 use bench_config::Config;
+use bench_experiment::tuning::{FrfSource, IdentifiedFrf, TuneSourceError, evidence};
 use bench_plant::{ModalModel, Mode, build};
 use bench_test_support::chirp_source::{config_at, sampled};
 use nalgebra::{Complex, DVector};

@@ -1,9 +1,9 @@
 //! Errors of figures.
 
-use bench::experiment::{AnalysisError, RunError};
 use bench::report::ReportError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
+use bench_experiment::{AnalysisError, RunError};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;
 use bench_rig::devices::DevicesError;

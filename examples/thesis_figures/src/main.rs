@@ -4,7 +4,7 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use bench::experiment::abandon_on_signal;
+use bench_experiment::abandon_on_signal;
 use clap::Parser;
 use serde::Serialize;
 use thesis_figures::{

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use super::FigureError;
 use super::model::Model;
-use bench::experiment::{self, Analysis, Plan, TrackingMetrics};
 use bench_config::Config;
+use bench_experiment::{Analysis, Plan, TrackingMetrics};
 use bench_recording::Recording;
 use bench_rig::devices;
 use bench_rt::record::{TickRecord, flag};
@@ -66,7 +66,7 @@ impl Runs {
         }
         let config = Model::stage().config()?;
         let recording = self.run(&Plan::chirp(config.clone()), "chirp")?;
-        let analysis = experiment::analyse(&recording, &config)?;
+        let analysis = bench_experiment::analyse(&recording, &config)?;
         Ok(self.chirp.get_or_init(|| analysis))
     }
 
@@ -85,9 +85,10 @@ impl Runs {
 
     /// Any closed-loop run.
     pub(crate) fn closed(&self, config: Config) -> Result<ClosedLoopRun, FigureError> {
-        let plan = Plan::control(config.clone()).map_err(experiment::RunError::Plan)?;
+        let plan = Plan::control(config.clone()).map_err(bench_experiment::RunError::Plan)?;
         let recording = self.run(&plan, "control")?;
-        let measured = experiment::tracking_metrics(&recording, &config.control, &config.servo)?;
+        let measured =
+            bench_experiment::tracking_metrics(&recording, &config.control, &config.servo)?;
         let measured = measured
             .ok_or_else(|| FigureError::Run("the run ended before its steady state".into()))?;
         let ticks: Vec<TickRecord> = recording.ticks()?.collect::<Result<_, _>>()?;
@@ -96,7 +97,8 @@ impl Runs {
 
     fn run(&self, plan: &Plan, what: &str) -> Result<Recording, FigureError> {
         let rig = devices::simulate(&plan.config)?.rig;
-        let mut run = experiment::run(plan, rig, Pace::Virtual, &self.folder, &mut |_, _| {})?;
+        let mut run =
+            bench_experiment::run(plan, rig, Pace::Virtual, &self.folder, &mut |_, _| {})?;
         run.totals()?;
         let path = run.path.clone();
         if let Some((trip, tick)) = run.ended.trip {

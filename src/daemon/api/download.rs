@@ -16,7 +16,7 @@ use futures_util::stream;
 use super::error::ApiError;
 use crate::daemon::files::FolderError;
 use crate::daemon::shared::Daemon;
-use crate::experiment::ErrorKind;
+use bench_experiment::ErrorKind;
 
 /// Bytes that are read at a time: what a client that takes nothing costs.
 const PART_BYTES: u64 = 8 << 10;

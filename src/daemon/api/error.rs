@@ -12,7 +12,7 @@ use serde::Serialize;
 use crate::daemon::files::FolderError;
 use crate::daemon::schedule::ScheduleError;
 use crate::daemon::worker::{ArgsError, ComputeError};
-use crate::experiment::{ErrorKind, ErrorObject};
+use bench_experiment::{ErrorKind, ErrorObject};
 
 /// An error with its status.
 #[derive(Debug)]

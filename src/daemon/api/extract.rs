@@ -21,7 +21,7 @@ use serde::de::DeserializeOwned;
 use super::error::ApiError;
 use crate::daemon::schedule::StopKind;
 use crate::daemon::shared::{Daemon, now};
-use crate::experiment::ErrorKind;
+use bench_experiment::ErrorKind;
 
 /// Longest time in which a client sends its body.
 const BODY_TIME: Duration = Duration::from_secs(10);

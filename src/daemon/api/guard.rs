@@ -11,7 +11,7 @@ use axum::response::{IntoResponse, Response};
 
 use super::error::ApiError;
 use crate::daemon::secret::Secret;
-use crate::experiment::ErrorKind;
+use bench_experiment::ErrorKind;
 
 /// Requests per second that all clients over TCP together may make in the long run, and at once.
 const RATE_PER_S: f64 = 500.0;

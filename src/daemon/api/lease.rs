@@ -15,7 +15,7 @@ use super::views::Operator;
 use crate::daemon::lease::LEASE;
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::Daemon;
-use crate::experiment::{ErrorKind, operator_name};
+use bench_experiment::{ErrorKind, operator_name};
 
 /// A lease that was given.
 #[derive(Debug, Serialize, JsonSchema)]

@@ -29,7 +29,7 @@ use crate::daemon::peer::Peer;
 use crate::daemon::session;
 use crate::daemon::session_messages::MAX_MESSAGE_BYTES;
 use crate::daemon::shared::Daemon;
-use crate::experiment::ErrorKind;
+use bench_experiment::ErrorKind;
 
 /// Time between two states.
 const STATE: Duration = Duration::from_millis(200);

@@ -18,7 +18,7 @@ use crate::daemon::catalogue::{Catalogue, ListedRecording, RecordingInfo};
 use crate::daemon::computations::Purpose;
 use crate::daemon::shared::Daemon;
 use crate::daemon::worker;
-use crate::experiment::ErrorKind;
+use bench_experiment::ErrorKind;
 use bench_recording::Recording;
 
 /// Most recordings on one page: the curves of more cannot be distinguished.

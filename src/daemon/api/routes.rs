@@ -79,7 +79,7 @@ async fn unknown() -> ApiError {
 async fn wrong_method() -> ApiError {
     ApiError::new(
         axum::http::StatusCode::METHOD_NOT_ALLOWED,
-        crate::experiment::ErrorKind::Usage,
+        bench_experiment::ErrorKind::Usage,
         "this path does not know the method; see /api/v1/openapi.json",
     )
 }

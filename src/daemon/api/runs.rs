@@ -27,7 +27,7 @@ use crate::daemon::schedule::{NewEntry, ScheduleError, StopKind};
 use crate::daemon::secret::Secret;
 use crate::daemon::shared::{Daemon, now};
 use crate::daemon::worker;
-use crate::experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
+use bench_experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
 use bench_rt::tuning::{Factors, Tune};
 
 /// The part of a path that names a command.

@@ -1,7 +1,7 @@
 //! Name and note of a run or of a recording, as clients give them.
 
 use super::error::ApiError;
-use crate::experiment::{DescriptionError, run_name, run_note};
+use bench_experiment::{DescriptionError, run_name, run_note};
 
 /// Refuses a name or a note that a recording cannot contain. An empty one is not given.
 pub fn check_texts(name: &str, note: &str) -> Result<(), ApiError> {

@@ -13,8 +13,8 @@ use super::extract::{Body, ClientAddress};
 use crate::daemon::computations::Purpose;
 use crate::daemon::shared::{Daemon, DaemonConfig};
 use crate::daemon::worker;
-use crate::experiment::ErrorKind;
 use bench_config::{Config, Source, load, profiles};
+use bench_experiment::ErrorKind;
 use bench_rig::devices;
 
 /// Findings of `bench doctor`.

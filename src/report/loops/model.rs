@@ -3,7 +3,6 @@
 use nalgebra::Complex;
 
 use super::plane::{CRITICAL, circle, level, plane, with_critical_point, with_unit_circle};
-use crate::experiment::LoopModel;
 use crate::report::ReportError;
 use crate::report::chart::colours::{BLUE, GREEN, GREY, ORANGE, VERMILION};
 use crate::report::chart::{Chart, Pen, Row, Scale, Symbol, sheet_svg};
@@ -11,6 +10,7 @@ use crate::report::labels::frequency_text;
 use crate::report::trace::{self, Line, Trace};
 use bench_base::units::hz;
 use bench_control::{Crossing, Margins};
+use bench_experiment::LoopModel;
 
 /// Heights of the frames in pixels.
 const MAGNITUDE_HEIGHT: f64 = 300.0;

@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use super::outputs::{AnalysisOutputs, AnalysisStatus};
 use super::result_files::{OutputError, ResultFiles};
-use crate::experiment::linearity::ModeOverAmplitude;
 use crate::report::{AmplitudeOverview, Picture, amplitudes_svg, joined, plant_conditions};
 use bench_config::Config;
+use bench_experiment::linearity::ModeOverAmplitude;
 
 const CAPTION: &str = "Frequency and compliance of the modes in the excited band relative to the smallest amplitude, and their \
     damping ratios, each with its 95 % confidence interval: those of a linear stage do not depend on the amplitude. Noise of one \

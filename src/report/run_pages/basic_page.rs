@@ -3,15 +3,15 @@
 use super::comparison::signals_section;
 use super::page::{named, table_section, with_interval};
 use super::run_facts;
-use crate::experiment::calibration::StaircaseResult;
-use crate::experiment::campaign::RestPosition;
-use crate::experiment::stage_check::{PhaseComparison, StageCheck};
-use crate::experiment::{BasicResults, Overview};
 use crate::report::ReportError;
 use crate::report::conditions::lines;
 use crate::report::html::{escaped, facts, row, section};
 use crate::report::number::plain;
 use bench_config::Config;
+use bench_experiment::calibration::StaircaseResult;
+use bench_experiment::campaign::RestPosition;
+use bench_experiment::stage_check::{PhaseComparison, StageCheck};
+use bench_experiment::{BasicResults, Overview};
 use bench_identify::Estimate;
 use bench_recording::Recording;
 

@@ -1,13 +1,13 @@
 //! One page for several recordings: their differences, their frequency responses and their steps.
 
 use super::run_differences::differences;
-use crate::experiment::run_comparison::{Comparison, RunResult};
-use crate::experiment::{Extent, Overview, StepResponse, TrackingMetrics};
 use crate::report::html::{document_with_plots, escaped, note, picture, row, section, table};
 use crate::report::{
     ReportError, SignalsPlot, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg,
     signals_svg, step_svg,
 };
+use bench_experiment::run_comparison::{Comparison, RunResult};
+use bench_experiment::{Extent, Overview, StepResponse, TrackingMetrics};
 use bench_identify::{Frf, Unit};
 
 /// Most recordings on one page: their curves have 4 colours and 3 strokes, so those of more cannot be distinguished.

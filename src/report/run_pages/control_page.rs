@@ -3,7 +3,6 @@
 use super::comparison::step_picture;
 use super::page::{named, table_section};
 use super::{Plot, PlotKind, run_facts};
-use crate::experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use crate::report::conditions::{joined, lines};
 use crate::report::html::{facts, note, row, section};
 use crate::report::number::{interval, plain};
@@ -12,6 +11,7 @@ use crate::report::{
     loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
 };
 use bench_config::Config;
+use bench_experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
 

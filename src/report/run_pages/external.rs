@@ -3,9 +3,9 @@
 use super::RecordReport;
 use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named};
-use crate::experiment::ExternalAnalysis;
 use crate::report::html::{facts, section};
 use crate::report::{MagnitudeAxis, ReportError};
+use bench_experiment::ExternalAnalysis;
 use bench_identify::Unit;
 use bench_identify::modal::MeasurementChain;
 

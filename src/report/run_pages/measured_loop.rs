@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::loop_pictures::MeasuredLoop;
 use super::result_files::{OutputError, ResultFiles};
-use crate::experiment::LoopCurves;
 use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredMargins;
+use bench_experiment::LoopCurves;
 use bench_identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
 
 /// A loop with a measured plant.

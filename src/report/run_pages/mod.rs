@@ -26,9 +26,9 @@ mod result_files;
 mod run_differences;
 mod run_facts;
 
-use crate::experiment::ModelResponse;
-use crate::experiment::certificate::SignCheck;
 use crate::report::MagnitudeAxis;
+use bench_experiment::ModelResponse;
+use bench_experiment::certificate::SignCheck;
 use bench_identify::modal::{MeasurementChain, ModalFit};
 use bench_identify::verdict::Verdict;
 use bench_identify::{Frf, Unit};

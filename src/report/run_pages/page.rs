@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
-use crate::experiment::certificate::SIGNS_DIFFER;
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::number::{interval, percent};
+use bench_experiment::certificate::SIGNS_DIFFER;
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use bench_identify::verdict::UncertainZero;
 

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::experiment::PlanError;
 use crate::report::ReportError;
 use bench_base::atomic_file::{write_atomic, write_new};
+use bench_experiment::PlanError;
 use bench_identify::Frf;
 use bench_identify::frf_csv;
 

@@ -2,11 +2,11 @@
 
 use super::page::table_section;
 use super::run_facts::setting_cell;
-use crate::experiment::run_comparison::{
-    Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
-};
 use crate::report::html::{note, row, section, table};
 use crate::report::number::{interval, percent, plain};
+use bench_experiment::run_comparison::{
+    Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
+};
 
 /// All tables of a comparison.
 pub(super) fn differences(comparison: &Comparison) -> String {

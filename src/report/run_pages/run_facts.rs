@@ -1,10 +1,10 @@
 //! Sections of a page about the run itself: its scheduling and its configuration.
 
 use super::page::{self, named};
-use crate::experiment::{Description, Ending, TripSummary};
 use crate::report::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::report::{joined, plant_conditions};
 use bench_config::{Config, SettingDifference, changed_settings};
+use bench_experiment::{Description, Ending, TripSummary};
 use bench_recording::{Recording, event_text};
 
 /// Entries of the recording's metadata that the page shows.

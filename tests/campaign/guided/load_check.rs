@@ -1,6 +1,6 @@
 //! The check of the load at one point.
 
-use bench::experiment::campaign::{Finding, GridPoint, Load, PointResult, Reply};
+use bench_experiment::campaign::{Finding, GridPoint, Load, PointResult, Reply};
 
 use super::{Action, DONE, all, campaign, config, grid, no_action, required, set_required};
 

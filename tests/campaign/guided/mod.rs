@@ -7,12 +7,12 @@ mod progress;
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
-use bench::experiment::campaign::{
+use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::campaign::{
     CampaignError, Grid, GridPoint, GuidedCampaign, Load, LoadCheck, LoadedRig, Operator,
     PointResult, Question, Reply, RestPosition, StageModel, analyse_point, visit_order,
 };
-use bench::experiment::{Plan, run};
-use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::{Plan, run};
 use bench_hal::Validity;
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;

@@ -1,6 +1,6 @@
 //! Order of the points; skipped points and stopped campaigns.
 
-use bench::experiment::campaign::{GridPoint, Reply};
+use bench_experiment::campaign::{GridPoint, Reply};
 
 use super::{DONE, Outcome, all, campaign, config, grid, no_action, set_required};
 

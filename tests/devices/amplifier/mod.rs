@@ -6,8 +6,8 @@ mod vesc;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bench::experiment::Plan;
 use bench_config::{Config, Source, load};
+use bench_experiment::Plan;
 use bench_hal::can::bus::{Host, SimulatedHost};
 use bench_hal::can::drive::faults::*;
 use bench_hal::{CurrentAmplifier, Devices, DisplacementProbe, Reading, Tick, Validity};

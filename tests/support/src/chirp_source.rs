@@ -1,9 +1,9 @@
 //! Measured responses without files: of simulated chirps, and of given modes; the true loop of a controller designed from them.
 
-use bench::experiment::MeasuredFrf;
-use bench::experiment::tuning::FrfSource;
 use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
+use bench_experiment::MeasuredFrf;
+use bench_experiment::tuning::FrfSource;
 use bench_identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
 use bench_plant::{LoopPlant, Mode};
 use bench_rig::simulated;

@@ -8,9 +8,9 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use bench::experiment::Plan;
-use bench::experiment::run_comparison::{Comparison, Difference, RunResult};
 use bench_config::{Config, Purpose, Source, load};
+use bench_experiment::Plan;
+use bench_experiment::run_comparison::{Comparison, Difference, RunResult};
 use bench_recording::Recording;
 
 use crate::simulated;

@@ -1,6 +1,6 @@
 //! A chirp of the simulated stage with its analysis, and the true modes and zeros of the model.
-use bench::experiment::{Analysis, Plan};
 use bench_config::{Config, Source, load};
+use bench_experiment::{Analysis, Plan};
 use bench_identify::modal::FittedMode;
 use bench_plant::ModalModel;
 use bench_plant::zeros::{cnmp_pairs, damped_zeros};

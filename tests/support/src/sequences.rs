@@ -2,11 +2,11 @@
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use bench::experiment::sequential::{
+use bench_config::Config;
+use bench_experiment::sequential::{
     SequenceEnd, SequenceLimits, ShotSummary, default_max_motion_s, until_decided,
 };
-use bench::experiment::{Analysis, Plan, Runner, Setup, close};
-use bench_config::Config;
+use bench_experiment::{Analysis, Plan, Runner, Setup, close};
 
 /// A sequence whose recordings are complete.
 pub struct Ended {

@@ -1,8 +1,8 @@
 //! Runs on the simulated stage, recorded and analysed as by the command line.
 use std::path::{Path, PathBuf};
 
-use bench::experiment::{self, Analysis, AnalysisError, Plan, analyse};
 use bench_config::Config;
+use bench_experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::servo_run::RunOutcome;
@@ -11,7 +11,8 @@ use bench_rt::thread::Pace;
 /// The recording of a run by `plan`, and how the run ended.
 pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
-    let run = experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
+    let run =
+        bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let ended = (run.path.clone(), run.ended.clone());
     run.finish("{}").expect("a good disk");
     ended

@@ -1,0 +1,68 @@
+//! The data of all shots.
+
+use core::ops::ControlFlow;
+use std::path::Path;
+
+use crate::analysis::{Analysis, AnalysisPhase, ModalStep, cautions, estimated, run_signals_of};
+use crate::analysis_error::AnalysisError;
+use crate::read_run::open_with_signals;
+use crate::response_estimate::ResponseEstimate;
+use bench_config::Config;
+use bench_identify::verdict::Certainty;
+use bench_identify::{Frf, FrfDatum, best_of};
+
+/// The responses of the shots, and their data for the fit.
+#[derive(Default)]
+pub(super) struct Evidence {
+    frfs: Vec<Frf>,
+    /// The data of all shots, frequencies rising.
+    pub(super) data: Vec<FrfDatum>,
+    filled_ticks: u64,
+    /// Defects of the runs.
+    cautions: Vec<String>,
+}
+
+impl Evidence {
+    /// Adds the recording of a shot.
+    ///
+    /// # Errors
+    /// When the recording cannot be read, or contains no frequency response.
+    pub(super) fn add(&mut self, recording: &Path, config: &Config) -> Result<(), AnalysisError> {
+        let (recording, signals) = open_with_signals(recording)?;
+        let signals = run_signals_of(&recording, signals, config, &mut never_cancels)?;
+        self.filled_ticks += signals.filled_ticks;
+        let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
+        self.frfs.push(estimate.frf);
+        self.cautions.extend(cautions(&recording));
+        self.data.extend(estimate.frf_data);
+        self.data
+            .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        Ok(())
+    }
+
+    /// Fit and verdict of all data so far.
+    ///
+    /// # Errors
+    /// When the model of the plant cannot be analysed.
+    pub(super) fn analysis(&self, config: &Config) -> Result<Analysis, AnalysisError> {
+        let estimate = ResponseEstimate {
+            frf: best_of(&self.frfs),
+            frf_data: self.data.clone(),
+            closed: None,
+            linearity: None,
+        };
+        let step = ModalStep {
+            config,
+            certainty: Certainty::REPEATED_LOOKS,
+        };
+        let mut analysis = step.of(estimate, self.filled_ticks, &mut never_cancels)?;
+        for caution in &self.cautions {
+            analysis.verdict = analysis.verdict.with(Some(caution.clone()));
+        }
+        Ok(analysis)
+    }
+}
+
+fn never_cancels(_: AnalysisPhase, _: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
