@@ -25,7 +25,7 @@
 //! | a grid of chirps | [`bench_experiment::campaign`] |
 //! | recordings compared with each other | [`bench_experiment::run_comparison`] |
 //! | signals and responses as files of other programs | [`bench_export`] |
-//! | plots and pages of runs, loops and the model | [`report`] |
+//! | plots and pages of runs, loops and the model | [`bench_report`] |
 //! | figures and tables of the thesis | `examples/thesis_figures/` |
 //!
 //! # Example
@@ -56,4 +56,3 @@
 pub mod cli;
 pub mod daemon;
 pub mod doctor;
-pub mod report;

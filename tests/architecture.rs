@@ -7,7 +7,7 @@ use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
 
 /// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 4] = ["report", "doctor", "daemon", "cli"];
+const ORDER: [&str; 3] = ["doctor", "daemon", "cli"];
 
 /// The segments of a path from the root of the crate.
 type ItemPath = Vec<String>;

@@ -8,14 +8,14 @@ use super::outcome::Outcome;
 use super::run_options::exit;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
-use crate::report::MagnitudeAxis;
-use crate::report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use bench_experiment::{AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals};
 use bench_recording::Recording;
+use bench_report::MagnitudeAxis;
+use bench_report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

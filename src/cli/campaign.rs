@@ -14,7 +14,6 @@ use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use super::value_range::{ValueRange, asymmetries, operating_points};
-use crate::report::campaign_picture;
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, Ratio, si};
@@ -23,6 +22,7 @@ use bench_experiment::campaign::{
     Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
 };
 use bench_experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
+use bench_report::campaign_picture;
 use bench_rig::devices;
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.

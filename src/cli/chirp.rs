@@ -18,8 +18,6 @@ use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, run_text};
 use super::table::{labelled, wrap};
 use super::until_decided::{SequenceCommand, SequentialOptions};
-use crate::report::MagnitudeAxis;
-use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
 use bench_config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
@@ -28,6 +26,8 @@ use bench_experiment::sequential::first_shot_config;
 use bench_experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
+use bench_report::MagnitudeAxis;
+use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_rig::devices;
 
 /// The bench and its excitation.

@@ -11,12 +11,12 @@ use super::identify::warn_of_unchecked;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
-use crate::report::ReportError;
-use crate::report::run_pages::{MAX_COMPARED, comparison_page};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_experiment::run_comparison::{Comparison, RunResult, distinguish};
 use bench_recording::Recording;
+use bench_report::ReportError;
+use bench_report::run_pages::{MAX_COMPARED, comparison_page};
 
 /// The recordings, and where the page goes.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,13 +1,13 @@
 //! The result of `bench compare` as text.
 
 use super::table::{labelled, table, wrap};
-use crate::report::number::interval;
 use bench_base::decimal::Decimal;
 use bench_experiment::run_comparison::{
     Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
 use bench_identify::Estimate;
 use bench_identify::verdict::Cnmp;
+use bench_report::number::interval;
 
 /// Tables of the differences, and what they mean.
 pub(super) fn text(comparison: &Comparison, page: Option<&str>) -> String {

@@ -11,7 +11,6 @@ use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{close, exit};
-use crate::report::MagnitudeAxis;
 use bench_config::{Purpose, warnings};
 use bench_control::{ClosedLoop, Margins, listed_poles};
 use bench_excitation::Extremes;
@@ -20,6 +19,7 @@ use bench_experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
 };
+use bench_report::MagnitudeAxis;
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Control, &args.settings()?)?;

@@ -12,9 +12,6 @@ use super::margins::text as margins_text;
 use super::output::warn;
 use super::run_options::run_text;
 use super::table::{labelled, table};
-use crate::report::run_pages::{
-    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
-};
 use bench_base::decimal::Decimal;
 use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
@@ -27,6 +24,9 @@ use bench_experiment::{
 };
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
+use bench_report::run_pages::{
+    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
+};
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

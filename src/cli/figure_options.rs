@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use super::columns::cannot_write;
 use super::error::CliError;
-use crate::report::{MagnitudeAxis, Picture, ReportError};
 use bench_base::atomic_file::write_atomic;
+use bench_report::{MagnitudeAxis, Picture, ReportError};
 
 /// How the responses of a run are drawn.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]

@@ -13,13 +13,13 @@ use super::outcome::Outcome;
 use super::output::print_result;
 use super::progress::ProgressLine;
 use super::run_options::{description_text, trip_text};
-use crate::report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::{
     Description, Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals,
 };
 use bench_recording::Recording;
+use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 
 /// The recording, and where the results go.
 #[derive(Clone, Debug, clap::Args)]

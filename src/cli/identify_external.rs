@@ -11,10 +11,6 @@ use super::linearity_output;
 use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
-use crate::report::MagnitudeAxis;
-use crate::report::run_pages::{
-    ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
-};
 use bench_base::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
 use bench_experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
 use bench_identify::external_csv::{self, Columns, Sampling};
@@ -24,6 +20,10 @@ use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
 use bench_identify::{IdentifyError, Signals};
+use bench_report::MagnitudeAxis;
+use bench_report::run_pages::{
+    ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
+};
 
 /// Largest deviation of a period from a whole number of samples, in samples. Leakage becomes relevant at a deviation
 /// a thousand times larger.

@@ -18,9 +18,6 @@ use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, run_text};
 use super::table::{labelled, table, wrap};
-use crate::report::MagnitudeAxis;
-use crate::report::number::interval;
-use crate::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Ratio;
 use bench_config::{Config, OptionSetting, Purpose};
@@ -30,6 +27,9 @@ use bench_experiment::linearity::{
 };
 use bench_experiment::{Run, RunSummary, Runner};
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use bench_report::MagnitudeAxis;
+use bench_report::number::interval;
+use bench_report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 
 /// Odd lines, one of each group of four omitted.
 const LINES: [(&str, &str); 2] = [

@@ -1,9 +1,9 @@
 //! Responses and margins of a closed loop, as text.
 
-use crate::report::number::angular_frequency;
-use crate::report::run_pages::LoopOutputs;
-use crate::report::{crossing_count, place};
 use bench_base::decimal::Decimal;
+use bench_report::number::angular_frequency;
+use bench_report::run_pages::LoopOutputs;
+use bench_report::{crossing_count, place};
 
 /// The files of the responses, and the measured margins beside those of the model.
 pub(super) fn text(outputs: &LoopOutputs) -> String {

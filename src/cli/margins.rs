@@ -14,13 +14,13 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{no_json, print_result, warn};
 use super::table::{table, wrap};
-use crate::report::{
-    LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
-};
 use bench_base::decimal::Decimal;
 use bench_config::{Config, ProbeSettings, Purpose};
 use bench_control::{ClosedLoop, Margins, Pole, listed_poles};
 use bench_experiment::{LoopModel, Stage, check_calibration, closed_loop};
+use bench_report::{
+    LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
+};
 
 /// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]

@@ -8,9 +8,6 @@ use super::analysis_output::in_folder;
 use super::error::CliError;
 use super::output::warn;
 use super::table::wrap;
-use crate::report::number::interval;
-use crate::report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
-use crate::report::{crossing_count, place};
 use bench_base::units::{UM_PER_M, hz};
 use bench_config::Config;
 use bench_control::ClosedLoop;
@@ -19,6 +16,9 @@ use bench_control::measured::{
 };
 use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use bench_identify::Estimate;
+use bench_report::number::interval;
+use bench_report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
+use bench_report::{crossing_count, place};
 
 /// The margins with a measured plant, and the files of the loop.
 #[derive(Debug, Serialize)]

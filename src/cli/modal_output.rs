@@ -1,10 +1,10 @@
 //! Modes, zeros and verdict, as text.
 
 use super::table::{table, wrap};
-use crate::report::run_pages::ModalSummary;
 use bench_base::decimal::Decimal;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::UncertainZero;
+use bench_report::run_pages::ModalSummary;
 
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary) -> String {

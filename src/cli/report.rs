@@ -10,16 +10,16 @@ use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
-use crate::report::ReportError;
-use crate::report::run_pages::{
-    BasicReport, BenchRun, ControlReport, comparison_page, page as analysed_page, plots,
-};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::run_comparison::RunResult;
 use bench_experiment::{Analysis, BasicResults, ControlRun, overview};
 use bench_recording::Recording;
+use bench_report::ReportError;
+use bench_report::run_pages::{
+    BasicReport, BenchRun, ControlReport, comparison_page, page as analysed_page, plots,
+};
 
 /// The page on standard output instead of a file.
 const STANDARD_OUTPUT: &str = "-";

@@ -14,7 +14,6 @@ use super::tune_plants::{ModelOptions, model_plants};
 use super::tune_values::{
     GoalName, factor, gain_margin, margin, phase_margin_deg, positive, sensitivity_limit,
 };
-use crate::report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
 use bench_base::quantity::{OfRatio, OperatingPoint, si};
@@ -30,6 +29,7 @@ use bench_experiment::tuning::{
 };
 use bench_plant::SignalPath;
 use bench_recording::Recording;
+use bench_report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
 
 /// What is designed, and for which plants.
 #[derive(Clone, Debug, clap::Args)]

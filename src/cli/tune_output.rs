@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::table::{table, wrap};
 use super::tune_measured;
-use crate::report::{BINDING_COLUMNS, PLANT_COLUMNS, binding_cells, plant_cells};
 use bench_control::tuning::Binding;
 use bench_experiment::tuning::{DesignCertificate, OppositeAsymmetry};
+use bench_report::{BINDING_COLUMNS, PLANT_COLUMNS, binding_cells, plant_cells};
 
 /// The design as text.
 pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path) -> String {

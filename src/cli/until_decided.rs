@@ -12,8 +12,6 @@ use super::output::print_text;
 use super::progress::ProgressLine;
 use super::run_options::{RunOptions, close, run_text};
 use super::table::wrap;
-use crate::report::MagnitudeAxis;
-use crate::report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 use bench_base::progress::Progress;
 use bench_base::quantity::Time;
 use bench_config::Config;
@@ -24,6 +22,8 @@ use bench_experiment::sequential::{
 use bench_experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use bench_identify::verdict::MAX_LOOKS;
 use bench_recording::Recording;
+use bench_report::MagnitudeAxis;
+use bench_report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
 
 /// Options of a sequential experiment.
 #[derive(Clone, Debug, clap::Args)]

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
-use bench::report::{Chart, Mark};
+use bench_report::{Chart, Mark};
 use thesis_figures::{Content, Figure, Runs, make_all, selected};
 
 /// The folder of the figures, kept for inspection.

@@ -1,6 +1,6 @@
 //! Pictures and page: well-formed, labelled, within their frames, and self-contained.
 
-use bench::report::{Chart, Mark, Pen, Row, Scale, ScaleKind, Symbol, colours, sheet_svg};
+use bench_report::{Chart, Mark, Pen, Row, Scale, ScaleKind, Symbol, colours, sheet_svg};
 use proptest::prelude::*;
 use serde_json::json;
 use thesis_figures::page;

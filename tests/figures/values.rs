@@ -1,6 +1,6 @@
 //! Curves and counts of several figures, against Python and closed forms, both independent of the program.
 
-use bench::report::Mark;
+use bench_report::Mark;
 use serde_json::{Value, json};
 
 use crate::figures::all::{chart, curves, sampled};

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use bench::report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
-use bench::report::{AmplitudeOverview, ReportError, amplitudes_svg};
 use bench_config::{Source, load};
 use bench_experiment::linearity::{ModeOverAmplitude, compare_modes};
 use bench_identify::modal::{Estimate, FittedMode};
+use bench_report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
+use bench_report::{AmplitudeOverview, ReportError, amplitudes_svg};
 
 use crate::report::svg;
 

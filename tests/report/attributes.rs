@@ -1,9 +1,9 @@
 //! What the charts carry for the cursor readout and the zoom of `plot.js`.
 
-use bench::report::{
+use bench_identify::Unit;
+use bench_report::{
     Chart, Curve, Pen, Row, Scale, Symbol, Trace, bode_svg, colours, html, sheet_svg,
 };
-use bench_identify::Unit;
 use nalgebra::Complex;
 
 use crate::report::pictures::flat;

@@ -1,7 +1,7 @@
 //! The Bode plot.
 
-use bench::report::{Curve, ReportError, Trace, bode_svg};
 use bench_identify::{Frf, Unit};
+use bench_report::{Curve, ReportError, Trace, bode_svg};
 use nalgebra::Complex;
 use proptest::prelude::*;
 

@@ -1,7 +1,7 @@
 //! The Bode plot of an identification: the residual of the fit.
 
-use bench::report::{Identification, MagnitudeAxis, Trace, identification_svg};
 use bench_identify::{Frf, Unit};
+use bench_report::{Identification, MagnitudeAxis, Trace, identification_svg};
 use nalgebra::Complex;
 
 use crate::report::pictures::flat;

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use bench::report::{LoopPlot, loop_bode_svg};
 use bench_control::{Crossing, Margins};
+use bench_report::{LoopPlot, loop_bode_svg};
 use nalgebra::Complex;
 
 use crate::report::pictures::frequencies;

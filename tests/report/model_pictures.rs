@@ -1,6 +1,6 @@
 //! Pictures of results of the model, written by `--svg` and `--html`.
 
-use bench::report::{CnmpMap, map_svg};
+use bench_report::{CnmpMap, map_svg};
 use bench_test_support::program::Bench;
 use serde_json::json;
 

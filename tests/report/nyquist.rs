@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use bench::report::{Curve, Trace, coherence_svg, nyquist_svg};
 use bench_identify::{Frf, Unit};
+use bench_report::{Curve, Trace, coherence_svg, nyquist_svg};
 use nalgebra::Complex;
 
 use crate::report::pictures::flat;

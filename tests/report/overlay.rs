@@ -1,7 +1,7 @@
 //! Several recordings in one plot.
 
-use bench::report::{ReportError, StepCurve, overlay_bode_svg, overlay_steps_svg};
 use bench_identify::Unit;
+use bench_report::{ReportError, StepCurve, overlay_bode_svg, overlay_steps_svg};
 
 use crate::report::pictures::{keep, measured, short_and_noisy};
 use crate::report::svg;

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use bench::report::phase::{is_ambiguous, offset_deg, unwrapped_deg};
-use bench::report::{Trace, bode_svg, has_ambiguous_phase};
 use bench_identify::{Frf, FrfPoint, Unit};
+use bench_report::phase::{is_ambiguous, offset_deg, unwrapped_deg};
+use bench_report::{Trace, bode_svg, has_ambiguous_phase};
 use nalgebra::Complex;
 
 use crate::report::pictures::frequencies;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use bench::report::{Curve, Trace, bode_svg};
 use bench_identify::Unit;
 use bench_identify::{EstimatorSettings, Frf, Signals, local};
+use bench_report::{Curve, Trace, bode_svg};
 use nalgebra::Complex;
 
 use crate::report::stage::{self, RATE_HZ, SampledPlant};

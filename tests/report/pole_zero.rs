@@ -1,9 +1,9 @@
 //! The map of poles and zeros.
 
-use bench::report::{
+use bench_identify::Unit;
+use bench_report::{
     PoleZeroMap, ReportError, StabilityChart, UncertainPoint, pole_zero_svg, stability_svg,
 };
-use bench_identify::Unit;
 use nalgebra::Complex;
 
 use crate::report::pictures::{flat, keep};

@@ -2,9 +2,9 @@
 
 use nalgebra::Complex;
 
-use bench::report::colours::{GREY, INK, VERMILION};
-use bench::report::phase::unwrapped_deg;
-use bench::report::{Chart, Pen, Scale, Symbol};
+use bench_report::colours::{GREY, INK, VERMILION};
+use bench_report::phase::unwrapped_deg;
+use bench_report::{Chart, Pen, Scale, Symbol};
 
 /// A named response over frequency.
 #[derive(Clone)]

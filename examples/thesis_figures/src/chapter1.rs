@@ -6,8 +6,8 @@ use super::bode::circle;
 use super::content::signed;
 use super::plane::plane;
 use super::{Comparison, Content, FigureError, Runs};
-use bench::report::colours::{BLUE, GREEN, GREY, INK, VERMILION};
-use bench::report::{Chart, Mark, Pen, Symbol};
+use bench_report::colours::{BLUE, GREEN, GREY, INK, VERMILION};
+use bench_report::{Chart, Mark, Pen, Symbol};
 use bench_thesis::{bandwidth_rad_s, guaranteed_peak, opening_angle};
 
 /// The circle of all zeros at which the band up to w0 subtends an angle Theta: centre w0/tan Theta, radius w0/sin
@@ -116,7 +116,7 @@ pub(crate) fn fig_1_4(_: &Runs) -> Result<Content, FigureError> {
         })
         .mark(Mark::Area {
             name: String::new(),
-            colour: bench::report::colours::PAPER,
+            colour: bench_report::colours::PAPER,
             strength: 1.0,
             outline: circle((centre, 0.0), radius),
         })

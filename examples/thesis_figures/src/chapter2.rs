@@ -4,11 +4,11 @@ use super::bode::{Curve, bode};
 use super::content::signed;
 use super::model::{Model, even, response};
 use super::{Comparison, Content, FigureError, Runs};
-use bench::report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
-use bench::report::{Chart, Mark, Pen, Scale};
 use bench_config::{PlantSettings, Sr4dofSettings};
 use bench_plant::zeros::{LocusPlane, Zero, ZeroKind, phase_drop_deg, undamped_zeros};
 use bench_plant::{ModalModel, Mode};
+use bench_report::colours::{BLUE, Colour, GREEN, GREY, INK, VERMILION};
+use bench_report::{Chart, Mark, Pen, Scale};
 use bench_thesis::veering::{Loci, ModesAt};
 
 const TAU: f64 = std::f64::consts::TAU;

@@ -2,10 +2,10 @@
 
 use super::model::{Model, even};
 use super::{Comparison, Content, FigureError, Runs};
-use bench::report::colours::Colour;
-use bench::report::{Chart, Mark, Scale};
 use bench_config::PlantSettings;
 use bench_plant::zeros::cnmp_map;
+use bench_report::colours::Colour;
+use bench_report::{Chart, Mark, Scale};
 
 pub(crate) fn fig_5_2(_: &Runs) -> Result<Content, FigureError> {
     let (points, asymmetries) = (even(-0.15, 0.15, 201), even(-0.10, 0.10, 201));

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use bench::report::{Chart, Row};
+use bench_report::{Chart, Row};
 
 /// A figure or a table: charts, and the text below them.
 #[derive(Clone, Debug, Default, PartialEq)]

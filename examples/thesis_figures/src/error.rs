@@ -1,11 +1,11 @@
 //! Errors of figures.
 
-use bench::report::ReportError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_experiment::{AnalysisError, RunError};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;
+use bench_report::ReportError;
 use bench_rig::devices::DevicesError;
 
 /// Why a figure could not be made.

@@ -1,7 +1,7 @@
 //! All figures on one self-contained HTML page.
 
 use super::{Comparison, Content, Figure, Outcome, Verdict};
-use bench::report::html::{document, escaped, picture, table};
+use bench_report::html::{document, escaped, picture, table};
 
 const TITLE: &str = "Figures and tables of the thesis, computed";
 const INTRODUCTION: &str = "<p>L. Cui, <cite>On the Complex Non-Minimum Phase Zeros in Flexure Mechanisms</cite>. Each figure is drawn \

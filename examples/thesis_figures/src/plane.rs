@@ -4,11 +4,11 @@ use nalgebra::Complex;
 
 use super::FigureError;
 use super::model::Varied;
-use bench::report::colours::{BLUE, Colour, GREY, INK};
-use bench::report::{Chart, Mark, Pen, Scale, Symbol};
 use bench_plant::zeros::{
     KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
+use bench_report::colours::{BLUE, Colour, GREY, INK};
+use bench_report::{Chart, Mark, Pen, Scale, Symbol};
 
 /// A coordinate beyond every frame.
 const FAR: f64 = 1e9;

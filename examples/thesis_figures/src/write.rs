@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::{Content, Entry, FigureError, Make, Runs, page};
-use bench::report::sheet_svg;
 use bench_base::atomic_file::write_atomic;
+use bench_report::sheet_svg;
 
 /// A figure that was made, or the reason why it is not computed.
 #[derive(Clone, Debug)]

@@ -10,13 +10,13 @@ use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::evenly_spread_rows;
 use super::sweep::SweepArgs;
-use crate::report::{Picture, ReportError, locus_svg, plant_conditions};
 use bench_base::decimal::Decimal;
 use bench_config::{Config, Purpose};
 use bench_plant::ModalModel;
 use bench_plant::zeros::{
     KindChange, Locus, LocusPlane, ModalSum, Zero, damped_zeros, undamped_zeros,
 };
+use bench_report::{Picture, ReportError, locus_svg, plant_conditions};
 use bench_thesis::ClosedForm;
 
 /// The setting that varies, and the zeros to follow.

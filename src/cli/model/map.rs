@@ -9,10 +9,10 @@ use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
 use super::super::value_range::{ValueRange, asymmetries, operating_points};
-use crate::report::{CnmpMap, Picture, ReportError, map_svg};
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OperatingPoint, Ratio};
 use bench_config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
+use bench_report::{CnmpMap, Picture, ReportError, map_svg};
 
 /// The largest picture in lines and characters, which fits 80 columns.
 const PICTURE: (usize, usize) = (60, 67);

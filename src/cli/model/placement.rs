@@ -9,8 +9,8 @@ use super::super::error::CliError;
 use super::super::output::print_result;
 use super::placement_text::text;
 use super::sweep::CloseModesArgs;
-use crate::report::{QuadrantPanel, quadrants_svg};
 use bench_plant::{Port, PortWeights, ports};
+use bench_report::{QuadrantPanel, quadrants_svg};
 use bench_thesis::veering::placement::{Chosen, Path, PlacementReport, Placements};
 use bench_thesis::veering::{Loci, QuadrantDiagram, meeting_pair, require_meeting};
 

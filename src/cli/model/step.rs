@@ -8,13 +8,13 @@ use super::super::figure_options::PictureOptions;
 use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
-use crate::report::{Picture, ReportError, model_step_svg, plant_conditions};
 use bench_base::decimal::Decimal;
 use bench_base::numeric::linspace;
 use bench_base::quantity::{OfTime, si};
 use bench_config::{Config, Purpose};
 use bench_plant::ModalModel;
 use bench_plant::zeros::{ModalSum, ZeroCounts};
+use bench_report::{Picture, ReportError, model_step_svg, plant_conditions};
 use bench_thesis::{Sequence, StepFeatures, StepPrediction, StepResponse};
 
 /// The table of the response.

@@ -10,10 +10,10 @@ use super::super::outcome::Outcome;
 use super::super::output::{print_note, print_result};
 use super::super::progress::ProgressLine;
 use super::study_text::text;
-use crate::report::{Picture, ReportError, plant_conditions, study_svg};
 use bench_base::progress::Progress;
 use bench_config::Purpose;
 use bench_experiment::stop_on_signal;
+use bench_report::{Picture, ReportError, plant_conditions, study_svg};
 use bench_study::{
     Answer, Block, Opened, Plan, Results, Shard, StudyFile, Tolerance, complete, joined,
 };

@@ -10,10 +10,10 @@ use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::sweep::CloseModesArgs;
 use super::{evenly_spread_rows, meeting_text};
-use crate::report::{Picture, ReportError, plant_conditions, veering_caption, veering_svg};
 use bench_base::decimal::Decimal;
 use bench_base::units::hz;
 use bench_config::{Config, Purpose};
+use bench_report::{Picture, ReportError, plant_conditions, veering_caption, veering_svg};
 use bench_thesis::veering::report::{Shares, VeeringReport};
 use bench_thesis::veering::{Loci, ModesAt, close_pair};
 

@@ -4,9 +4,9 @@ use super::super::content::signed;
 use super::super::model::{ModeOf, Model, even, geometric};
 use super::super::plane::{Part, changes, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
-use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Symbol};
 use bench_plant::zeros::{Crossing, Locus, LocusPlane, ModalTerm};
+use bench_report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
+use bench_report::{Chart, Pen, Symbol};
 use bench_thesis::{critical_damping, touching_damping, two_mode_break_points};
 
 const KEY_V: &str = "plant.modes.v.residue_per_kg";

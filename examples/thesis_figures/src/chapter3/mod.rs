@@ -10,8 +10,8 @@ pub(crate) use two_modes::{fig_3_2, fig_3_3, fig_3_4, fig_3_5, fig_3_6, fig_3_8}
 
 use super::FigureError;
 use super::model::{even, geometric};
-use bench::report::{Chart, Pen, Scale};
 use bench_plant::zeros::{ModalSum, ModalTerm};
+use bench_report::{Chart, Pen, Scale};
 use bench_thesis::{Sequence, StepFeatures, StepResponse};
 
 const W: &str = "Frequency (rad/s)";
@@ -71,7 +71,7 @@ fn step_chart(heading: &str, seconds: f64) -> Chart {
 fn zero_line(chart: Chart) -> Chart {
     chart.line(
         "",
-        Pen::solid(bench::report::colours::GREY).thin(),
+        Pen::solid(bench_report::colours::GREY).thin(),
         vec![(0.0, 0.0), (1e3, 0.0)],
     )
 }

@@ -6,10 +6,10 @@ use super::super::model::{ModeOf, Model, geometric, kinds, response};
 use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
-use bench::report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Scale, Symbol};
 use bench_control::{ControllerText, continuous_response};
 use bench_plant::zeros::{Crossing, Locus, LocusPlane, ModalSum};
+use bench_report::colours::{BLUE, Colour, GREEN, INK, ORANGE, PURPLE, VERMILION};
+use bench_report::{Chart, Pen, Scale, Symbol};
 
 const KEY: &str = "plant.modes.R.residue_per_kg";
 

@@ -6,9 +6,9 @@ use super::super::model::{ModeOf, Model, even, kinds, response};
 use super::super::plane::{Part, locus, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{W, dense, initial, part, sequence, step, step_chart, sum, zero_line};
-use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Scale, Symbol};
 use bench_plant::zeros::{Locus, LocusPlane, ModalSum, ZeroKind, phase_drop_deg};
+use bench_report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
+use bench_report::{Chart, Pen, Scale, Symbol};
 
 /// A range of the residue of mode v, with its name and what it is expected to give.
 type Segment = (&'static str, f64, f64, Colour, &'static str);

@@ -4,8 +4,8 @@ use super::super::content::signed;
 use super::super::model::{Model, even};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{K, K23, L, Y, sr4dof};
-use bench::report::colours::{BLUE, INK, VERMILION};
-use bench::report::{Chart, Pen, Scale};
+use bench_report::colours::{BLUE, INK, VERMILION};
+use bench_report::{Chart, Pen, Scale};
 use bench_thesis::veering::{Loci, ModesAt};
 
 const TAU: f64 = std::f64::consts::TAU;

@@ -6,9 +6,9 @@ use super::super::model::{ModeOf, Model, even, geometric, kinds, response};
 use super::super::plane::locus;
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::W;
-use bench::report::colours::{BLUE, GREEN, GREY, INK, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Scale, Symbol};
 use bench_plant::zeros::{Crossing, LocusPlane, ModalSum, ModalTerm};
+use bench_report::colours::{BLUE, GREEN, GREY, INK, PURPLE, VERMILION};
+use bench_report::{Chart, Pen, Scale, Symbol};
 use bench_thesis::{Sequence, critical_residues, critical_sums};
 
 /// Modes u and v of the example of section 4.2.2: wu^2 = 1, wv^2 = 2, residues -1 and 1.

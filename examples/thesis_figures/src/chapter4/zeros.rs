@@ -6,9 +6,9 @@ use super::super::model::{Model, even, kinds, response};
 use super::super::plane::{Part, changes, locus, places, plane, tracks};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::{K, K23, L, W, Y, sr4dof, three_mass};
-use bench::report::colours::{BLUE, Colour, GREEN, GREY, VERMILION};
-use bench::report::{Chart, Pen, Symbol};
 use bench_plant::zeros::{Crossing, Locus, LocusPlane, undamped_zeros};
+use bench_report::colours::{BLUE, Colour, GREEN, GREY, VERMILION};
+use bench_report::{Chart, Pen, Symbol};
 
 /// Bode plots of a plant at some values of a setting, and the migration of its zeros between.
 struct Study<'a> {

@@ -8,9 +8,9 @@ use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, step};
 use nalgebra::Complex;
 
-use bench::report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
-use bench::report::{Chart, Pen, Scale};
 use bench_control::{ClosedLoop, ControllerText, Margins};
+use bench_report::colours::{BLUE, Colour, GREEN, PURPLE, VERMILION};
+use bench_report::{Chart, Pen, Scale};
 use bench_thesis::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";

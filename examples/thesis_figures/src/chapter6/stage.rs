@@ -8,10 +8,10 @@ use super::super::measured::{ClosedLoopRun, ThesisController};
 use super::super::model::{Model, kinds, response};
 use super::super::{Comparison, Content, FigureError, Runs};
 use super::loops::{closed, closed_loop, open, sensitivity, step};
-use bench::report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
-use bench::report::{Chart, Mark, Pen, Scale};
 use bench_control::{ControllerText, Margins, continuous_response, step_metrics};
 use bench_plant::zeros::{cnmp_pairs, undamped_zeros};
+use bench_report::colours::{BLUE, Colour, GREEN, INK, PURPLE, VERMILION};
+use bench_report::{Chart, Mark, Pen, Scale};
 use bench_thesis::sign_sequence;
 
 const W: &str = "Frequency (rad/s)";

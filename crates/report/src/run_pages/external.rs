@@ -1,0 +1,107 @@
+//! The report of an external record: without model and loop.
+
+use super::RecordReport;
+use super::distortion_plot::distortion_plot;
+use super::page::{delay_ms, named};
+use crate::html::{facts, section};
+use crate::{MagnitudeAxis, ReportError};
+use bench_experiment::ExternalAnalysis;
+use bench_identify::Unit;
+use bench_identify::modal::MeasurementChain;
+
+/// An analysed table of samples.
+#[derive(Clone, Copy, Debug)]
+pub struct ExternalRecord<'a> {
+    /// Its analysis.
+    pub analysis: &'a ExternalAnalysis,
+    /// Name of the file.
+    pub file: &'a str,
+    /// Column of the input.
+    pub input: &'a str,
+    /// Column of the output.
+    pub output: &'a str,
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Number of samples.
+    pub samples: usize,
+    /// Axis of the magnitudes.
+    pub magnitude_axis: MagnitudeAxis,
+}
+
+impl<'a> ExternalRecord<'a> {
+    /// The report of the record.
+    ///
+    /// # Errors
+    /// When drawing fails.
+    pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
+        let (analysis, input, output) = (self.analysis, self.input, self.output);
+        let fit = analysis.fit.as_ref().ok();
+        let subtitle = format!("{input} to {output}, in the units of the columns");
+        let linearity = analysis
+            .periodic
+            .as_ref()
+            .and_then(|part| part.linearity.as_ref());
+        let plot =
+            linearity.map(|linearity| distortion_plot(linearity, output, self.file, &subtitle));
+        Ok(RecordReport {
+            name: None,
+            ending: String::new(),
+            command_and_settings: String::new(),
+            title: self.file.to_string(),
+            subtitle,
+            record: format!("{} samples at {} Hz", self.samples, self.rate_hz),
+            unit: Unit::Bare,
+            residue_unit: format!("{output} per {input} and s^2"),
+            frf: &analysis.frf,
+            model: None,
+            magnitude_axis: self.magnitude_axis,
+            chain: MeasurementChain::Input(analysis.input_path),
+            fit,
+            signs: None,
+            verdict: &analysis.verdict,
+            judged_up_to_rad_s: analysis.judged_up_to_rad_s,
+            evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),
+            further_plots: plot.transpose()?.into_iter().collect(),
+            before_plots: String::new(),
+            after_plots: self.description(),
+        })
+    }
+
+    fn description(&self) -> String {
+        let periodic = self.analysis.periodic.as_ref();
+        let pairs = named([
+            ("Input", Some(self.input.to_string())),
+            ("Output", Some(self.output.to_string())),
+            ("Samples", Some(self.samples.to_string())),
+            ("Rate", Some(format!("{} Hz", self.rate_hz))),
+            (
+                "Hold of the input",
+                milliseconds(self.analysis.input_path.hold_s),
+            ),
+            (
+                "Lag of the input",
+                milliseconds(self.analysis.input_path.lag_s),
+            ),
+            (
+                "Periods averaged",
+                periodic.map(|part| part.periods.to_string()),
+            ),
+            (
+                "Periods skipped before",
+                periodic.map(|part| part.skipped.to_string()),
+            ),
+            (
+                "Distortion",
+                periodic
+                    .and_then(|part| part.distortion)
+                    .map(|distortion| distortion.description()),
+            ),
+        ]);
+        section("The record", &facts(&pairs))
+    }
+}
+
+/// A time in milliseconds; `None` if it is 0.
+fn milliseconds(time_s: f64) -> Option<String> {
+    (time_s > 0.0).then(|| format!("{:.4} ms", 1e3 * time_s))
+}
