@@ -54,5 +54,4 @@
 #![deny(unsafe_code)]
 
 pub mod cli;
-pub mod daemon;
 pub mod doctor;

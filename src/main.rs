@@ -26,7 +26,7 @@ fn start_log() {
         .log_internal_errors(false);
     tracing_subscriber::registry()
         .with(lines)
-        .with(bench::daemon::WarningCopies)
+        .with(bench_daemon::WarningCopies)
         .with(filter)
         .init();
 }

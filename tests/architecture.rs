@@ -1,13 +1,10 @@
-//! The structure of the sources: every import points in the direction of ARCHITECTURE.md, and there are no cyclic imports between files.
+//! The structure of the sources: no crate has cyclic imports between files. Cargo refuses cyclic dependencies between crates.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use syn::visit::{self, Visit};
 use syn::{Attribute, Item, ItemMod, ItemUse, UseTree, Visibility};
-
-/// The modules of the library. A module imports only modules that precede it. Cargo checks the same for crates.
-const ORDER: [&str; 3] = ["doctor", "daemon", "cli"];
 
 /// The segments of a path from the root of the crate.
 type ItemPath = Vec<String>;
@@ -292,43 +289,6 @@ impl Library {
     }
 }
 
-/// The position of a module in [`ORDER`]: that of its path or of the nearest parent in the list.
-fn rank(module: &ItemPath) -> Option<usize> {
-    let position = |length: usize| {
-        let path = module[..length].join("::");
-        ORDER.iter().position(|entry| *entry == path)
-    };
-    let found = (1..=module.len()).rev().find_map(position);
-    assert!(
-        found.is_some() || module.is_empty(),
-        "{module:?} is not in ORDER"
-    );
-    found
-}
-
-#[test]
-fn imports_point_in_the_direction_of_the_architecture() {
-    let library = Library::read("src");
-    let mut violations = Vec::new();
-    for (from, targets) in library.imports() {
-        let Some(own) = rank(from) else { continue };
-        for to in &targets {
-            if rank(to).is_some_and(|other| other > own) {
-                violations.push(format!(
-                    "{} imports {}",
-                    library.file(from),
-                    library.file(to)
-                ));
-            }
-        }
-    }
-    assert!(
-        violations.is_empty(),
-        "imports against the direction:\n{}",
-        violations.join("\n")
-    );
-}
-
 type Graph = BTreeMap<ItemPath, BTreeSet<ItemPath>>;
 
 /// All modules that `start` imports directly or indirectly.
@@ -388,7 +348,7 @@ fn program_has_no_cyclic_imports_between_files() {
 fn crates_have_no_cyclic_imports_between_files() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("crates");
     let entries: Vec<_> = std::fs::read_dir(crates).expect("a folder").collect();
-    assert!(entries.len() >= 4, "{entries:?}");
+    assert!(entries.len() >= 15, "{entries:?}");
     for entry in entries {
         let name = entry.expect("an entry").file_name();
         let found = cycles_of_files(&format!("crates/{}/src", name.display()));
@@ -418,13 +378,10 @@ fn detects_a_cycle_of_three_files() {
 
 #[test]
 fn finds_the_imports_of_a_known_file() {
-    let library = Library::read("src");
-    let servo: ItemPath = ["rt", "servo"].map(String::from).into();
+    let library = Library::read("crates/rt/src");
+    let servo: ItemPath = ["servo"].map(String::from).into();
     let imports = library.imports();
     let files: Vec<String> = imports[&servo].iter().map(|to| library.file(to)).collect();
-    assert!(files.contains(&"rt/arming.rs".to_string()), "{files:?}");
-    assert!(
-        !files.iter().any(|file| file.starts_with("cli")),
-        "{files:?}"
-    );
+    assert!(files.contains(&"arming.rs".to_string()), "{files:?}");
+    assert!(!files.contains(&"thread.rs".to_string()), "{files:?}");
 }

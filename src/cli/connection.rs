@@ -6,8 +6,8 @@ use std::sync::Arc;
 use super::arguments::arguments;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
-use crate::daemon::client::{DaemonOwner, rig_of, running_daemon};
-use crate::daemon::{Command, OnDisconnect, RunRequest};
+use bench_daemon::client::{DaemonOwner, rig_of, running_daemon};
+use bench_daemon::{Command, OnDisconnect, RunRequest};
 use bench_experiment::{RigOwner, Stage};
 
 /// Where runs are made.

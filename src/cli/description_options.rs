@@ -1,7 +1,7 @@
 //! `--name`, `--note` and `--operator`: what the operator says about a run.
 
 use super::arguments::arguments;
-use crate::daemon::client::is_started_by_daemon;
+use bench_daemon::client::is_started_by_daemon;
 use bench_experiment::{Description, Invocation, operator_name, run_name, run_note};
 
 /// Name, note and operator of a run.

@@ -13,8 +13,8 @@ use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_message, print_note, print_text};
-use crate::daemon::http_client::{Ask, HttpError, Target, json as answer, send};
-use crate::daemon::{Hold, OutputPiece};
+use bench_daemon::http_client::{Ask, HttpError, Target, json as answer, send};
+use bench_daemon::{Hold, OutputPiece};
 use bench_experiment::StopSignals;
 
 /// Period of the renewals of the arm lease.

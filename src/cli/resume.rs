@@ -12,8 +12,8 @@ use super::outcome::Outcome;
 use super::output::print_result;
 use super::remote::{ask, in_runtime, tcp_target};
 use super::table::wrap;
-use crate::daemon::client::running_daemon;
-use crate::daemon::http_client::Target;
+use bench_daemon::client::running_daemon;
+use bench_daemon::http_client::Target;
 use bench_experiment::operator_name;
 
 /// Pause between two attempts to take the lease.

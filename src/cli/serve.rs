@@ -9,8 +9,8 @@ use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::table::labelled;
-use crate::daemon::{DaemonConfig, ServeOptions, Started, own_socket, serve};
 use bench_config::{Purpose, Source};
+use bench_daemon::{DaemonConfig, ServeOptions, Started, own_socket, serve};
 use bench_rig::devices::is_simulated;
 
 /// Address of the page of a demonstration.

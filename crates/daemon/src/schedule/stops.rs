@@ -1,8 +1,8 @@
 //! The rules of the queue for stops and trips: the bench is held, and a stopped command keeps its turn for [`GRACE`] only.
 
 use super::{GRACE, Now, Schedule, ScheduleError};
-use crate::daemon::hold::{Hold, HoldCause, StopKind};
-use crate::daemon::run_entry::{Phase, RunEntry, RunOutcome};
+use crate::hold::{Hold, HoldCause, StopKind};
+use crate::run_entry::{Phase, RunEntry, RunOutcome};
 
 impl Schedule {
     /// Stops a command: one that waits is removed; for the one that has its turn the bench is stopped and held. `by` says who stops.

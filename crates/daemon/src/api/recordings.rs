@@ -14,10 +14,10 @@ use super::download::OpenFile;
 use super::error::ApiError;
 use super::extract::{Body, ClientAddress, InPath, InQuery};
 use super::texts::check_texts;
-use crate::daemon::catalogue::{Catalogue, ListedRecording, RecordingInfo};
-use crate::daemon::computations::Purpose;
-use crate::daemon::shared::Daemon;
-use crate::daemon::worker;
+use crate::catalogue::{Catalogue, ListedRecording, RecordingInfo};
+use crate::computations::Purpose;
+use crate::shared::Daemon;
+use crate::worker;
 use bench_experiment::ErrorKind;
 use bench_recording::Recording;
 

@@ -19,8 +19,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::error::ApiError;
-use crate::daemon::schedule::StopKind;
-use crate::daemon::shared::{Daemon, now};
+use crate::schedule::StopKind;
+use crate::shared::{Daemon, now};
 use bench_experiment::ErrorKind;
 
 /// Longest time in which a client sends its body.

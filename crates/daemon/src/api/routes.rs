@@ -18,9 +18,9 @@ use bytes::Bytes;
 
 use super::error::ApiError;
 use super::{lease, live, page, recordings, runs, tools};
-use crate::daemon::client::SESSION_PATH;
-use crate::daemon::metrics;
-use crate::daemon::shared::Daemon;
+use crate::client::SESSION_PATH;
+use crate::metrics;
+use crate::shared::Daemon;
 
 /// Largest body of a request in bytes.
 const MAX_BODY: usize = 1 << 20;

@@ -10,7 +10,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use super::error::ApiError;
-use crate::daemon::secret::Secret;
+use crate::secret::Secret;
 use bench_experiment::ErrorKind;
 
 /// Requests per second that all clients over TCP together may make in the long run, and at once.

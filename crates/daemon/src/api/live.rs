@@ -22,13 +22,13 @@ use tokio::time::{Instant, Interval, MissedTickBehavior, interval};
 use super::error::ApiError;
 use super::extract::InQuery;
 use super::views::{StateView, state};
-use crate::daemon::live::event_text::EventView;
-use crate::daemon::live::hub::LiveMessage;
-use crate::daemon::live::response::ResponseView;
-use crate::daemon::peer::Peer;
-use crate::daemon::session;
-use crate::daemon::session_messages::MAX_MESSAGE_BYTES;
-use crate::daemon::shared::Daemon;
+use crate::live::event_text::EventView;
+use crate::live::hub::LiveMessage;
+use crate::live::response::ResponseView;
+use crate::peer::Peer;
+use crate::session;
+use crate::session_messages::MAX_MESSAGE_BYTES;
+use crate::shared::Daemon;
 use bench_experiment::ErrorKind;
 
 /// Time between two states.

@@ -14,8 +14,8 @@ use bytes::Bytes;
 use futures_util::stream;
 
 use super::error::ApiError;
-use crate::daemon::files::FolderError;
-use crate::daemon::shared::Daemon;
+use crate::files::FolderError;
+use crate::shared::Daemon;
 use bench_experiment::ErrorKind;
 
 /// Bytes that are read at a time: what a client that takes nothing costs.

@@ -5,8 +5,8 @@ use std::time::Duration;
 use proptest::prelude::*;
 
 use super::*;
-use crate::daemon::hold::HoldCause;
-use crate::daemon::run_entry::{Command, OnDisconnect};
+use crate::hold::HoldCause;
+use crate::run_entry::{Command, OnDisconnect};
 
 /// What may happen.
 #[derive(Clone, Debug)]

@@ -12,9 +12,9 @@ use super::error::ApiError;
 use super::extract::{Body, LeaseHeader};
 use super::reply::{Created, Reply};
 use super::views::Operator;
-use crate::daemon::lease::LEASE;
-use crate::daemon::secret::Secret;
-use crate::daemon::shared::Daemon;
+use crate::lease::LEASE;
+use crate::secret::Secret;
+use crate::shared::Daemon;
 use bench_experiment::{ErrorKind, operator_name};
 
 /// A lease that was given.

@@ -1,8 +1,8 @@
 //! Arguments of commands, as clients give them.
 
 use super::error::ApiError;
-use crate::daemon::shared::Daemon;
-use crate::daemon::worker::{check_args, check_links};
+use crate::shared::Daemon;
+use crate::worker::{check_args, check_links};
 
 /// Refuses arguments that name something outside the folder of the recordings, directly or through a link.
 pub async fn check_arguments(daemon: &Daemon, args: &[String]) -> Result<(), ApiError> {

@@ -7,7 +7,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::*;
-use crate::daemon::run_entry::{Command, OnDisconnect};
+use crate::run_entry::{Command, OnDisconnect};
 
 /// Sequences: some thousands in each test run, 100,000 with BENCH_HOLDS=100000.
 const SEQUENCES: u64 = 4_000;

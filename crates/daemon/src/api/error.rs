@@ -9,9 +9,9 @@ use axum::response::{IntoResponse, Response};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::daemon::files::FolderError;
-use crate::daemon::schedule::ScheduleError;
-use crate::daemon::worker::{ArgsError, ComputeError};
+use crate::files::FolderError;
+use crate::schedule::ScheduleError;
+use crate::worker::{ArgsError, ComputeError};
 use bench_experiment::{ErrorKind, ErrorObject};
 
 /// An error with its status.

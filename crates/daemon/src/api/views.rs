@@ -3,12 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::daemon::hold::Hold;
-use crate::daemon::lease::Lease;
-use crate::daemon::live::hub::{LoopView, Share, TripView};
-use crate::daemon::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcome};
-use crate::daemon::schedule::Now;
-use crate::daemon::shared::{Daemon, now};
+use crate::hold::Hold;
+use crate::lease::Lease;
+use crate::live::hub::{LoopView, Share, TripView};
+use crate::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcome};
+use crate::schedule::Now;
+use crate::shared::{Daemon, now};
 use bench_base::progress::Snapshot;
 use bench_rig::devices::is_simulated;
 
