@@ -1,5 +1,7 @@
 //! Small helpers that several crates use: quantities with units, numbers, atomic files, locks, checkpoints, progress.
 
+#![deny(unsafe_code)]
+
 pub mod atomic_file;
 pub mod checkpoint;
 pub mod decimal;

@@ -12,6 +12,8 @@
 //! The types define everything about a key: the schema (`bench config schema`), the range and the documentation are made from
 //! them. The default values are in `bench-config/stage.toml`.
 
+#![deny(unsafe_code)]
+
 mod calibration;
 mod campaign;
 mod command;

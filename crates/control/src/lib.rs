@@ -17,6 +17,8 @@
 //! Sign convention: u = C (r - y). Positive current moves the stage in the positive direction, so C has positive gain.
 //! Coefficients are immutable and separate from the state.
 
+#![deny(unsafe_code)]
+
 mod biquad;
 mod closed_loop;
 mod controller;

@@ -1,5 +1,7 @@
 //! The daemon: one process owns the bench and serves clients.
 
+#![deny(unsafe_code)]
+
 mod api;
 mod catalogue;
 pub mod client;

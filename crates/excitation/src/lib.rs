@@ -10,6 +10,8 @@
 //! and one line in `reference/mod.rs`. A program that uses this library can run its own [`Excitation`] or [`Reference`] without
 //! either.
 
+#![deny(unsafe_code)]
+
 mod amplitude;
 mod check;
 mod chirp;

@@ -8,6 +8,8 @@
 //! The supervisor cannot delay the loop: it watches counters and the state of the recorder, and sends requests to the loop through a
 //! ring. Signals reach the loop directly. The rig stays open for several runs.
 
+#![deny(unsafe_code)]
+
 mod amplitude_plan;
 mod analysis;
 mod analysis_error;

@@ -8,6 +8,8 @@
 //! Signals are streamed: the memory does not depend on the length of the recording. Rows (`csv`, `parquet`) are written while the
 //! recording is opened. Columns (`mat`, `uff58`) need the number of ticks first, so the ticks are read again, once for all columns.
 
+#![deny(unsafe_code)]
+
 mod csv;
 mod error;
 mod file;

@@ -25,6 +25,8 @@
 //!
 //! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
+#![deny(unsafe_code)]
+
 mod band;
 pub mod delay;
 mod error;

@@ -20,6 +20,8 @@
 //!
 //! Signs: positive current gives positive force, positive force gives positive displacement at low frequency.
 
+#![deny(unsafe_code)]
+
 mod beam;
 mod coordinate;
 mod damping;

@@ -31,6 +31,8 @@
 //! * Times in a recording are scheduled times since the loop began: two runs at virtual pace have the same bytes in all
 //!   three channels.
 
+#![deny(unsafe_code)]
+
 mod attachments;
 mod contents;
 mod continuity;

@@ -11,6 +11,8 @@
 //! run_pages (plots and page of one record) -> html, number
 //! ```
 
+#![deny(unsafe_code)]
+
 mod amplitudes;
 pub mod bode;
 mod campaign;

@@ -12,6 +12,8 @@
 //! run, [`device_defect`] whether the devices can be used, [`clock`] its two paces, [`program`] what it runs, [`record`] what it publishes, [`request`] what it is asked to do,
 //! [`supervision`] what ends a run without a request, [`tuning`] what changes a run in progress.
 
+#![deny(unsafe_code)]
+
 pub mod arming;
 pub mod clock;
 pub mod device_defect;

@@ -20,6 +20,8 @@
 //! # Ok::<(), bench_settings::ConfigError>(())
 //! ```
 
+#![deny(unsafe_code)]
+
 pub mod check;
 mod error;
 pub mod files;

@@ -12,6 +12,8 @@
 //! A file holds the counts alone: the settings of draw k are a function of the plan and of k. The answer therefore does
 //! not depend on threads, shards, interruptions, or the order in which blocks were completed.
 
+#![deny(unsafe_code)]
+
 mod answer;
 mod counter;
 mod effects;
