@@ -98,9 +98,10 @@ fn soak(options: &Options) -> Result<bool, Box<dyn Error>> {
     };
     let schedule = Schedule::new(options.seed, rate_hz, options.every, ticks);
     announce(&schedule, options);
-    let report = match options.realtime {
-        true => realtime::run(SoakLoop::new(&config, schedule, Pace::Realtime)?, &config)?,
-        false => simulated::run(SoakLoop::new(&config, schedule, Pace::Virtual)?)?,
+    let report = if options.realtime {
+        realtime::run(SoakLoop::new(&config, schedule, Pace::Realtime)?, &config)?
+    } else {
+        simulated::run(SoakLoop::new(&config, schedule, Pace::Virtual)?)?
     };
     Ok(report.print(options.realtime))
 }

@@ -71,18 +71,20 @@ pub(super) fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) ->
 
 /// The outcome of a run with its analysis.
 pub(super) fn outcome(run: &RunSummary, outputs: &AnalysisOutputs) -> Outcome {
-    match outputs.is_cancelled() {
-        true => Outcome::Failed,
-        false => exit(run),
+    if outputs.is_cancelled() {
+        Outcome::Failed
+    } else {
+        exit(run)
     }
 }
 
 /// A failed analysis of a run, with the state of its recording.
 pub(super) fn analysis_failed(error: &CliError, recording: &Path) -> CliError {
     let path = recording.display();
-    let state = match recording.exists() {
-        true => "is complete",
-        false => "was removed",
+    let state = if recording.exists() {
+        "is complete"
+    } else {
+        "was removed"
     };
     CliError::Failed(format!("{error}; the recording of the run {state}: {path}"))
 }

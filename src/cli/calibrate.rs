@@ -162,9 +162,10 @@ fn plan_text(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> Strin
         config.chosen_excitation().describe(),
         plan.chirp.travel_m * 1e6
     );
-    let chirp = match with_delay {
-        true => wrap(&chirp, 0),
-        false => String::new(),
+    let chirp = if with_delay {
+        wrap(&chirp, 0)
+    } else {
+        String::new()
     };
     wrap(&steps, 0) + &chirp
 }

@@ -83,9 +83,10 @@ pub(super) struct Args {
 
 impl Args {
     fn method(&self) -> Method {
-        match self.single_chirp {
-            true => Method::SingleChirp,
-            false => Method::UntilDecided,
+        if self.single_chirp {
+            Method::SingleChirp
+        } else {
+            Method::UntilDecided
         }
     }
 }
@@ -127,9 +128,12 @@ fn measure(
     config: &Config,
     tolerances: Tolerances,
 ) -> Result<(), CliError> {
-    let measured = stop_on_signal(|stop| match is_guided(args, config) {
-        true => measure_guided(campaign, config, tolerances, stop),
-        false => measure_simulated(campaign, args, stop),
+    let measured = stop_on_signal(|stop| {
+        if is_guided(args, config) {
+            measure_guided(campaign, config, tolerances, stop)
+        } else {
+            measure_simulated(campaign, args, stop)
+        }
     });
     measured.map_err(ExperimentError::from)?
 }
@@ -301,9 +305,10 @@ fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, C
 
 /// A ratio above 0 and below 1.
 fn below_one(ratio: f64, refusal: &str) -> Result<f64, CliError> {
-    match ratio > 0.0 && ratio < 1.0 {
-        true => Ok(ratio),
-        false => Err(CliError::Usage(refusal.into())),
+    if ratio > 0.0 && ratio < 1.0 {
+        Ok(ratio)
+    } else {
+        Err(CliError::Usage(refusal.into()))
     }
 }
 

@@ -196,9 +196,10 @@ impl<'a> Report<'a> {
         let Some(offset) = &self.offset else {
             return "no verdict is decided".into();
         };
-        let open = match offset.is_open() {
-            true => "; the interval is open at an end of the search: measure closer to the border",
-            false => "",
+        let open = if offset.is_open() {
+            "; the interval is open at an end of the search: measure closer to the border"
+        } else {
+            ""
         };
         format!(
             "{:+.2} % of initial asymmetry fits best, 95 % interval {:+.2} to {:+.2} %{open}; {} verdicts disagree with it",
@@ -224,9 +225,10 @@ impl<'a> Report<'a> {
     }
 
     fn distance_text(&self, tolerances: f64, [point, border]: [f64; 2], at_end: bool) -> String {
-        let end = match at_end {
-            true => "; it is at the end of the range, a larger one may be better",
-            false => "",
+        let end = if at_end {
+            "; it is at the end of the range, a larger one may be better"
+        } else {
+            ""
         };
         format!(
             "{tolerances:.1} tolerances from the nearest CNMP zeros, at {:.2} % of L and {:+.2} %{end}; \

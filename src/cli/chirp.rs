@@ -181,9 +181,10 @@ pub(super) fn outputs(
     config: &Config,
     magnitude_axis: MagnitudeAxis,
 ) -> Result<AnalysisOutputs, CliError> {
-    match run.is_completed() {
-        true => analysed(path, config, magnitude_axis),
-        false => Ok(AnalysisOutputs::run_incomplete()),
+    if run.is_completed() {
+        analysed(path, config, magnitude_axis)
+    } else {
+        Ok(AnalysisOutputs::run_incomplete())
     }
 }
 

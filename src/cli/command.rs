@@ -121,9 +121,10 @@ fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
 }
 
 fn failed(error: &CliError, json: bool) -> Outcome {
-    match json {
-        true => print_report(&ErrorReport::of(error)),
-        false => print_note(&error.to_string()),
+    if json {
+        print_report(&ErrorReport::of(error))
+    } else {
+        print_note(&error.to_string())
     }
     error.outcome()
 }
@@ -131,13 +132,15 @@ fn failed(error: &CliError, json: bool) -> Outcome {
 /// Help and version are requests, everything else is wrong usage.
 fn not_parsed(error: &clap::Error, json: bool) -> Outcome {
     let is_request = error.exit_code() == 0;
-    match json && !is_request {
-        true => print_report(&ErrorReport::of_usage(error)),
-        false => drop(error.print()),
+    if json && !is_request {
+        print_report(&ErrorReport::of_usage(error))
+    } else {
+        drop(error.print())
     }
-    match is_request {
-        true => Outcome::Done,
-        false => Outcome::Usage,
+    if is_request {
+        Outcome::Done
+    } else {
+        Outcome::Usage
     }
 }
 

@@ -54,9 +54,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.json, &report, |report| {
         text(&report.comparison, report.page.as_deref())
     })?;
-    Ok(match cautions.is_empty() {
-        true => Outcome::Done,
-        false => Outcome::Impaired,
+    Ok(if cautions.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::Impaired
     })
 }
 

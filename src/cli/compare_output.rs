@@ -60,9 +60,10 @@ fn agreement(label: &str, reference: Option<&str>, other: Option<&str>) -> Strin
     let (Some(reference), Some(other)) = (reference, other) else {
         return String::new();
     };
-    let line = match other == reference {
-        true => format!("{other} in both"),
-        false => format!("DIFFERENT: {other}, reference {reference}"),
+    let line = if other == reference {
+        format!("{other} in both")
+    } else {
+        format!("DIFFERENT: {other}, reference {reference}")
     };
     labelled(label, &line)
 }
@@ -91,12 +92,13 @@ fn modes_text(modes: &ModeDifferences) -> String {
     let compliance = modes.static_compliance_m_per_n.iter();
     let compliance = compliance.map(|found| difference_row("compliance um/N", found, 1e6));
     let rows: Vec<Vec<String>> = of_modes.chain(compliance).collect();
-    let table = match rows.is_empty() {
-        true => String::new(),
-        false => format!(
+    let table = if rows.is_empty() {
+        String::new()
+    } else {
+        format!(
             "\n{}",
             table(&["", "reference", "difference", "%", ""], &rows)
-        ),
+        )
     };
     table
         + &unpaired("only in the reference", &modes.only_in_reference_hz)
@@ -122,9 +124,10 @@ fn difference_row(name: &str, found: &Difference, factor: f64) -> Vec<String> {
 
 fn unpaired(text: &str, frequencies_hz: &[f64]) -> String {
     let shown: Vec<String> = frequencies_hz.iter().map(|hz| format!("{hz:.2}")).collect();
-    match shown.is_empty() {
-        true => String::new(),
-        false => wrap(&format!("{text}: modes at {} Hz", shown.join(", ")), 2),
+    if shown.is_empty() {
+        String::new()
+    } else {
+        wrap(&format!("{text}: modes at {} Hz", shown.join(", ")), 2)
     }
 }
 

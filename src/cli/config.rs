@@ -100,9 +100,10 @@ struct Profile {
 impl Profile {
     fn line(&self) -> String {
         let place = self.file.as_deref().unwrap_or("built in");
-        let hidden = match self.hidden {
-            true => " (hidden: give its path)",
-            false => "",
+        let hidden = if self.hidden {
+            " (hidden: give its path)"
+        } else {
+            ""
         };
         labelled(&self.name, &format!("{place}{hidden}"))
     }
@@ -121,9 +122,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 fn show(args: &ConfigArgs) -> Result<(), CliError> {
     let config = args.load(Purpose::Model)?;
-    match args.bench.json {
-        true => print_json(&config),
-        false => print_text(&to_toml(&config)?),
+    if args.bench.json {
+        print_json(&config)
+    } else {
+        print_text(&to_toml(&config)?)
     }
 }
 

@@ -108,9 +108,10 @@ fn print_plan(
 
 /// The margins and the response to the reference by the model.
 fn predicted(margins: Margins, plan: &Plan, closed_loop: &ClosedLoop) -> Predicted {
-    let step = match margins.stable {
-        true => predicted_step(plan, closed_loop).map(|step| step.metrics),
-        false => None,
+    let step = if margins.stable {
+        predicted_step(plan, closed_loop).map(|step| step.metrics)
+    } else {
+        None
     };
     Predicted {
         sine: PredictedSine::of(&plan.config, closed_loop, &margins),

@@ -81,9 +81,12 @@ pub(super) fn result(
     no_report: bool,
 ) -> Result<ControlResult, CliError> {
     let recording = path.to_path_buf();
-    let work = move || match no_report {
-        true => figures_only(&recording),
-        false => analysed(&recording),
+    let work = move || {
+        if no_report {
+            figures_only(&recording)
+        } else {
+            analysed(&recording)
+        }
     };
     let result = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let result = result.unwrap_or_else(|| Ok(ControlResult::default()));
@@ -194,9 +197,10 @@ fn conditions_text(conditions: &[Condition]) -> String {
 /// The conditions of a certificate as a table.
 pub(super) fn conditions_table(conditions: &[Condition]) -> String {
     let rows: Vec<Vec<String>> = conditions.iter().map(condition_row).collect();
-    match rows.is_empty() {
-        true => String::new(),
-        false => table(&["condition", "certificate", "today", "result"], &rows),
+    if rows.is_empty() {
+        String::new()
+    } else {
+        table(&["condition", "certificate", "today", "result"], &rows)
     }
 }
 
@@ -212,9 +216,10 @@ fn condition_row(condition: &Condition) -> Vec<String> {
 /// The rest between the check of the stage and the closing of the loop.
 fn rest_text(rest: &RestAfterCheck) -> String {
     let (left_um, permitted_um) = (rest.left_m * 1e6, rest.permitted_m * 1e6);
-    let limited = match rest.is_limited {
-        true => format!(", above the permitted {permitted_um:.2} um because the rest is limited"),
-        false => String::new(),
+    let limited = if rest.is_limited {
+        format!(", above the permitted {permitted_um:.2} um because the rest is limited")
+    } else {
+        String::new()
     };
     let text = format!(
         "{:.2} s with zero current after the check of the stage; at most {left_um:.2} um of its vibration are left{limited}",

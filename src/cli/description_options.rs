@@ -25,9 +25,10 @@ impl DescriptionOptions {
         Description {
             name: self.name.clone(),
             note: self.note.clone(),
-            operator: match is_started_by_daemon() {
-                true => self.operator.clone(),
-                false => self.operator.clone().or_else(user),
+            operator: if is_started_by_daemon() {
+                self.operator.clone()
+            } else {
+                self.operator.clone().or_else(user)
             },
             invocation: Some(Invocation::new(arguments(), profile)),
         }

@@ -29,9 +29,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.bench.json, &report, |report| {
         text(report, &same_options(args))
     })?;
-    Ok(match report.ready {
-        true => Outcome::Done,
-        false => Outcome::Failed,
+    Ok(if report.ready {
+        Outcome::Done
+    } else {
+        Outcome::Failed
     })
 }
 

@@ -144,11 +144,12 @@ fn require_measuring_rate(rate_hz: Option<f64>) -> Result<(), CliError> {
 }
 
 fn require_positive(option: &str, value: Option<f64>) -> Result<(), CliError> {
-    match value.is_none_or(|value| value > 0.0) {
-        true => Ok(()),
-        false => Err(CliError::Usage(format!(
+    if value.is_none_or(|value| value > 0.0) {
+        Ok(())
+    } else {
+        Err(CliError::Usage(format!(
             "{option} is not above 0; give a value above 0"
-        ))),
+        )))
     }
 }
 

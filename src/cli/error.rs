@@ -101,9 +101,10 @@ impl From<CampaignError> for CliError {
 impl CliError {
     /// The outcome of the command: wrong usage and refused settings are distinguished from failures at run time.
     pub fn outcome(&self) -> Outcome {
-        match self.is_failure() {
-            true => Outcome::Failed,
-            false => Outcome::Usage,
+        if self.is_failure() {
+            Outcome::Failed
+        } else {
+            Outcome::Usage
         }
     }
 

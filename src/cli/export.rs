@@ -69,9 +69,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let target = target(args);
     target.check()?;
     args.format.check()?;
-    let exported = match args.frf {
-        true => export_response(args, &target)?,
-        false => export_signals(args, &target)?,
+    let exported = if args.frf {
+        export_response(args, &target)?
+    } else {
+        export_signals(args, &target)?
     };
     let recording = &exported.recording;
     let defects = defects(recording, args.frf);
@@ -81,9 +82,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.json, &report, |report| {
         format!("file       {}\n", report.file)
     })?;
-    Ok(match defects.is_empty() {
-        true => Outcome::Done,
-        false => Outcome::Impaired,
+    Ok(if defects.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::Impaired
     })
 }
 
@@ -151,11 +153,10 @@ fn defects(recording: &Recording, is_response: bool) -> Vec<String> {
 }
 
 fn missing_text(overruns: u64, lost: u64, is_response: bool) -> String {
-    let consequence = match is_response {
-        true => {
-            "missing ticks are interpolated in the response; repeat the run if that is not acceptable"
-        }
-        false => "the file lacks these ticks; the column `tick` shows where",
+    let consequence = if is_response {
+        "missing ticks are interpolated in the response; repeat the run if that is not acceptable"
+    } else {
+        "the file lacks these ticks; the column `tick` shows where"
     };
     format!("{overruns} overruns and {lost} lost records: {consequence}")
 }

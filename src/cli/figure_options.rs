@@ -17,9 +17,10 @@ pub(super) struct ResponseFigureOptions {
 
 impl ResponseFigureOptions {
     pub fn magnitude_axis(self) -> MagnitudeAxis {
-        match self.db {
-            true => MagnitudeAxis::Decibels,
-            false => MagnitudeAxis::Logarithmic,
+        if self.db {
+            MagnitudeAxis::Decibels
+        } else {
+            MagnitudeAxis::Logarithmic
         }
     }
 }
@@ -61,12 +62,13 @@ impl PictureOptions {
             return Ok(());
         };
         let is_same = std::path::absolute(svg).ok() == std::path::absolute(html).ok();
-        match is_same {
-            true => Err(CliError::Usage(format!(
+        if is_same {
+            Err(CliError::Usage(format!(
                 "--svg and --html are both {}; give two different files",
                 svg.display()
-            ))),
-            false => Ok(()),
+            )))
+        } else {
+            Ok(())
         }
     }
 
@@ -76,9 +78,10 @@ impl PictureOptions {
             .files()
             .map(|path| path.display().to_string())
             .collect();
-        match files.is_empty() {
-            true => String::new(),
-            false => format!("picture in {}\n", files.join(" and ")),
+        if files.is_empty() {
+            String::new()
+        } else {
+            format!("picture in {}\n", files.join(" and "))
         }
     }
 

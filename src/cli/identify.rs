@@ -74,9 +74,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let made = analysed(&recording, signals, &plan.config, args)?;
     let report = Report::new(&recording, &args.recording, made);
     print_result(args.json, &report, |report| report.text(&plan.config))?;
-    Ok(match report.is_whole() {
-        true => Outcome::Done,
-        false => Outcome::Impaired,
+    Ok(if report.is_whole() {
+        Outcome::Done
+    } else {
+        Outcome::Impaired
     })
 }
 
@@ -135,9 +136,10 @@ fn analysed(
 
 /// Beside the recording, existing results are its own. In another folder they may be those of a file of the same name.
 fn existing_file(beside: &Path, recording: &Path) -> ExistingFile {
-    match beside.canonicalize().ok() == recording.canonicalize().ok() {
-        true => ExistingFile::Replace,
-        false => ExistingFile::Keep,
+    if beside.canonicalize().ok() == recording.canonicalize().ok() {
+        ExistingFile::Replace
+    } else {
+        ExistingFile::Keep
     }
 }
 

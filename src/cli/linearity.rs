@@ -68,11 +68,12 @@ impl Args {
     fn scales(&self) -> Result<Vec<f64>, CliError> {
         let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
-        match are_amplitudes(&scales) {
-            true => Ok(scales),
-            false => Err(CliError::Usage(format!(
+        if are_amplitudes(&scales) {
+            Ok(scales)
+        } else {
+            Err(CliError::Usage(format!(
                 "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios from 0.000001 to 1000000, for example 0.5,1,2"
-            ))),
+            )))
         }
     }
 

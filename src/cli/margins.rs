@@ -63,12 +63,13 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     warn(&check_calibration(&config, Stage::of(&config))?);
     let closed_loop = closed_loop(&config)?;
-    let (margins, poles) = match args.continuous {
-        true => (
+    let (margins, poles) = if args.continuous {
+        (
             closed_loop.continuous_margins()?,
             closed_loop.continuous_poles(),
-        ),
-        false => (closed_loop.margins(), closed_loop.poles()),
+        )
+    } else {
+        (closed_loop.margins(), closed_loop.poles())
     };
     args.picture
         .write(|| drawn(args, &config, &closed_loop, &margins))?;
@@ -82,9 +83,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let report = Report {
         margins: margins_json(&margins)?,
         poles: listed_poles(&poles, config.servo.rate_hz),
-        delay_s: match args.continuous {
-            true => 0.0,
-            false => closed_loop.plant().delay_s(),
+        delay_s: if args.continuous {
+            0.0
+        } else {
+            closed_loop.plant().delay_s()
         },
         measured,
     };
@@ -94,9 +96,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             + &measured.unwrap_or_default()
             + &args.picture.files_text()
     })?;
-    Ok(match is_stable {
-        true => Outcome::Done,
-        false => Outcome::Failed,
+    Ok(if is_stable {
+        Outcome::Done
+    } else {
+        Outcome::Failed
     })
 }
 
@@ -107,9 +110,10 @@ fn drawn(
     closed_loop: &ClosedLoop,
     margins: &Margins,
 ) -> Result<Picture, ReportError> {
-    let model = match args.continuous {
-        true => LoopModel::continuous(closed_loop, config, margins.clone()),
-        false => LoopModel::of(closed_loop, config),
+    let model = if args.continuous {
+        LoopModel::continuous(closed_loop, config, margins.clone())
+    } else {
+        LoopModel::of(closed_loop, config)
     };
     let time = time_text(config, margins);
     let title = format!("{}: {} controller", config.title, config.control.controller);
@@ -145,9 +149,10 @@ fn pole_row(pole: &Pole) -> Vec<String> {
 /// Rates and delays of the signal path as text.
 fn chain_text(config: &Config) -> String {
     let (servo, amplifier) = (&config.servo, &config.amplifier);
-    let latency = match amplifier.latency_s > 0.0 {
-        true => format!(" and {:.2} ms latency", amplifier.latency_s * 1e3),
-        false => String::new(),
+    let latency = if amplifier.latency_s > 0.0 {
+        format!(" and {:.2} ms latency", amplifier.latency_s * 1e3)
+    } else {
+        String::new()
     };
     format!(
         "sampling at {} Hz, zero-order hold, {} of computing delay, amplifier bandwidth {} Hz{latency}{}",
@@ -180,17 +185,19 @@ fn probe_text(probe: &ProbeSettings) -> String {
 pub(super) fn text(config: &Config, margins: &Margins, poles: &[Pole]) -> String {
     let time = time_text(config, margins);
     let title = format!("{} controller, {time}", config.control.controller);
-    let rest = match margins.stable {
-        true => margin_lines(margins),
-        false => unstable_text(poles),
+    let rest = if margins.stable {
+        margin_lines(margins)
+    } else {
+        unstable_text(poles)
     };
     wrap(&title, 0) + &rest
 }
 
 fn time_text(config: &Config, margins: &Margins) -> String {
-    match margins.continuous {
-        true => "continuous time, without delay and amplifier".to_string(),
-        false => chain_text(config),
+    if margins.continuous {
+        "continuous time, without delay and amplifier".to_string()
+    } else {
+        chain_text(config)
     }
 }
 

@@ -237,9 +237,10 @@ fn outside_text(outside: &OutsideBand) -> String {
 
 fn bound_text(bound: &RangeBound) -> String {
     let (least, most) = (bound.min_loop_gain, bound.max_loop_gain);
-    let loop_gain = match least > 1.0 {
-        true => format!("|L| is at least {least:.3e}"),
-        false => format!("|L| is at most {most:.3e}"),
+    let loop_gain = if least > 1.0 {
+        format!("|L| is at least {least:.3e}")
+    } else {
+        format!("|L| is at most {most:.3e}")
     };
     format!("{loop_gain}, |S| at most {:.4}", bound.max_sensitivity)
 }

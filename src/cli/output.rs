@@ -32,9 +32,10 @@ pub(super) fn print_result<T: Serialize>(
     result: &T,
     text: impl FnOnce(&T) -> String,
 ) -> Result<(), CliError> {
-    match json {
-        true => print_json(result),
-        false => print_text(&text(result)),
+    if json {
+        print_json(result)
+    } else {
+        print_text(&text(result))
     }
 }
 

@@ -57,9 +57,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         unchecked_messages: recovered.unchecked_messages,
     };
     print_result(args.json, &report, |report| text(report, &recovered))?;
-    Ok(match recovered.is_complete() {
-        true => Outcome::Done,
-        false => Outcome::Impaired,
+    Ok(if recovered.is_complete() {
+        Outcome::Done
+    } else {
+        Outcome::Impaired
     })
 }
 

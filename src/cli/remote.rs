@@ -41,11 +41,12 @@ pub(super) fn tcp_target(address: &str, token_file: Option<&str>) -> Result<Targ
 
 /// Other users of the machine see the arguments of a process, so that the address must not contain the token.
 fn require_plain_address(address: &str) -> Result<(), CliError> {
-    match address.contains(['#', '?', '@']) {
-        false => Ok(()),
-        true => Err(CliError::Usage(format!(
+    if !address.contains(['#', '?', '@']) {
+        Ok(())
+    } else {
+        Err(CliError::Usage(format!(
             "--connect: every user of this machine can read the arguments of a process, so that the token does not belong there; give http://HOST:PORT only, and the token with --token-file FILE or in the environment variable {TOKEN_VARIABLE}"
-        ))),
+        )))
     }
 }
 

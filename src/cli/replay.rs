@@ -46,9 +46,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         first: replayed.first,
     };
     print_result(args.json, &report, |report| text(report, recording.cut()))?;
-    Ok(match report.identical {
-        true => Outcome::Done,
-        false => Outcome::Failed,
+    Ok(if report.identical {
+        Outcome::Done
+    } else {
+        Outcome::Failed
     })
 }
 

@@ -55,9 +55,10 @@ pub(super) struct RunOptions {
 impl RunOptions {
     /// The stage of the run.
     pub fn stage(&self, config: &Config) -> Stage {
-        match self.simulate {
-            true => Stage::Simulated,
-            false => Stage::of(config),
+        if self.simulate {
+            Stage::Simulated
+        } else {
+            Stage::of(config)
         }
     }
 
@@ -97,9 +98,10 @@ impl RunOptions {
 
     /// The daemon that makes the run. A rehearsal of a run on devices is made in this process.
     fn owner(&self, config: &Config) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
-        match self.simulate {
-            true => Ok(None),
-            false => self.connect.owner(self.stage(config), &self.description),
+        if self.simulate {
+            Ok(None)
+        } else {
+            self.connect.owner(self.stage(config), &self.description)
         }
     }
 
@@ -113,9 +115,10 @@ impl RunOptions {
             let stated = motor_memory(config)?.state_cold(&Moment::now());
             stated.map_err(MotorError::from)?;
         }
-        Ok(match self.wait_for_motor {
-            true => MotorHandling::WaitUntilCool,
-            false => MotorHandling::Remembered,
+        Ok(if self.wait_for_motor {
+            MotorHandling::WaitUntilCool
+        } else {
+            MotorHandling::Remembered
         })
     }
 
@@ -260,13 +263,15 @@ fn realtime_text(timing: &TimingSummary) -> String {
     let us = |ns: u64| ns as f64 / 1e3;
     let (scheduling, lateness, compute) =
         (&timing.scheduling, &timing.lateness_ns, &timing.compute_ns);
-    let memory = match scheduling.memory_locked {
-        true => "locked",
-        false => "not locked",
+    let memory = if scheduling.memory_locked {
+        "locked"
+    } else {
+        "not locked"
     };
-    let idle = match scheduling.idle_states_off {
-        true => "off",
-        false => "on",
+    let idle = if scheduling.idle_states_off {
+        "off"
+    } else {
+        "on"
     };
     format!(
         "  schedule   {}, memory {memory}, idle states {idle}\n  lateness   p50 {:.1} us, p99 {:.1} us, max {:.1} us\n  compute    p50 {:.1} us, max {:.1} us\n",

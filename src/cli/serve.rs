@@ -99,9 +99,10 @@ fn absolute_if_file(name: String) -> String {
 
 /// What is printed at the start. The token is shown on a terminal only: a pipe or the journal may be read by others.
 fn started_text(started: &Started) -> String {
-    let page = match std::io::stdout().is_terminal() {
-        true => started.page_with_token(),
-        false => started.page.clone(),
+    let page = if std::io::stdout().is_terminal() {
+        started.page_with_token()
+    } else {
+        started.page.clone()
     };
     let page = page.map(|page| labelled("page", &page));
     let foxglove = started.foxglove.map(|address| format!("ws://{address}"));

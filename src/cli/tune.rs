@@ -113,14 +113,16 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let design = design(&task, &progress).inspect_err(|_| warn(&remarks))?;
     let evidence = evidence(&frfs, &design.cascade.sections(), &config)?;
     progress.begin("convex bound", 0);
-    let bound = match args.without_bound {
-        true => None,
-        false => bound_of(&task, design.attained),
+    let bound = if args.without_bound {
+        None
+    } else {
+        bound_of(&task, design.attained)
     };
     drop(line);
-    let opposite = match frfs.is_empty() {
-        true => opposite_asymmetry(args, &config, &task, &design)?,
-        false => None,
+    let opposite = if frfs.is_empty() {
+        opposite_asymmetry(args, &config, &task, &design)?
+    } else {
+        None
     };
     let disturbance = args.disturbance.as_ref();
     let extras = DesignExtras {
@@ -143,22 +145,24 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         args.modulus_margin,
     ));
     warn(&failures);
-    Ok(match failures.is_empty() {
-        true => Outcome::Done,
-        false => Outcome::Failed,
+    Ok(if failures.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::Failed
     })
 }
 
 impl Args {
     /// The configuration. With a campaign, --asymmetry chooses its points and is no setting.
     fn configuration(&self) -> Result<Config, CliError> {
-        let bench = match self.sources.is_measured() {
-            true => BenchOptions {
+        let bench = if self.sources.is_measured() {
+            BenchOptions {
                 asymmetry: None,
                 operating_point: None,
                 ..self.bench.clone()
-            },
-            false => self.bench.clone(),
+            }
+        } else {
+            self.bench.clone()
         };
         bench.load(Purpose::Model, &[])
     }
@@ -167,16 +171,15 @@ impl Args {
 /// The task for the measured plants, or for those of the model.
 fn task(args: &Args, frfs: &[IdentifiedFrf], config: &Config) -> Result<DesignTask, CliError> {
     let options = options(args)?;
-    Ok(match frfs.is_empty() {
-        true => {
-            let plants = model_plants(&model_options(args), config, &[])?;
-            let task = DesignTask::new(&RigModel::from(config), &plants, options)?;
-            match &args.disturbance {
-                Some(file) => with_recorded_disturbance(task, file)?,
-                None => task,
-            }
+    Ok(if frfs.is_empty() {
+        let plants = model_plants(&model_options(args), config, &[])?;
+        let task = DesignTask::new(&RigModel::from(config), &plants, options)?;
+        match &args.disturbance {
+            Some(file) => with_recorded_disturbance(task, file)?,
+            None => task,
         }
-        false => DesignTask::measured(&tune_measured::plants(frfs), options)?,
+    } else {
+        DesignTask::measured(&tune_measured::plants(frfs), options)?
     })
 }
 

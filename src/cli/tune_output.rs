@@ -17,9 +17,10 @@ pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path
     let files = format!(
         "files: {folder}/controller.toml, certificate.json, report.html, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
     );
-    let binding = match explain {
-        true => binding_text(&certificate.binding),
-        false => String::new(),
+    let binding = if explain {
+        binding_text(&certificate.binding)
+    } else {
+        String::new()
     };
     let extras = &certificate.extras;
     let bound = extras.bound.as_ref();
@@ -45,9 +46,10 @@ pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path
 fn opposite_text(opposite: &OppositeAsymmetry) -> String {
     let percent = 100.0 * opposite.mass_asymmetry;
     let states = opposite.plants.iter().map(|figures| {
-        let state = match figures.stable {
-            true => format!("modulus margin {:.3}", figures.modulus_margin),
-            false => "unstable".to_string(),
+        let state = if figures.stable {
+            format!("modulus margin {:.3}", figures.modulus_margin)
+        } else {
+            "unstable".to_string()
         };
         format!("{} {state}", figures.plant)
     });

@@ -39,9 +39,10 @@ fn number(text: &str) -> Result<f64, String> {
 fn within(text: &str, range: RangeInclusive<f64>, hint: &str) -> Result<f64, String> {
     let value = number(text)?;
     let (low, high) = (range.start(), range.end());
-    match range.contains(&value) {
-        true => Ok(value),
-        false => Err(format!("{value} is not between {low} and {high}; {hint}")),
+    if range.contains(&value) {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not between {low} and {high}; {hint}"))
     }
 }
 
@@ -68,9 +69,10 @@ pub(super) fn factor(text: &str) -> Result<f64, String> {
 /// A limit above 0. For clap.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let value = number(text)?;
-    match value > 0.0 {
-        true => Ok(value),
-        false => Err(format!("{value} is not positive; give a limit above 0")),
+    if value > 0.0 {
+        Ok(value)
+    } else {
+        Err(format!("{value} is not positive; give a limit above 0"))
     }
 }
 
@@ -82,11 +84,12 @@ pub(super) fn sensitivity_limit(text: &str) -> Result<SensitivityLimit, String> 
         .ok_or_else(|| format!("`{text}` has no @; {form}"))?;
     let frequency: AngularFrequency = frequency.parse().map_err(|e| format!("{e}; {form}"))?;
     let omega_rad_s = frequency.si();
-    match omega_rad_s > 0.0 {
-        true => Ok(SensitivityLimit {
+    if omega_rad_s > 0.0 {
+        Ok(SensitivityLimit {
             magnitude: positive(magnitude)?,
             omega_rad_s,
-        }),
-        false => Err(format!("`{text}`: the frequency is not positive; {form}")),
+        })
+    } else {
+        Err(format!("`{text}`: the frequency is not positive; {form}"))
     }
 }

@@ -51,11 +51,12 @@ impl SequentialOptions {
             return Ok(Some(default_max_motion_s(config)?));
         };
         let first_s = first_shot_config(config)?.chirp.duration_s;
-        match limit.si() >= first_s {
-            true => Ok(Some(limit.si())),
-            false => Err(CliError::Usage(format!(
+        if limit.si() >= first_s {
+            Ok(Some(limit.si()))
+        } else {
+            Err(CliError::Usage(format!(
                 "--max-duration is {limit}, but the first chirp takes {first_s:.2} s; give a longer time"
-            ))),
+            )))
         }
     }
 }
@@ -186,12 +187,13 @@ fn band_text(shot: &Shot) -> String {
 
 fn shot_text(number: usize, summary: &ShotSummary) -> String {
     let band = band_text(&summary.shot);
-    let losses = match summary.has_losses() {
-        true => format!(
+    let losses = if summary.has_losses() {
+        format!(
             ", {} overruns, {} lost records",
             summary.overruns, summary.lost_records
-        ),
-        false => String::new(),
+        )
+    } else {
+        String::new()
     };
     let verdict = summary.cnmp.name();
     wrap(&format!("chirp {number}: {band}: {verdict}{losses}"), 0)

@@ -42,12 +42,13 @@ fn accepted(loaded: LoadedCalibration, is_amplifier_known: bool) -> Vec<Finding>
     let warning = |what| Subject::Calibration.warning(what, "repeat `bench calibrate`");
     let mut findings: Vec<Finding> = loaded.warnings.into_iter().map(warning).collect();
     let (file, made) = (loaded.file, loaded.calibration.made);
-    findings.push(match is_amplifier_known {
-        true => Subject::Calibration.ok(format!("{file}, made {made}")),
-        false => Subject::Calibration.note(
+    findings.push(if is_amplifier_known {
+        Subject::Calibration.ok(format!("{file}, made {made}"))
+    } else {
+        Subject::Calibration.note(
             format!("{file}, made {made}: not checked whether it belongs to the amplifier"),
             "correct the failures of the amplifier, then repeat `bench doctor`",
-        ),
+        )
     });
     findings
 }

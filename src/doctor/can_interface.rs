@@ -92,9 +92,10 @@ pub fn findings(facts: &InterfaceFacts) -> Vec<Finding> {
 
 fn absent(facts: &InterfaceFacts) -> Finding {
     let name = &facts.name;
-    let others = match facts.others.is_empty() {
-        true => "this machine has no CAN interface".into(),
-        false => format!("the CAN interfaces are {}", facts.others.join(", ")),
+    let others = if facts.others.is_empty() {
+        "this machine has no CAN interface".into()
+    } else {
+        format!("the CAN interfaces are {}", facts.others.join(", "))
     };
     let what = match &facts.link {
         Link::Unreadable(why) => {

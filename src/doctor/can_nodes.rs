@@ -164,9 +164,10 @@ fn nodes(traffic: &BusTraffic, bit_rate: u32) -> Finding {
     let heartbeats = heartbeats.map(|(node, state)| format!("node {node} {}", state_name(*state)));
     let vescs = traffic.vescs.keys().map(|node| format!("VESC {node}"));
     let names: Vec<String> = heartbeats.chain(vescs).collect();
-    let names = match names.is_empty() {
-        true => "no heartbeat and no STATUS".into(),
-        false => names.join(", "),
+    let names = if names.is_empty() {
+        "no heartbeat and no STATUS".into()
+    } else {
+        names.join(", ")
     };
     let percent = 100.0 * traffic.figures(bit_rate).load;
     Subject::CanNodes.ok(format!(

@@ -52,9 +52,10 @@ pub use trial::{Lateness, Trial, trial};
 /// Examines everything that the runs of `config` need. `checks` are the results of the commands' own checks; `out` is the
 /// folder for recordings.
 pub fn examine(config: &Config, checks: &RunChecks, out: &Path) -> Report {
-    let pace = match devices::is_simulated(config) {
-        true => Pace::Virtual,
-        false => Pace::Realtime,
+    let pace = if devices::is_simulated(config) {
+        Pace::Virtual
+    } else {
+        Pace::Realtime
     };
     let mut report = Report::default();
     examine_configuration(config, checks, &mut report);

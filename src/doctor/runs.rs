@@ -125,9 +125,10 @@ fn accepted_loop(margins: &Margins, min_modulus_margin: f64) -> Finding {
             "choose another controller (--controller FILE), or set control.min_modulus_margin to refuse such loops",
         );
     }
-    let limit = match min_modulus_margin > 0.0 {
-        true => format!("at least {min_modulus_margin} is required"),
-        false => "none is required".into(),
+    let limit = if min_modulus_margin > 0.0 {
+        format!("at least {min_modulus_margin} is required")
+    } else {
+        "none is required".into()
     };
     let margin = margins.modulus_margin;
     Subject::Control.ok(format!("modulus margin {margin:.3} by the model; {limit}"))

@@ -180,12 +180,13 @@ fn permission_remedy(facts: &PortFacts, device: &Path) -> String {
     let group_may_open = facts.mode & 0o060 == 0o060 && group != "root";
     // The group of root would grant more than a port.
     let new_group = if group == "root" { "dialout" } else { group };
-    let by_group = match group_may_open && !facts.groups.contains(group) {
-        true => format!("`sudo usermod -aG {group} {user}` and log in again"),
-        false => format!(
+    let by_group = if group_may_open && !facts.groups.contains(group) {
+        format!("`sudo usermod -aG {group} {user}` and log in again")
+    } else {
+        format!(
             "`sudo chgrp {new_group} {0} && sudo chmod g+rw {0}`, and add {user} to the group {new_group} (`sudo usermod -aG {new_group} {user}`)",
             device.display()
-        ),
+        )
     };
     let Some(usb) = &facts.usb else {
         return by_group;

@@ -114,9 +114,10 @@ impl Lateness {
     }
 
     fn text(&self) -> String {
-        let memory = match self.memory_locked {
-            true => "memory locked",
-            false => "memory not locked",
+        let memory = if self.memory_locked {
+            "memory locked"
+        } else {
+            "memory not locked"
         };
         format!(
             "{}, {memory}: late by {:.1} us (p50), {:.1} us (p99), {:.1} us (max) in {} ticks at {} Hz, {} missed",

@@ -106,9 +106,10 @@ pub fn with_column(row: &str, index: usize, value: f64) -> String {
 pub fn date(offset_s: i64) -> Value {
     let now = SystemTime::now();
     let offset = Duration::from_secs(offset_s.unsigned_abs());
-    let time = match offset_s < 0 {
-        true => now - offset,
-        false => now + offset,
+    let time = if offset_s < 0 {
+        now - offset
+    } else {
+        now + offset
     };
     json!(humantime_text(time))
 }

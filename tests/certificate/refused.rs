@@ -281,9 +281,10 @@ fn conditions_are_listed_with_both_values() {
     for condition in &evidence.conditions {
         // Model and controller may change after the chirp.
         let is_free = matches!(condition.subject, Subject::Plant | Subject::Controller);
-        let expected = match is_free {
-            true => Agreement::NotCompared,
-            false => Agreement::Agrees,
+        let expected = if is_free {
+            Agreement::NotCompared
+        } else {
+            Agreement::Agrees
         };
         assert_eq!(condition.agreement, expected, "{condition:?}");
     }

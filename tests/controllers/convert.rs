@@ -96,9 +96,10 @@ fn tolerance(text: &str, point: &Point) -> f64 {
 /// A controller is accepted if its response is right to a millionth from a tenth of its slowest pole, which is faster than 30 rad/s.
 /// Below, an integrator that rounding has moved is one again, and the response differs by the rounding of the numbers.
 fn limit(tolerance: f64, omega_rad_s: f64) -> f64 {
-    match omega_rad_s < 3.0 {
-        true => tolerance,
-        false => tolerance.min(1e-6),
+    if omega_rad_s < 3.0 {
+        tolerance
+    } else {
+        tolerance.min(1e-6)
     }
 }
 

@@ -62,14 +62,16 @@ fn refused_fields(is_discrete: bool) -> Vec<(&'static str, Value, &'static str)>
     ];
     for name in delays {
         fields.push((name, json!([1e-3, 2e-3]), name));
-        match is_discrete {
-            true => fields.extend([(name, json!(1.5), "whole"), (name, json!(-2), "whole")]),
-            false => fields.push((name, json!(0.03), "pade")),
+        if is_discrete {
+            fields.extend([(name, json!(1.5), "whole"), (name, json!(-2), "whole")])
+        } else {
+            fields.push((name, json!(0.03), "pade"))
         }
     }
-    let variables: &[&'static str] = match is_discrete {
-        true => &["s", "p"],
-        false => &["z", "q", "z^-1", "q^-1"],
+    let variables: &[&'static str] = if is_discrete {
+        &["s", "p"]
+    } else {
+        &["z", "q", "z^-1", "q^-1"]
     };
     fields.extend(
         variables

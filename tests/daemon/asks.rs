@@ -126,9 +126,12 @@ fn ask() -> impl Strategy<Value = Ask> {
 
 pub fn steps() -> impl Strategy<Value = Vec<Step>> {
     let step = prop_oneof![8 => vec(ask(), 1), 2 => vec(ask(), 2..6), 1 => Just(Vec::new())];
-    (any::<bool>(), vec(step, 5..25)).prop_map(|(begins_with_run, steps)| match begins_with_run {
-        true => [run_under_lease(), steps].concat(),
-        false => steps,
+    (any::<bool>(), vec(step, 5..25)).prop_map(|(begins_with_run, steps)| {
+        if begins_with_run {
+            [run_under_lease(), steps].concat()
+        } else {
+            steps
+        }
     })
 }
 

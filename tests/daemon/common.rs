@@ -332,9 +332,10 @@ fn answer(bytes: &[u8]) -> Answer {
         .contains("transfer-encoding: chunked");
     Answer {
         status: status.expect("a status"),
-        body: match is_chunked {
-            true => dechunked(body),
-            false => body.to_vec(),
+        body: if is_chunked {
+            dechunked(body)
+        } else {
+            body.to_vec()
         },
     }
 }

@@ -129,9 +129,10 @@ impl Bench {
         if terminal.try_wait().expect("a process").is_some() {
             return;
         }
-        match is_killed {
-            true => signal(terminal, Signal::SIGKILL),
-            false => freeze(terminal),
+        if is_killed {
+            signal(terminal, Signal::SIGKILL)
+        } else {
+            freeze(terminal)
         }
     }
 

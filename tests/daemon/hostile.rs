@@ -83,9 +83,10 @@ fn stop_acts_although_its_body_is_incomplete() {
             state["run"]["phase"] == "running"
         });
         let (mut by_tcp, mut by_unix) = (tcp(&daemon), unix(&daemon));
-        let sent = match is_tcp {
-            true => by_tcp.write_all(head.as_bytes()),
-            false => by_unix.write_all(head.as_bytes()),
+        let sent = if is_tcp {
+            by_tcp.write_all(head.as_bytes())
+        } else {
+            by_unix.write_all(head.as_bytes())
         };
         sent.expect("a connection");
         // The loop lasts 60 s by itself.

@@ -8,13 +8,13 @@ use crate::daemon::common::{Daemon, bench_in};
 fn comparable(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(text).into_owned();
     let words = text.split_inclusive(['/', ' ', '\n', '"', '_']);
-    let words =
-        words.map(
-            |word| match word.len() >= 20 && word.starts_with("20") && word.contains('T') {
-                true => "TIME",
-                false => word,
-            },
-        );
+    let words = words.map(|word| {
+        if word.len() >= 20 && word.starts_with("20") && word.contains('T') {
+            "TIME"
+        } else {
+            word
+        }
+    });
     words.collect()
 }
 

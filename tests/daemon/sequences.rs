@@ -255,9 +255,10 @@ fn random_sequences_never_move_without_token_and_lease() {
     let outcome = runner.run(&steps(), |steps| {
         let mut rights = rights.borrow_mut();
         for step in &steps {
-            match step.is_empty() {
-                true => wait_for_run(&daemon),
-                false => take(step, &mut rights, &daemon)?,
+            if step.is_empty() {
+                wait_for_run(&daemon)
+            } else {
+                take(step, &mut rights, &daemon)?
             }
             let state = check(&rights, &daemon)?;
             runs_seen.set(runs_seen.get() + u32::from(state["loop"]["state"] == "running"));

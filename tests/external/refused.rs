@@ -50,12 +50,16 @@ fn rejects_a_decimal_comma_with_the_remedy() {
 fn rejects_decimal_commas_between_commas_with_the_remedy() {
     let header_line = |line: &str| line.starts_with("time");
     let lines = valid();
-    let lines = lines.lines().map(|line| match header_line(line) {
-        true => format!("{line}\n"),
-        false => {
-            let cells = line.split(',').map(|cell| match cell.contains('.') {
-                true => cell.replace('.', ","),
-                false => format!("{cell},0"),
+    let lines = lines.lines().map(|line| {
+        if header_line(line) {
+            format!("{line}\n")
+        } else {
+            let cells = line.split(',').map(|cell| {
+                if cell.contains('.') {
+                    cell.replace('.', ",")
+                } else {
+                    format!("{cell},0")
+                }
             });
             cells.collect::<Vec<_>>().join(",") + "\n"
         }

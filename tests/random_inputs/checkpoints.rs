@@ -73,9 +73,10 @@ fn damaged_point_of_a_campaign_is_the_measured_one_or_rejected() {
         std::fs::write(&path, bytes).expect("a file");
         let opened = open().expect("campaign.json is intact");
         let expected: &[(GridPoint, PointResult)] = &[(point, result(0))];
-        match opened.done.is_empty() {
-            true => assert_eq!(opened.rejected.len(), 1),
-            false => assert!(opened.done == expected, "{:?}", opened.done),
+        if opened.done.is_empty() {
+            assert_eq!(opened.rejected.len(), 1)
+        } else {
+            assert!(opened.done == expected, "{:?}", opened.done)
         }
         !opened.done.is_empty()
     });

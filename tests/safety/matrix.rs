@@ -188,9 +188,10 @@ struct Cell<'a> {
 
 impl Cell<'_> {
     fn missed(&self) -> u32 {
-        match self.failures.contains(&Failure::MissedTicks) {
-            true => MISSED,
-            false => 0,
+        if self.failures.contains(&Failure::MissedTicks) {
+            MISSED
+        } else {
+            0
         }
     }
 
@@ -255,14 +256,15 @@ impl Cell<'_> {
         let bench = Bench::still(&stage(), &self.faults())
             .with_ramps(20)
             .with_healthy_ticks(healthy_ticks);
-        match self.is_calibrated {
-            false => bench,
-            true => bench.with_correction(Correction {
+        if !self.is_calibrated {
+            bench
+        } else {
+            bench.with_correction(Correction {
                 current_gain: 1.2,
                 current_offset_a: 0.02,
                 probe_gain: 0.85,
                 probe_offset_m: 2e-6,
-            }),
+            })
         }
     }
 

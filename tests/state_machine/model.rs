@@ -262,9 +262,10 @@ impl Model {
     }
 
     fn lease(&mut self, inputs: &TickInputs) {
-        self.lease_age = match inputs.renewed {
-            true => 0,
-            false => self.lease_age + 1 + u64::from(inputs.missed),
+        self.lease_age = if inputs.renewed {
+            0
+        } else {
+            self.lease_age + 1 + u64::from(inputs.missed)
         };
         if self.lease_age >= self.settings.lease_ticks {
             self.count_end(Cause::Lease, Model::finish);
@@ -326,9 +327,10 @@ impl Model {
         let length = self.settings.ramp_ticks;
         self.settled += 1;
         if self.settled <= length {
-            return match load.holds {
-                true => load.current_a,
-                false => load.current_a * ramp(self.settled, length),
+            return if load.holds {
+                load.current_a
+            } else {
+                load.current_a * ramp(self.settled, length)
             };
         }
         if self.settled == length + 1 {
@@ -336,9 +338,10 @@ impl Model {
         }
         let tick = self.settled - length;
         self.settling_ends = tick >= length || self.left_a == 0.0;
-        match self.settling_ends {
-            true => 0.0,
-            false => self.left_a * ramp(tick, length),
+        if self.settling_ends {
+            0.0
+        } else {
+            self.left_a * ramp(tick, length)
         }
     }
 
@@ -416,8 +419,9 @@ impl Missed {
 /// The cycloid from 1 to 0.
 fn ramp(tick: u64, ticks: u64) -> f64 {
     let x = tick as f64 / ticks as f64;
-    match tick >= ticks {
-        true => 0.0,
-        false => 1.0 - x + (TAU * x).sin() / TAU,
+    if tick >= ticks {
+        0.0
+    } else {
+        1.0 - x + (TAU * x).sin() / TAU
     }
 }

@@ -76,9 +76,10 @@ impl CurrentAmplifier for TestRig {
         if faults.has(Fault::PendingEnable) {
             return Poll::Pending;
         }
-        Poll::Ready(match faults.has(Fault::FailedEnable) {
-            true => Err(refusal()),
-            false => Ok(()),
+        Poll::Ready(if faults.has(Fault::FailedEnable) {
+            Err(refusal())
+        } else {
+            Ok(())
         })
     }
 
@@ -103,9 +104,10 @@ impl CurrentAmplifier for TestRig {
     fn begin_reset(&mut self) -> Result<(), DeviceError> {
         let mut shared = self.shared();
         shared.begun.resets += 1;
-        match shared.faults.has(Fault::RefusedReset) {
-            true => Err(refusal()),
-            false => Ok(()),
+        if shared.faults.has(Fault::RefusedReset) {
+            Err(refusal())
+        } else {
+            Ok(())
         }
     }
 
@@ -114,9 +116,10 @@ impl CurrentAmplifier for TestRig {
         if faults.has(Fault::PendingReset) {
             return Poll::Pending;
         }
-        Poll::Ready(match faults.has(Fault::FailedReset) {
-            true => Err(refusal()),
-            false => Ok(()),
+        Poll::Ready(if faults.has(Fault::FailedReset) {
+            Err(refusal())
+        } else {
+            Ok(())
         })
     }
 
@@ -125,9 +128,10 @@ impl CurrentAmplifier for TestRig {
         if shared.faults.has(Fault::FailedDrive) {
             return AmplifierStatus::Fault(9);
         }
-        match shared.is_enabled && !shared.faults.has(Fault::ReportsDisabled) {
-            true => AmplifierStatus::Enabled,
-            false => AmplifierStatus::Disabled,
+        if shared.is_enabled && !shared.faults.has(Fault::ReportsDisabled) {
+            AmplifierStatus::Enabled
+        } else {
+            AmplifierStatus::Disabled
         }
     }
 }
@@ -149,9 +153,10 @@ impl DisplacementProbe for TestRig {
             },
             sequence: self.sequence,
             age_ns: 0,
-            validity: match faults.has(Fault::InvalidReading) {
-                true => Validity::Faulty,
-                false => Validity::Valid,
+            validity: if faults.has(Fault::InvalidReading) {
+                Validity::Faulty
+            } else {
+                Validity::Valid
             },
         }
     }

@@ -19,10 +19,11 @@ impl Display for Decimal {
         let rounds_to_zero = f
             .precision()
             .is_some_and(|decimals| format!("{:.decimals$}", self.0).parse::<f64>() == Ok(0.0));
-        match rounds_to_zero {
-            true => Display::fmt(&0.0, f),
+        if rounds_to_zero {
+            Display::fmt(&0.0, f)
+        } else {
             // The sum of the two zeros is the positive one.
-            false => Display::fmt(&(self.0 + 0.0), f),
+            Display::fmt(&(self.0 + 0.0), f)
         }
     }
 }

@@ -36,9 +36,10 @@ fn regular(options: &mut OpenOptions, path: &Path) -> std::io::Result<File> {
     // Without this flag a FIFO without a writer would block here.
     let file = options.custom_flags(libc::O_NONBLOCK).open(path)?;
     let kind = file.metadata()?.file_type();
-    match kind.is_file() {
-        true => Ok(file),
-        false => Err(refused(format!("it is {}, not a regular file", name(kind)))),
+    if kind.is_file() {
+        Ok(file)
+    } else {
+        Err(refused(format!("it is {}, not a regular file", name(kind))))
     }
 }
 
@@ -58,11 +59,12 @@ pub fn read_open(file: &File, max_bytes: u64) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     // One byte more shows that the file is too large, even if it grows meanwhile.
     file.take(max_bytes + 1).read_to_end(&mut bytes)?;
-    match bytes.len() as u64 > max_bytes {
-        true => Err(refused(format!(
+    if bytes.len() as u64 > max_bytes {
+        Err(refused(format!(
             "it is larger than the limit of {max_bytes} bytes for such a file"
-        ))),
-        false => Ok(bytes),
+        )))
+    } else {
+        Ok(bytes)
     }
 }
 

@@ -19,9 +19,12 @@ pub fn to_four_decimals(value: f64) -> f64 {
 /// `count` evenly spaced values, two or more, both ends among them exactly.
 pub fn linspace(from: f64, to: f64, count: usize) -> impl Iterator<Item = f64> {
     let last = count - 1;
-    (0..count).map(move |k| match k == last {
-        true => to,
-        false => from + (to - from) * k as f64 / last as f64,
+    (0..count).map(move |k| {
+        if k == last {
+            to
+        } else {
+            from + (to - from) * k as f64 / last as f64
+        }
     })
 }
 

@@ -89,9 +89,10 @@ impl InterlockSettings {
             .model_error_ratio
             .filter(|_| self.model_error_off.is_none())?;
         let share = self.share_of_model_error();
-        let at_rest_ratio = match share < 1.0 {
-            true => ratio / (1.0 - share),
-            false => f64::INFINITY,
+        let at_rest_ratio = if share < 1.0 {
+            ratio / (1.0 - share)
+        } else {
+            f64::INFINITY
         };
         let allowed_ratio = ratio + CLOSED_SHARE_FACTOR * share * MAX_DETECTED_RATIO;
         Some(Detection {

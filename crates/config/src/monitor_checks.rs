@@ -34,12 +34,13 @@ fn ineffective(interlock: &InterlockSettings, detection: &Detection) -> Finding 
     let ratio = interlock.model_error_ratio.unwrap_or_default();
     let share = interlock.share_of_model_error();
     let limit = 100.0 * MAX_DETECTED_RATIO;
-    let at_rest = match detection.at_rest_ratio.is_finite() {
-        true => format!(
+    let at_rest = if detection.at_rest_ratio.is_finite() {
+        format!(
             "at a modelled motion of {:.1} %",
             100.0 * detection.at_rest_ratio
-        ),
-        false => "never".into(),
+        )
+    } else {
+        "never".into()
     };
     let what = format!(
         "makes the comparison with the model ineffective: with model_error_ratio = {ratio} and model_error_share = {share}, a detached probe trips {at_rest}, and an oscillation in a closed loop at {:.1} % of interlock.soft_limit_m; the limit is {limit} % for both; lower the two settings (0.02 and 0.5 in the profiles), or switch the comparison off with a reason, interlock.model_error_off = \"REASON\"",
@@ -50,9 +51,10 @@ fn ineffective(interlock: &InterlockSettings, detection: &Detection) -> Finding 
 
 /// The setting that alone makes the monitor ineffective, or the ratio.
 fn responsible(share: f64) -> &'static str {
-    match share > 1.0 - MAX_DETECTED_RATIO {
-        true => "interlock.model_error_share",
-        false => "interlock.model_error_ratio",
+    if share > 1.0 - MAX_DETECTED_RATIO {
+        "interlock.model_error_share"
+    } else {
+        "interlock.model_error_ratio"
     }
 }
 

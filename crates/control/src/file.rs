@@ -194,12 +194,13 @@ impl ControllerText {
             numbered.map(|(number, settings)| self.checked_section(number, settings, rate_hz));
         let sections: Vec<Section> = checked.collect::<Result<_, _>>()?;
         let count = sections.iter().map(Section::integrators).sum();
-        match count > MAX_INTEGRATORS {
-            true => Err(ControllerError::Integrators {
+        if count > MAX_INTEGRATORS {
+            Err(ControllerError::Integrators {
                 name: self.name.clone(),
                 count,
-            }),
-            false => Ok(sections),
+            })
+        } else {
+            Ok(sections)
         }
     }
 

@@ -64,13 +64,14 @@ fn half_length(bandwidth_hz: f64, period_s: f64) -> Result<usize, CommandFilterE
         half.saturating_mul(2).saturating_add(1),
         CommandFilter::MAX_TAPS,
     );
-    match taps > max {
-        true => Err(CommandFilterError::Long {
+    if taps > max {
+        Err(CommandFilterError::Long {
             taps,
             ticks: i64::try_from(taps).unwrap_or(i64::MAX),
             max,
-        }),
-        false => Ok(half.max(1)),
+        })
+    } else {
+        Ok(half.max(1))
     }
 }
 
@@ -154,12 +155,11 @@ fn cut_off(weights: &[f64]) -> Taps {
     let kept = Taps::dense(first, weights[early..weights.len() - late].iter().copied());
     let gain: f64 = weights.iter().sum();
     // A free body needs no steady current, and its taps keep their sum near 0.
-    match gain.abs() > CUT_OFF * total {
-        true => {
-            let ratio = gain / kept.sum();
-            kept.scaled(ratio)
-        }
-        false => kept,
+    if gain.abs() > CUT_OFF * total {
+        let ratio = gain / kept.sum();
+        kept.scaled(ratio)
+    } else {
+        kept
     }
 }
 

@@ -102,9 +102,10 @@ fn refined_peak(magnitude: &dyn Fn(f64) -> f64, grid_rad_s: &[f64], on_grid: &[f
 }
 
 fn larger(highest: Peak, peak: Peak) -> Peak {
-    match peak.value > highest.value {
-        true => peak,
-        false => highest,
+    if peak.value > highest.value {
+        peak
+    } else {
+        highest
     }
 }
 
@@ -114,9 +115,10 @@ const NO_PEAK: Peak = Peak {
 };
 
 fn higher(highest: Peak, (&rad_s, &value): (&f64, &f64)) -> Peak {
-    match value > highest.value {
-        true => Peak { rad_s, value },
-        false => highest,
+    if value > highest.value {
+        Peak { rad_s, value }
+    } else {
+        highest
     }
 }
 

@@ -143,9 +143,10 @@ impl Admission {
     }
 
     fn admit(&mut self, router: &Router, address: Option<IpAddr>) -> Admitted {
-        let place = match self.spare.refill() {
-            true => self.places.take(address),
-            false => None,
+        let place = if self.spare.refill() {
+            self.places.take(address)
+        } else {
+            None
         };
         if let Some(place) = place {
             return Admitted::Any(router.clone(), place);

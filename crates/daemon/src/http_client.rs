@@ -34,9 +34,10 @@ impl Target {
             .rsplit_once(':')
             .is_some_and(|(_, port)| port.parse::<u16>().is_ok());
         Target::Tcp {
-            address: match has_port {
-                true => address.into(),
-                false => format!("{address}:80"),
+            address: if has_port {
+                address.into()
+            } else {
+                format!("{address}:80")
             },
             token,
         }
@@ -110,9 +111,10 @@ pub async fn json(target: &Target, ask: &Ask<'_>) -> Result<(u16, Value), HttpEr
     let response = send(target, ask).await?;
     let status = response.status().as_u16();
     let body = response.into_body().collect().await?.to_bytes();
-    match body.is_empty() {
-        true => Ok((status, Value::Null)),
-        false => Ok((status, serde_json::from_slice(&body)?)),
+    if body.is_empty() {
+        Ok((status, Value::Null))
+    } else {
+        Ok((status, serde_json::from_slice(&body)?))
     }
 }
 
@@ -124,9 +126,10 @@ pub async fn download(target: &Target, path: &str) -> Result<Bytes, HttpError> {
     let response = send(target, &Ask::get(path)).await?;
     let status = response.status();
     let body = response.into_body().collect().await?.to_bytes();
-    match status.is_success() {
-        true => Ok(body),
-        false => Err(std::io::Error::other(format!("status {status}")).into()),
+    if status.is_success() {
+        Ok(body)
+    } else {
+        Err(std::io::Error::other(format!("status {status}")).into())
     }
 }
 

@@ -36,9 +36,10 @@ impl Exposition {
     }
 
     fn value(&mut self, name: &str, labels: &str, value: impl Display) {
-        let _ = match labels.is_empty() {
-            true => writeln!(self.0, "{name} {value}"),
-            false => writeln!(self.0, "{name}{{{labels}}} {value}"),
+        let _ = if labels.is_empty() {
+            writeln!(self.0, "{name} {value}")
+        } else {
+            writeln!(self.0, "{name}{{{labels}}} {value}")
         };
     }
 

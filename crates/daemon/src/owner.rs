@@ -291,9 +291,10 @@ impl OwnerThread {
             pace: order.pace,
             simulate: false,
             clear_fault: order.clear_fault,
-            motor: match self.is_simulated() {
-                true => MotorHandling::Simulated,
-                false => order.motor,
+            motor: if self.is_simulated() {
+                MotorHandling::Simulated
+            } else {
+                order.motor
             },
             now: Moment::now,
             folder: order.folder.clone(),

@@ -38,9 +38,10 @@ impl RunRecord {
     /// When another daemon uses the folder, and those of the file system.
     pub fn begin(folder: &Path, holder: &Holder) -> Result<RunRecord, LockError> {
         let mut lock = LockFile::take(&folder.join(FILE), holder)?;
-        let last = match lock.was_left() {
-            true => LastEnd::Crashed,
-            false => LastEnd::Clean,
+        let last = if lock.was_left() {
+            LastEnd::Crashed
+        } else {
+            LastEnd::Clean
         };
         lock.keep(last == LastEnd::Crashed);
         Ok(RunRecord { lock, last })

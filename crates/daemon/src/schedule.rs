@@ -438,9 +438,10 @@ impl Schedule {
     }
 
     fn require_service(&self) -> Result<(), ScheduleError> {
-        match self.is_shutting_down {
-            true => Err(ScheduleError::ShuttingDown),
-            false => Ok(()),
+        if self.is_shutting_down {
+            Err(ScheduleError::ShuttingDown)
+        } else {
+            Ok(())
         }
     }
 }

@@ -207,10 +207,7 @@ impl Session {
                 message = self.connection.receive() => message,
                 changed = changes.changed() => {
                     let ends = self.daemon.read(Schedule::is_shutting_down);
-                    match changed.is_err() || ends {
-                        true => return,
-                        false => continue,
-                    }
+                    if changed.is_err() || ends { return } else { continue }
                 }
             };
             let Some(message) = message else { return };

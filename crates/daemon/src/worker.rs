@@ -286,9 +286,10 @@ pub async fn page(
     let mut process = process(daemon, &["report"], files)?;
     process.args(["--out", "-"]);
     let output = printed(daemon, purpose, process).await?;
-    match output.status.success() {
-        true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
-        false => Err(ComputeError::of(&output)),
+    if output.status.success() {
+        Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+    } else {
+        Err(ComputeError::of(&output))
     }
 }
 

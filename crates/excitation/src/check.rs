@@ -141,38 +141,41 @@ impl Limits {
         frequency_hz: Option<f64>,
         setting: &'static str,
     ) -> Result<(), ExcitationError> {
-        match is_within(travel_m, self.travel_m) {
-            true => Ok(()),
-            false => Err(ExcitationError::Travel {
+        if is_within(travel_m, self.travel_m) {
+            Ok(())
+        } else {
+            Err(ExcitationError::Travel {
                 travel_um: travel_m * 1e6,
                 frequency_hz,
                 limit_um: self.travel_m * 1e6,
                 setting,
-            }),
+            })
         }
     }
 
     fn check_slew(&self, slew_a_per_s: f64, setting: &'static str) -> Result<(), ExcitationError> {
         let limit_a_per_s = self.slew_a_per_s;
-        match is_within(slew_a_per_s, limit_a_per_s) {
-            true => Ok(()),
-            false => Err(ExcitationError::Slew {
+        if is_within(slew_a_per_s, limit_a_per_s) {
+            Ok(())
+        } else {
+            Err(ExcitationError::Slew {
                 slew_a_per_s,
                 limit_a_per_s,
                 setting,
-            }),
+            })
         }
     }
 
     fn check_heat(&self, thermal_a: f64, setting: &'static str) -> Result<(), ExcitationError> {
         let limit_a = self.continuous_current_a;
-        match is_within(thermal_a, limit_a) {
-            true => Ok(()),
-            false => Err(ExcitationError::Heat {
+        if is_within(thermal_a, limit_a) {
+            Ok(())
+        } else {
+            Err(ExcitationError::Heat {
                 thermal_a,
                 limit_a,
                 setting,
-            }),
+            })
         }
     }
 

@@ -81,9 +81,10 @@ pub enum AmplitudePlanError {
 /// # Errors
 /// If the model cannot be analysed.
 pub fn default_amplitude(config: Config) -> Result<Config, AmplitudePlanError> {
-    match config.chosen_excitation().design.is_shaped_by_default() {
-        true => shape_amplitude(config, &ResponseSource::Model),
-        false => Ok(config),
+    if config.chosen_excitation().design.is_shaped_by_default() {
+        shape_amplitude(config, &ResponseSource::Model)
+    } else {
+        Ok(config)
     }
 }
 

@@ -187,9 +187,10 @@ pub(super) fn estimated(
     let loop_signals = signals.loop_signals;
     report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
-    match is_closed_loop(recording.metadata()) {
-        true => closed_loop::estimate_loop(&loop_signals, band_hz, recording, config),
-        false => open_loop(loop_signals.signals, band_hz, config),
+    if is_closed_loop(recording.metadata()) {
+        closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)
+    } else {
+        open_loop(loop_signals.signals, band_hz, config)
     }
 }
 

@@ -52,9 +52,10 @@ fn with_margins(
 fn require_swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
     let reference = reference.design();
     let kind = reference.name();
-    match reference.can_identify() {
-        true => Ok(()),
-        false => Err(ClosedLoopError::Reference { kind }),
+    if reference.can_identify() {
+        Ok(())
+    } else {
+        Err(ClosedLoopError::Reference { kind })
     }
 }
 

@@ -178,9 +178,10 @@ fn lowest_rad_s(closed_loop: &ClosedLoop, margins: &Margins) -> f64 {
     let lowest = modes
         .chain(margins.crossover_rad_s)
         .fold(f64::INFINITY, f64::min);
-    match lowest.is_finite() {
-        true => LOWEST_RATIO * lowest,
-        false => 1.0,
+    if lowest.is_finite() {
+        LOWEST_RATIO * lowest
+    } else {
+        1.0
     }
 }
 

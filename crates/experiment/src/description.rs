@@ -65,9 +65,10 @@ impl Invocation {
 /// A word in single quotes, unless a shell reads it unchanged without them.
 fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_alphanumeric() || "_-./:=,%+@".contains(c);
-    match !word.is_empty() && word.chars().all(is_plain) {
-        true => word.into(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
+    if !word.is_empty() && word.chars().all(is_plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
     }
 }
 
@@ -115,17 +116,19 @@ pub fn operator_name(text: &str) -> Result<String, DescriptionError> {
 /// When the text is empty, too long, or contains another control character.
 pub fn run_note(text: &str) -> Result<String, DescriptionError> {
     let text = of_length(text, MAX_NOTE)?;
-    match text.chars().any(|c| c.is_control() && c != '\n') {
-        true => Err(DescriptionError::ControlInLines),
-        false => Ok(text.into()),
+    if text.chars().any(|c| c.is_control() && c != '\n') {
+        Err(DescriptionError::ControlInLines)
+    } else {
+        Ok(text.into())
     }
 }
 
 fn one_line(text: &str, limit: usize) -> Result<String, DescriptionError> {
     let text = of_length(text, limit)?;
-    match text.chars().any(char::is_control) {
-        true => Err(DescriptionError::Control),
-        false => Ok(text.into()),
+    if text.chars().any(char::is_control) {
+        Err(DescriptionError::Control)
+    } else {
+        Ok(text.into())
     }
 }
 

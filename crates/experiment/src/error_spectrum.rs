@@ -145,9 +145,10 @@ impl Welch {
 
     /// Frequencies in hertz and weights, whose sum is 1, of the mean over a band as Welch's method measures it.
     fn quadrature(&self, band: &Range<usize>) -> Vec<(f64, f64)> {
-        match band.len() > WIDE_BAND {
-            true => self.evenly(band),
-            false => self.windowed(band),
+        if band.len() > WIDE_BAND {
+            self.evenly(band)
+        } else {
+            self.windowed(band)
         }
     }
 
@@ -278,9 +279,10 @@ mod tests {
                 _ => (std::f64::consts::PI * x).sin() / (std::f64::consts::PI * x),
             };
             // At one bin both sine and denominator are zero; the limit of the ratio is 1/2.
-            let expected = match x == 1.0 {
-                true => 0.25,
-                false => (sinc / (1.0 - x * x)).powi(2),
+            let expected = if x == 1.0 {
+                0.25
+            } else {
+                (sinc / (1.0 - x * x)).powi(2)
             };
             assert!(
                 (value - expected).abs() < 1e-4,

@@ -41,9 +41,10 @@ impl ExcitationPlan {
     /// The plan of the configured excitation with its extremes.
     pub fn new(config: &Config, expected: Extremes) -> ExcitationPlan {
         let chosen = config.chosen_excitation();
-        let amplitude = match chosen.design.has_amplitude_curve() {
-            true => config.chirp.amplitude.clone(),
-            false => Vec::new(),
+        let amplitude = if chosen.design.has_amplitude_curve() {
+            config.chirp.amplitude.clone()
+        } else {
+            Vec::new()
         };
         ExcitationPlan {
             excitation: chosen.describe(),

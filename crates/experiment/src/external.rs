@@ -123,9 +123,10 @@ pub fn analyse_external(
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
-    let band_hz = match band_hz.is_none() && periodic.is_some() {
-        true => response_band_hz(&frf),
-        false => requested_hz,
+    let band_hz = if band_hz.is_none() && periodic.is_some() {
+        response_band_hz(&frf)
+    } else {
+        requested_hz
     };
     let fit = match &periodic {
         Some(periodic) => fit_of_periods(&data, periodic.linearity.as_ref(), &chain),

@@ -80,9 +80,10 @@ pub enum Stage {
 impl Stage {
     /// The stage of the configured devices.
     pub fn of(config: &Config) -> Stage {
-        match devices::is_simulated(config) {
-            true => Stage::Simulated,
-            false => Stage::Devices,
+        if devices::is_simulated(config) {
+            Stage::Simulated
+        } else {
+            Stage::Devices
         }
     }
 }

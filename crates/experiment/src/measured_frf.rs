@@ -144,9 +144,10 @@ impl MeasuredFrf {
     /// # Errors
     /// When the file cannot be read, or has no response from current to displacement.
     pub fn read(path: &Path) -> Result<MeasuredFrf, FrfError> {
-        match path.extension() == Some(OsStr::new("mcap")) {
-            true => MeasuredFrf::of_recording(path).map(|(measured, _)| measured),
-            false => MeasuredFrf::of_csv(path),
+        if path.extension() == Some(OsStr::new("mcap")) {
+            MeasuredFrf::of_recording(path).map(|(measured, _)| measured)
+        } else {
+            MeasuredFrf::of_csv(path)
         }
     }
 
@@ -154,9 +155,10 @@ impl MeasuredFrf {
     pub(super) fn read_with_data(
         path: &Path,
     ) -> Result<(MeasuredFrf, Option<Vec<FrfDatum>>), FrfError> {
-        match path.extension() == Some(OsStr::new("mcap")) {
-            true => MeasuredFrf::of_recording(path).map(|(frf, data)| (frf, Some(data))),
-            false => MeasuredFrf::of_csv(path).map(|frf| (frf, None)),
+        if path.extension() == Some(OsStr::new("mcap")) {
+            MeasuredFrf::of_recording(path).map(|(frf, data)| (frf, Some(data)))
+        } else {
+            MeasuredFrf::of_csv(path).map(|frf| (frf, None))
         }
     }
 
@@ -290,12 +292,13 @@ fn check_gain(frf: &Frf, plant: &LoopPlant) -> Result<(), FrfError> {
         return Ok(());
     };
     let ratio = response.norm() / plant.response(rad_s(frequency_hz)).norm();
-    match (1.0 / MAX_GAIN_RATIO..=MAX_GAIN_RATIO).contains(&ratio) {
-        true => Ok(()),
-        false => Err(FrfError::Gain {
+    if (1.0 / MAX_GAIN_RATIO..=MAX_GAIN_RATIO).contains(&ratio) {
+        Ok(())
+    } else {
+        Err(FrfError::Gain {
             ratio,
             frequency_hz,
-        }),
+        })
     }
 }
 

@@ -45,9 +45,10 @@ impl<'a> PlannedReference<'a> {
 
     /// What reduces current and travel.
     fn to_lower(self) -> &'static str {
-        match self.config.control.feedforward.is_none() {
-            true => "the values of the reference, or its slope",
-            false => "the values of the reference, its slope, or control.feedforward.bandwidth_hz",
+        if self.config.control.feedforward.is_none() {
+            "the values of the reference, or its slope"
+        } else {
+            "the values of the reference, its slope, or control.feedforward.bandwidth_hz"
         }
     }
 }

@@ -149,9 +149,10 @@ impl RememberedMotor<'_> {
             let is_stopped = || signal.load(Ordering::Relaxed) || self.stop.is_raised();
             wait_for(wait_s, &begun, now, is_stopped, progress)
         })?;
-        match is_cool {
-            true => Ok(()),
-            false => Err(MotorError::Stopped.into()),
+        if is_cool {
+            Ok(())
+        } else {
+            Err(MotorError::Stopped.into())
         }
     }
 }

@@ -60,11 +60,12 @@ impl Run {
             RunFile::Own(recorder) => recorder.complete()?,
             RunFile::Remote { totals, .. } => totals.clone(),
         };
-        match self.path.exists() {
-            true => Ok(totals),
-            false => Err(RecordingError::Removed {
+        if self.path.exists() {
+            Ok(totals)
+        } else {
+            Err(RecordingError::Removed {
                 path: self.path.clone(),
-            }),
+            })
         }
     }
 

@@ -81,9 +81,10 @@ impl Setup {
 
     /// The stage of a run.
     fn stage(&self, config: &Config) -> Stage {
-        match self.simulate {
-            true => Stage::Simulated,
-            false => Stage::of(config),
+        if self.simulate {
+            Stage::Simulated
+        } else {
+            Stage::of(config)
         }
     }
 

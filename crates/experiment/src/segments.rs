@@ -128,13 +128,14 @@ fn estimate_stepped_sine(
             Err(error) => return Err(error),
         }
     }
-    match data.is_empty() {
-        true => Err(IdentifyError::NotExcited { low_hz, high_hz }),
-        false => Ok(Segments::Lines(
+    if data.is_empty() {
+        Err(IdentifyError::NotExcited { low_hz, high_hz })
+    } else {
+        Ok(Segments::Lines(
             frf,
             with_mean_variance(&data, &input_powers),
             None,
-        )),
+        ))
     }
 }
 

@@ -101,12 +101,11 @@ impl SignalBuilder {
             self.late.push(f64::NAN);
             return;
         }
-        let (read_s, late) = match self.on_devices {
-            true => {
-                let late = (seconds(record.done_ns) - scheduled_s) * self.rate_hz;
-                (seconds(record.woke_ns), late)
-            }
-            false => (scheduled_s, 0.0),
+        let (read_s, late) = if self.on_devices {
+            let late = (seconds(record.done_ns) - scheduled_s) * self.rate_hz;
+            (seconds(record.woke_ns), late)
+        } else {
+            (scheduled_s, 0.0)
         };
         self.late.push(late);
         let measured_s = read_s - seconds(record.probe_age_ns);
@@ -242,13 +241,14 @@ fn aligned_currents(input_a: Vec<f64>, late: Vec<f64>) -> Vec<f64> {
 /// Refuses a reading that no loop would have used: the resampling would need a grid of its age.
 fn check_age(record: &TickRecord) -> Result<(), AnalysisError> {
     let age_s = seconds(record.probe_age_ns);
-    match age_s <= MAX_AGE_S {
-        true => Ok(()),
-        false => Err(AnalysisError::ReadingAge {
+    if age_s <= MAX_AGE_S {
+        Ok(())
+    } else {
+        Err(AnalysisError::ReadingAge {
             tick: record.tick,
             age_s,
             limit_s: MAX_AGE_S,
-        }),
+        })
     }
 }
 

@@ -43,9 +43,10 @@ impl StopSignals {
     pub async fn received(&mut self) {
         poll_fn(|context| {
             let mut signals = self.signals.iter_mut();
-            match signals.any(|signal| signal.poll_recv(context).is_ready()) {
-                true => Poll::Ready(()),
-                false => Poll::Pending,
+            if signals.any(|signal| signal.poll_recv(context).is_ready()) {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
             }
         })
         .await

@@ -157,11 +157,12 @@ fn timing(config: &Config, settings: &MinimumTimeSettings) -> Result<StepTiming,
     let block_ticks = (libm::round(settings.block_s * rate_hz) as usize).max(1);
     let longest = libm::ceil(settings.longest_s * rate_hz) as usize;
     let blocks = longest.div_ceil(block_ticks).max(1);
-    match blocks > MAX_BLOCKS {
-        true => Err(PlanError::ManyBlocks { blocks }),
-        false => Ok(StepTiming {
+    if blocks > MAX_BLOCKS {
+        Err(PlanError::ManyBlocks { blocks })
+    } else {
+        Ok(StepTiming {
             block_ticks,
             blocks,
-        }),
+        })
     }
 }

@@ -130,9 +130,10 @@ pub fn step_response(
         return Ok(None);
     };
     let closed_loop = closed_loop_of(controller, config)?;
-    let predicted = match closed_loop.margins().stable {
-        true => predicted_step(plan, &closed_loop),
-        false => None,
+    let predicted = if closed_loop.margins().stable {
+        predicted_step(plan, &closed_loop)
+    } else {
+        None
     };
     let (rest_m, positions_m) = positions_after(recording, step.at_s * config.servo.rate_hz)?;
     Ok(Some(StepResponse {

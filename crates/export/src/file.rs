@@ -34,9 +34,10 @@ impl Target {
             return Err(ExportError::Special { path, kind });
         }
         // A symbolic link to nothing exists, too.
-        match path.symlink_metadata().is_ok() {
-            true => Err(ExportError::Exists { path: path.clone() }),
-            false => Ok(()),
+        if path.symlink_metadata().is_ok() {
+            Err(ExportError::Exists { path: path.clone() })
+        } else {
+            Ok(())
         }
     }
 

@@ -68,9 +68,10 @@ struct Groups<'a> {
 impl Rows for Groups<'_> {
     fn push(&mut self, record: &TickRecord) -> std::result::Result<(), ExportError> {
         self.rows.push(*record);
-        match self.rows.len() < GROUP {
-            true => Ok(()),
-            false => self.write_group().map_err(failed),
+        if self.rows.len() < GROUP {
+            Ok(())
+        } else {
+            self.write_group().map_err(failed)
         }
     }
 }

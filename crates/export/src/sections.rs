@@ -45,9 +45,10 @@ impl<'a> Sections<'a> {
     pub(super) fn append(&mut self, index: usize, bytes: &[u8]) -> Result<(), ExportError> {
         let section = &mut self.sections[index];
         section.block.extend_from_slice(bytes);
-        match section.block.len() < BLOCK {
-            true => Ok(()),
-            false => section.write_block(self.file),
+        if section.block.len() < BLOCK {
+            Ok(())
+        } else {
+            section.write_block(self.file)
         }
     }
 

@@ -116,9 +116,10 @@ struct Datasets<'a> {
 impl Rows for Datasets<'_> {
     fn push(&mut self, record: &TickRecord) -> Result<(), ExportError> {
         self.rows += 1;
-        let end = match self.rows.is_multiple_of(PER_LINE) {
-            true => "\n",
-            false => "",
+        let end = if self.rows.is_multiple_of(PER_LINE) {
+            "\n"
+        } else {
+            ""
         };
         for (index, signal) in self.signals.iter().enumerate() {
             let ordinate = format!("{:>20}{end}", exponential(signal.number(record), 12));
@@ -131,9 +132,10 @@ impl Rows for Datasets<'_> {
 impl Datasets<'_> {
     /// Ends the last line and the dataset.
     fn finish(mut self) -> Result<(), ExportError> {
-        let end = match self.rows.is_multiple_of(PER_LINE) {
-            true => DELIMITER.to_string(),
-            false => format!("\n{DELIMITER}"),
+        let end = if self.rows.is_multiple_of(PER_LINE) {
+            DELIMITER.to_string()
+        } else {
+            format!("\n{DELIMITER}")
         };
         for index in 0..self.signals.len() {
             self.sections.append(index, end.as_bytes())?;

@@ -254,9 +254,10 @@ impl Table<'_> {
     fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
         number.ok_or_else(|| {
-            let what = match text.contains(',') {
-                true => "has a comma in place of the decimal point; write the numbers as in 0.5",
-                false => "is not a finite number; repair the cell, or cut the file there",
+            let what = if text.contains(',') {
+                "has a comma in place of the decimal point; write the numbers as in 0.5"
+            } else {
+                "is not a finite number; repair the cell, or cut the file there"
             };
             self.invalid_line(line, &format!("{text:?} in column `{column}` {what}"))
         })

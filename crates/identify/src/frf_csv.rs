@@ -124,13 +124,12 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
 /// The columns are those of another file, or of a response in another unit.
 fn wrong_header(found: &str) -> FrfCsvError {
     let name = found.split(',').nth(1).unwrap_or_default();
-    let text = match found.replacen(name, METRES_PER_AMPERE, 1) == HEADER {
-        true => format!(
+    let text = if found.replacen(name, METRES_PER_AMPERE, 1) == HEADER {
+        format!(
             "the magnitude column is `{name}`, not `{METRES_PER_AMPERE}`; give a response from current (A) to displacement (m), such as ..._frf.csv of `bench chirp`"
-        ),
-        false => format!(
-            "the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`"
-        ),
+        )
+    } else {
+        format!("the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`")
     };
     FrfCsvError::Format(text)
 }

@@ -105,9 +105,10 @@ pub fn orthogonal_complement(vector: &DVector<f64>) -> DMatrix<f64> {
     let mut v = vector.clone();
     v[0] += if vector[0] < 0.0 { -norm } else { norm };
     let scale = v.norm_squared();
-    let projection = match scale > 0.0 {
-        true => (2.0 / scale) * &v * v.transpose(),
-        false => DMatrix::zeros(n, n),
+    let projection = if scale > 0.0 {
+        (2.0 / scale) * &v * v.transpose()
+    } else {
+        DMatrix::zeros(n, n)
     };
     let reflection = DMatrix::identity(n, n) - projection;
     reflection.columns(1, n - 1).into_owned()

@@ -61,9 +61,10 @@ impl Mode {
         let damping_rate = v.dot(&(&structure.damping * &v));
         Mode {
             omega_rad_s,
-            damping_ratio: match omega_rad_s == 0.0 {
-                true => 0.0,
-                false => damping_rate / (2.0 * omega_rad_s),
+            damping_ratio: if omega_rad_s == 0.0 {
+                0.0
+            } else {
+                damping_rate / (2.0 * omega_rad_s)
             },
             force_gain: structure.force.dot(&v),
             sensor_gain: structure.sensor.dot(&v),
@@ -178,9 +179,10 @@ impl ModalModel {
             let mode = Mode::new(structure, omega_rad_s, shape.into_owned());
             modal.modes.push(mode);
         }
-        match modal.has_response() {
-            true => Ok(modal),
-            false => Err(PlantError::NoResponse),
+        if modal.has_response() {
+            Ok(modal)
+        } else {
+            Err(PlantError::NoResponse)
         }
     }
 
@@ -213,9 +215,10 @@ impl ModalModel {
         let mode = &self.modes[index];
         let residue = mode.residue_per_kg();
         // The peak of a double integrator has no limit: it is observed unless its residue is rounding.
-        let is_hidden = match mode.omega_rad_s == 0.0 {
-            true => residue.abs() <= ROUNDING_RATIO * self.largest(Mode::residue_per_kg),
-            false => mode.peak_m_per_n() <= OBSERVED_RATIO * self.others(index),
+        let is_hidden = if mode.omega_rad_s == 0.0 {
+            residue.abs() <= ROUNDING_RATIO * self.largest(Mode::residue_per_kg)
+        } else {
+            mode.peak_m_per_n() <= OBSERVED_RATIO * self.others(index)
         };
         if is_hidden {
             Sign::Hidden

@@ -492,8 +492,9 @@ fn channels(contents: &Contents) -> String {
     let names: Vec<_> = channels
         .map(|(topic, schema)| format!("{topic} of {schema}"))
         .collect();
-    match names.is_empty() {
-        true => "it has no channels".into(),
-        false => format!("it has {}", names.join(", ")),
+    if names.is_empty() {
+        "it has no channels".into()
+    } else {
+        format!("it has {}", names.join(", "))
     }
 }

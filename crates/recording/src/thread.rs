@@ -213,9 +213,10 @@ fn take(published: &LoopMessage, recorder: &mut Recorder, writing: &mut Writing,
         *writing = Writing::Failed(error);
         health.failed.store(true, Ordering::Release);
     }
-    let counter = match writing.is_on() {
-        true => &health.written,
-        false => &health.discarded,
+    let counter = if writing.is_on() {
+        &health.written
+    } else {
+        &health.discarded
     };
     counter.fetch_add(1, Ordering::Relaxed);
 }

@@ -59,9 +59,10 @@ fn density_range(spectrum: &ErrorSpectrum) -> (f64, f64) {
     let (low, high) = positive.fold((f64::INFINITY, 0.0_f64), |(low, high), value| {
         (low.min(value), high.max(value))
     });
-    match low <= high {
-        true => (low / DENSITY_MARGIN, high * DENSITY_MARGIN),
-        false => (0.1, 10.0),
+    if low <= high {
+        (low / DENSITY_MARGIN, high * DENSITY_MARGIN)
+    } else {
+        (0.1, 10.0)
     }
 }
 

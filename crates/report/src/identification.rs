@@ -128,13 +128,15 @@ fn residual_range(frf: &Frf, residual: &[f64]) -> (f64, f64) {
     let least = residuals.fold(f64::INFINITY, |least, value| least.min(*value));
     let largest = residual.iter().copied().chain(sigmas.map(|s| high * s));
     let largest = largest.fold(0.0, f64::max);
-    let bottom = match smallest.is_finite() {
-        true => least.clamp(smallest / MAX_DEPTH, smallest),
-        false => least,
+    let bottom = if smallest.is_finite() {
+        least.clamp(smallest / MAX_DEPTH, smallest)
+    } else {
+        least
     };
-    match bottom < largest {
-        true => (bottom / ROOM, largest * ROOM),
-        false => (0.1, 10.0),
+    if bottom < largest {
+        (bottom / ROOM, largest * ROOM)
+    } else {
+        (0.1, 10.0)
     }
 }
 

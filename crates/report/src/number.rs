@@ -33,9 +33,10 @@ pub fn significant(value: f64, digits: usize) -> String {
 pub fn interval(value: f64, half: f64) -> String {
     let digits = decimals(half);
     let value = plain(value, digits);
-    match half.is_finite() {
-        true => format!("{value} ± {half:.digits$}"),
-        false => format!("{value} ± without bound"),
+    if half.is_finite() {
+        format!("{value} ± {half:.digits$}")
+    } else {
+        format!("{value} ± without bound")
     }
 }
 

@@ -60,9 +60,10 @@ fn nyquist(unit: Unit, heading: &str, lines: &[Line], band_hz: (f64, f64)) -> Ch
             chart = circles(chart, line, frf, &indices, factor);
         }
         let curve = points(line, &indices, factor);
-        chart = match std::ptr::eq(line, finest(lines)) {
-            true => chart.directed(line.name, line.pen, curve),
-            false => chart.line(line.name, line.pen, curve),
+        chart = if std::ptr::eq(line, finest(lines)) {
+            chart.directed(line.name, line.pen, curve)
+        } else {
+            chart.line(line.name, line.pen, curve)
         };
     }
     chart = with_frequencies(chart, finest(lines), band_hz, factor);

@@ -149,9 +149,10 @@ fn sign_captions(signs: Option<[char; 3]>) -> Vec<String> {
     let Some([r, u, v]) = signs else {
         return vec!["the modes cross".into()];
     };
-    let (which, zeros) = match r == v && r != u {
-        true => ("signs alternate:", "CNMP zeros possible"),
-        false => ("signs do not alternate:", "no CNMP zeros"),
+    let (which, zeros) = if r == v && r != u {
+        ("signs alternate:", "CNMP zeros possible")
+    } else {
+        ("signs do not alternate:", "no CNMP zeros")
     };
     vec![
         format!("αR {r}   αu {u}   αv {v}"),

@@ -138,9 +138,10 @@ pub(super) fn lines<'a>(traces: &[Trace<'a>]) -> Result<Vec<Line<'a>>, ReportErr
     let mut lines = with_pens
         .map(|(trace, pen)| Line::new(trace, pen))
         .collect::<Result<Vec<_>, _>>()?;
-    match lines.iter().any(Line::is_ambiguous) {
-        true => lines.iter_mut().for_each(Line::wrap),
-        false => align_phases(&mut lines),
+    if lines.iter().any(Line::is_ambiguous) {
+        lines.iter_mut().for_each(Line::wrap)
+    } else {
+        align_phases(&mut lines)
     }
     if lines.is_empty() {
         Err(ReportError::NoTrace)

@@ -171,12 +171,13 @@ impl Interlocks {
         if !position_m.is_finite() {
             return Err(Trip::ProbeInvalid);
         }
-        match is_within(position_m.abs(), limit_m) {
-            true => Ok(()),
-            false => Err(Trip::Travel {
+        if is_within(position_m.abs(), limit_m) {
+            Ok(())
+        } else {
+            Err(Trip::Travel {
                 position_m,
                 limit_m,
-            }),
+            })
         }
     }
 
@@ -218,9 +219,10 @@ impl Interlocks {
         self.heat(self.heating_a, f64::from(missed));
         let count = self.overruns.add(missed, now.scheduled_ns);
         let limit = self.limits.overruns_per_s;
-        match count > limit {
-            true => Err(Trip::Overruns { count, limit }),
-            false => Ok(()),
+        if count > limit {
+            Err(Trip::Overruns { count, limit })
+        } else {
+            Ok(())
         }
     }
 
@@ -267,12 +269,13 @@ impl Interlocks {
         let expected_a = set_point_a.max(-limit_a).min(limit_a);
         let lowest_a = expected_a.min(self.last_accepted_a) - self.limits.accepted_error_a;
         let highest_a = expected_a.max(self.last_accepted_a) + self.limits.accepted_error_a;
-        match (lowest_a..=highest_a).contains(&accepted_a) {
-            true => Ok(()),
-            false => Err(Trip::SetPointNotAccepted {
+        if (lowest_a..=highest_a).contains(&accepted_a) {
+            Ok(())
+        } else {
+            Err(Trip::SetPointNotAccepted {
                 accepted_a,
                 expected_a,
-            }),
+            })
         }
     }
 

@@ -325,13 +325,14 @@ impl LowPass {
 
 impl Residual {
     fn check(&self) -> Result<(), Trip> {
-        match is_within(self.error_m.abs(), self.limit_m) {
-            true => Ok(()),
-            false => Err(Trip::ModelError {
+        if is_within(self.error_m.abs(), self.limit_m) {
+            Ok(())
+        } else {
+            Err(Trip::ModelError {
                 error_m: self.error_m,
                 modelled_m: self.modelled_m,
                 limit_m: self.limit_m,
-            }),
+            })
         }
     }
 }

@@ -158,9 +158,10 @@ impl Servo {
     }
 
     fn check_motion(&mut self, position_m: f64, missed: u32) -> Result<(), Trip> {
-        match self.runs() {
-            true => self.run.interlocks.check_motion(position_m, missed),
-            false => Ok(()),
+        if self.runs() {
+            self.run.interlocks.check_motion(position_m, missed)
+        } else {
+            Ok(())
         }
     }
 
@@ -193,9 +194,10 @@ impl Servo {
 
     /// The factors of reference and loop gain in this tick.
     fn factors(&mut self) -> Factors {
-        match self.runs() {
-            true => self.run.tuning.next(),
-            false => Factors::default(),
+        if self.runs() {
+            self.run.tuning.next()
+        } else {
+            Factors::default()
         }
     }
 

@@ -62,9 +62,10 @@ impl Settling {
         }
         let tick = self.tick - self.ramp_ticks;
         self.done = tick >= self.ramp_ticks || self.left_a == 0.0;
-        match self.done {
-            true => SettlingStep::Done,
-            false => SettlingStep::Current(self.left_a * ramp(tick, self.ramp_ticks)),
+        if self.done {
+            SettlingStep::Done
+        } else {
+            SettlingStep::Current(self.left_a * ramp(tick, self.ramp_ticks))
         }
     }
 

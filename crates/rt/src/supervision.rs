@@ -83,9 +83,10 @@ impl LeaseWatch {
     /// Counts a tick and the missed ticks before it; returns whether the lease has expired.
     fn has_expired(&mut self, missed: u32) -> bool {
         let renewals = self.lease.0.load(Ordering::Relaxed);
-        self.ticks = match renewals == self.renewals {
-            true => self.ticks.saturating_add(1 + u64::from(missed)),
-            false => 0,
+        self.ticks = if renewals == self.renewals {
+            self.ticks.saturating_add(1 + u64::from(missed))
+        } else {
+            0
         };
         self.renewals = renewals;
         self.ticks >= self.limit_ticks

@@ -115,9 +115,10 @@ impl Scheduling {
 
     fn set_policy(&mut self, priority: i32) {
         let remedy = "raise `rtprio` in /etc/security/limits.conf or give the program CAP_SYS_NICE";
-        self.policy = match self.granted("SCHED_FIFO", set_fifo(priority), remedy) {
-            true => format!("SCHED_FIFO {priority}"),
-            false => "SCHED_OTHER".into(),
+        self.policy = if self.granted("SCHED_FIFO", set_fifo(priority), remedy) {
+            format!("SCHED_FIFO {priority}")
+        } else {
+            "SCHED_OTHER".into()
         };
     }
 

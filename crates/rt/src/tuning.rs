@@ -105,9 +105,12 @@ impl Tuning {
         if let Some((tune, tick)) = &mut self.change {
             *tick += 1;
             let left = ramp(*tick, tune.ramp_ticks);
-            let between = |from: f64, to: f64| match left == 0.0 {
-                true => to,
-                false => to + (from - to) * left,
+            let between = |from: f64, to: f64| {
+                if left == 0.0 {
+                    to
+                } else {
+                    to + (from - to) * left
+                }
             };
             self.now = Factors {
                 reference: between(self.from.reference, tune.to.reference),

@@ -259,9 +259,10 @@ fn chosen<'a>(variants: &'a [Json], tag: &str, value: &Value) -> Option<&'a Json
 
 /// The path of the entry `key` of a table.
 pub fn join(path: &str, key: &str) -> String {
-    match path.is_empty() {
-        true => key.to_string(),
-        false => format!("{path}.{key}"),
+    if path.is_empty() {
+        key.to_string()
+    } else {
+        format!("{path}.{key}")
     }
 }
 

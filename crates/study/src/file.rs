@@ -155,12 +155,13 @@ fn add_block(results: &mut Results, json: Option<&str>) -> bool {
 /// Refuses a file of other settings.
 fn check_settings(content: &Content, expected: &str) -> Result<(), StudyError> {
     let differences = differences(&content.header, expected);
-    match differences.is_empty() {
-        true => Ok(()),
-        false => Err(StudyError::OtherSettings {
+    if differences.is_empty() {
+        Ok(())
+    } else {
+        Err(StudyError::OtherSettings {
             path: content.path.clone(),
             differences,
-        }),
+        })
     }
 }
 

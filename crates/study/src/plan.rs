@@ -235,9 +235,10 @@ fn matching_settings<'a>(
         .filter(|(key, _)| tolerance.matches(key))
         .filter_map(|(key, value)| Some((key, value.as_f64()?)))
         .collect();
-    match matching_settings.is_empty() {
-        true => Err(tolerance.wrong(no_matching_setting(tolerance, settings))),
-        false => Ok(matching_settings),
+    if matching_settings.is_empty() {
+        Err(tolerance.wrong(no_matching_setting(tolerance, settings)))
+    } else {
+        Ok(matching_settings)
     }
 }
 

@@ -260,9 +260,10 @@ impl Takeover {
     }
 
     fn largest(&self, sum: &ModalSum, omega_rad_s: f64) -> Dominant {
-        let among = match self.able.is_empty() {
-            true => &self.candidates,
-            false => &self.able,
+        let among = if self.able.is_empty() {
+            &self.candidates
+        } else {
+            &self.able
         };
         let size = |part: &&Part| part.value(sum, omega_rad_s).abs();
         let largest = among.iter().max_by(|a, b| size(a).total_cmp(&size(b)));

@@ -130,9 +130,10 @@ fn signs(sum: &ModalSum) -> String {
 /// The names of a sequence, reversed with the signs.
 fn reversed_names(sum: &ModalSum, sequence: &Sequence) -> Vec<String> {
     let names = sequence.names();
-    match slowest_is_negative(sum) {
-        true => names.into_iter().map(reversed_name).collect(),
-        false => names,
+    if slowest_is_negative(sum) {
+        names.into_iter().map(reversed_name).collect()
+    } else {
+        names
     }
 }
 

@@ -82,14 +82,15 @@ pub(crate) fn fig_1_3(_: &Runs) -> Result<Content, FigureError> {
             )
             .remark("printed: equal"),
         );
-        content = content.compare(match angle_deg == 90.0 {
-            true => Comparison::within("(a) Θ", 90.0, 0, ours.to_degrees(), "deg", 1e-9),
-            false => Comparison::holds(
+        content = content.compare(if angle_deg == 90.0 {
+            Comparison::within("(a) Θ", 90.0, 0, ours.to_degrees(), "deg", 1e-9)
+        } else {
+            Comparison::holds(
                 "(b) Θ",
                 "below 90 deg",
                 ours.to_degrees() < 90.0,
                 &degrees(ours),
-            ),
+            )
         });
     }
     Ok(content

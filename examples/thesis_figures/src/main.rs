@@ -66,13 +66,12 @@ fn run(args: &Args) -> Result<(), FigureError> {
         page: args.out.join("index.html").display().to_string(),
         figures: figures.collect(),
     };
-    let text = match args.json {
-        true => {
-            serde_json::to_string_pretty(&report)
-                .map_err(|error| FigureError::Output(error.to_string()))?
-                + "\n"
-        }
-        false => text(&report),
+    let text = if args.json {
+        serde_json::to_string_pretty(&report)
+            .map_err(|error| FigureError::Output(error.to_string()))?
+            + "\n"
+    } else {
+        text(&report)
     };
     let written = std::io::stdout().lock().write_all(text.as_bytes());
     written.map_err(|error| FigureError::Output(error.to_string()))

@@ -60,12 +60,15 @@ impl Model {
     /// `bench WHAT` on this plant, then `more`.
     pub fn command(&self, what: &str, more: &str) -> String {
         let profile = self.profile.map(|name| format!(" --config {name}"));
-        let quoted = |set: &String| match set
-            .chars()
-            .any(|c| !(c.is_ascii_alphanumeric() || "._=+-".contains(c)))
-        {
-            true => format!(" --set '{set}'"),
-            false => format!(" --set {set}"),
+        let quoted = |set: &String| {
+            if set
+                .chars()
+                .any(|c| !(c.is_ascii_alphanumeric() || "._=+-".contains(c)))
+            {
+                format!(" --set '{set}'")
+            } else {
+                format!(" --set {set}")
+            }
         };
         let sets: String = self.sets.iter().map(quoted).collect();
         let more = if more.is_empty() {

@@ -58,9 +58,10 @@ fn open(path: &Path) -> std::io::Result<File> {
     options.read(true).write(true).custom_flags(flags.bits());
     let existing = options.open(path);
     let file = existing.or_else(|_| options.create(true).truncate(false).mode(0o666).open(path))?;
-    match file.metadata()?.is_file() {
-        true => Ok(file),
-        false => Err(std::io::Error::other("it is not a regular file")),
+    if file.metadata()?.is_file() {
+        Ok(file)
+    } else {
+        Err(std::io::Error::other("it is not a regular file"))
     }
 }
 

@@ -80,9 +80,10 @@ fn explained(args: &Args, trajectory: &Trajectory) -> Result<f64, CliError> {
         return Ok(configured.unwrap_or(samples[trajectory.closest].value));
     };
     let value = sweep.value("--at", text)?;
-    match range.contains(&value) {
-        true => Ok(value),
-        false => Err(outside(value, &range)),
+    if range.contains(&value) {
+        Ok(value)
+    } else {
+        Err(outside(value, &range))
     }
 }
 

@@ -40,18 +40,20 @@ fn bands_text(bands: &[[f64; 2]]) -> String {
     let ranges: Vec<String> = ranges
         .map(|[from, to]| format!("{from:.9} to {to:.9}"))
         .collect();
-    let ranges = match ranges.is_empty() {
-        true => "none".into(),
-        false => ranges.join(", "),
+    let ranges = if ranges.is_empty() {
+        "none".into()
+    } else {
+        ranges.join(", ")
     };
     format!("CNMP zeros of these modes: {ranges}")
 }
 
 fn explanation_text(here: &Explanation) -> String {
     let proposition = &here.proposition;
-    let zeros = match proposition.plant {
-        true => "CNMP zeros",
-        false => "no CNMP zeros",
+    let zeros = if proposition.plant {
+        "CNMP zeros"
+    } else {
+        "no CNMP zeros"
     };
     let remedies: String = here.remedies.iter().map(|remedy| wrap(remedy, 2)).collect();
     let prediction = proposition.predicted.name();

@@ -75,9 +75,10 @@ struct Change {
 pub(super) fn run(args: &Args) -> Result<(), CliError> {
     args.table.check()?;
     let values = args.sweep.values()?;
-    let plane = match args.damped {
-        true => LocusPlane::Damped,
-        false => LocusPlane::Undamped,
+    let plane = if args.damped {
+        LocusPlane::Damped
+    } else {
+        LocusPlane::Undamped
     };
     let locus = Locus::follow(plane, &values, |value| zeros(args, value))?;
     args.table.write(|| {
@@ -94,9 +95,10 @@ pub(super) fn run(args: &Args) -> Result<(), CliError> {
 
 fn drawn(args: &Args, config: &Config, locus: &Locus) -> Result<Picture, ReportError> {
     let vary = &args.sweep.vary;
-    let which = match args.damped {
-        true => "zeros with damping",
-        false => "zeros without damping, one of each pair s, -s",
+    let which = if args.damped {
+        "zeros with damping"
+    } else {
+        "zeros without damping, one of each pair s, -s"
     };
     let title = format!("{}: {which}", config.title);
     let conditions = plant_conditions(&config.plant, &[vary]);
@@ -111,9 +113,10 @@ fn drawn(args: &Args, config: &Config, locus: &Locus) -> Result<Picture, ReportE
 
 fn zeros(args: &Args, value: f64) -> Result<Vec<Zero>, CliError> {
     let structure = args.sweep.structure(value)?;
-    Ok(match args.damped {
-        true => damped_zeros(&structure)?,
-        false => undamped_zeros(&structure)?,
+    Ok(if args.damped {
+        damped_zeros(&structure)?
+    } else {
+        undamped_zeros(&structure)?
     })
 }
 
@@ -161,9 +164,10 @@ fn row(locus: &Locus, index: usize) -> Vec<f64> {
 }
 
 fn text(report: &Report) -> String {
-    let which = match report.damped {
-        true => "with damping",
-        false => "without damping, one of each pair s, -s",
+    let which = if report.damped {
+        "with damping"
+    } else {
+        "without damping, one of each pair s, -s"
     };
     let title = format!("{}: zeros {which}, over {}", report.profile, report.vary);
     let (tracks, changes) = (tracks_table(report), changes_text(report));
@@ -174,9 +178,10 @@ fn changes_text(report: &Report) -> String {
     if !report.changes.is_empty() {
         return report.changes.iter().map(change_text).collect();
     }
-    match report.tracks.iter().all(Track::is_constant) {
-        true => format!("the zeros do not depend on {}\n", report.vary),
-        false => "the kinds of the zeros do not change\n".into(),
+    if report.tracks.iter().all(Track::is_constant) {
+        format!("the zeros do not depend on {}\n", report.vary)
+    } else {
+        "the kinds of the zeros do not change\n".into()
     }
 }
 
@@ -210,9 +215,10 @@ fn change_text(change: &Change) -> String {
         before,
         after,
     } = &change.change;
-    let place = match s.re.is_finite() && s.im.is_finite() {
-        true => format!(" at {:.4}{:+.4}j rad/s", Decimal(s.re), Decimal(s.im)),
-        false => String::new(),
+    let place = if s.re.is_finite() && s.im.is_finite() {
+        format!(" at {:.4}{:+.4}j rad/s", Decimal(s.re), Decimal(s.im))
+    } else {
+        String::new()
     };
     let sentence = format!(
         "at {value:.9}: {before} to {after}, {}{place}",
@@ -245,9 +251,12 @@ fn closed_form_text(closed_form: &ClosedForm) -> String {
 }
 
 fn break_points_text(points_rad_s: &[f64; 2]) -> String {
-    let [first, second] = points_rad_s.map(|s| match s.is_finite() {
-        true => format!("{:.4}", Decimal(s)),
-        false => "infinity".into(),
+    let [first, second] = points_rad_s.map(|s| {
+        if s.is_finite() {
+            format!("{:.4}", Decimal(s))
+        } else {
+            "infinity".into()
+        }
     });
     let sentence = format!("break points by Eq. (3-14) {first} and {second} rad/s");
     wrap(&sentence, 4)

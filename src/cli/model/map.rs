@@ -168,9 +168,10 @@ fn columns(report: &Report) -> Vec<Column> {
 
 fn text(report: &Report, profile: &str) -> String {
     let (rows, columns) = (report.operating_points.len(), report.asymmetries.len());
-    let rest = match rows <= PICTURE.0 && columns <= PICTURE.1 {
-        true => picture(report),
-        false => format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1),
+    let rest = if rows <= PICTURE.0 && columns <= PICTURE.1 {
+        picture(report)
+    } else {
+        format!("no picture above {} x {} points\n", PICTURE.0, PICTURE.1)
     };
     let summary = format!(
         "{profile}: CNMP zeros without damping at {}",

@@ -80,11 +80,12 @@ fn placements(args: &Args) -> Result<PlacementReport, CliError> {
 /// The places of the plant at a value; a plant given by its modes has none.
 fn places(args: &Args, value: f64) -> Result<Vec<Port>, CliError> {
     let places = ports(&args.modes.sweep.config(value)?.plant);
-    match places.is_empty() {
-        false => Ok(places),
-        true => Err(CliError::Usage(
-            "a plant given by its modes has no places for an actuator or a probe; describe it as masses and springs (plant.model = \"lumped\")".into(),
-        )),
+    if !places.is_empty() {
+        Ok(places)
+    } else {
+        Err(CliError::Usage(
+        "a plant given by its modes has no places for an actuator or a probe; describe it as masses and springs (plant.model = \"lumped\")".into(),
+    ))
     }
 }
 

@@ -36,9 +36,10 @@ fn present_text(report: &PlacementReport) -> String {
 }
 
 fn judgement(trial: &Trial) -> String {
-    let diagram = match trial.picture_alternates {
-        true => "signs alternate somewhere",
-        false => "signs alternate nowhere",
+    let diagram = if trial.picture_alternates {
+        "signs alternate somewhere"
+    } else {
+        "signs alternate nowhere"
     };
     format!(
         "diagram: {diagram}; model: CNMP zeros of these modes at {} of {} values, of any modes at {}{}",
@@ -169,9 +170,10 @@ const TRIAL_HEADER: [&str; 8] = [
 
 fn trial_row(placement: &Placement) -> Vec<String> {
     let trial = &placement.trial;
-    let diagram = match trial.picture_alternates {
-        true => "alternates",
-        false => "does not",
+    let diagram = if trial.picture_alternates {
+        "alternates"
+    } else {
+        "does not"
     };
     let differs = if trial.differs { "differs" } else { "" };
     vec![

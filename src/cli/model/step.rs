@@ -144,9 +144,10 @@ fn text(report: &Report) -> String {
     let end = report.end_m_per_n.map_or("unlimited".into(), |end| {
         format!("{:.4} um/N", Decimal(end * 1e6))
     });
-    let disagreement = match report.predicted.agrees {
-        true => "",
-        false => "  the features DISAGREE with the prediction\n",
+    let disagreement = if report.predicted.agrees {
+        ""
+    } else {
+        "  the features DISAGREE with the prediction\n"
     };
     format!(
         "{}: {}, {}\n  end                 {end}\n{}{}{}{disagreement}",

@@ -187,8 +187,9 @@ impl Dimension {
 /// A number, with an exponent if it has many zeros: `1e308`.
 fn number_text(number: f64) -> String {
     let is_short = number == 0.0 || (1e-12..1e12).contains(&number.abs());
-    match is_short {
-        true => number.to_string(),
-        false => format!("{number:e}"),
+    if is_short {
+        number.to_string()
+    } else {
+        format!("{number:e}")
     }
 }

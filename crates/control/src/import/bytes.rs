@@ -58,9 +58,10 @@ impl<'a> Bytes<'a> {
 /// An unsigned integer of up to eight bytes.
 pub(super) fn unsigned(bytes: &[u8], big_endian: bool) -> u64 {
     let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
-    match big_endian {
-        true => bytes.iter().fold(0, append),
-        false => bytes.iter().rev().fold(0, append),
+    if big_endian {
+        bytes.iter().fold(0, append)
+    } else {
+        bytes.iter().rev().fold(0, append)
     }
 }
 

@@ -290,11 +290,12 @@ fn continuous_delay(Delay { name, value }: &Delay) -> String {
 fn whole_samples(Delay { name, value }: &Delay) -> Result<usize, String> {
     let whole = libm::round(*value);
     let is_whole = (value - whole).abs() < SAMPLE_ROUNDING && whole > 0.0;
-    match is_whole && whole <= MAX_ORDER as f64 {
-        true => Ok(whole as usize),
-        false => Err(format!(
+    if is_whole && whole <= MAX_ORDER as f64 {
+        Ok(whole as usize)
+    } else {
+        Err(format!(
             "`{name}` is {value} samples: a delay of a discrete controller must be a whole number of samples from 0 to {MAX_ORDER}; approximate it by poles and zeros and save the controller again"
-        )),
+        ))
     }
 }
 

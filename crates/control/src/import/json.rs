@@ -83,9 +83,10 @@ fn numbers(items: &[Json]) -> Option<NumericArray> {
         return None;
     }
     let is_vector = items.iter().all(|item| !item.is_array());
-    let shape = match is_vector {
-        true => vec![rows.len()],
-        false => vec![rows.len(), columns],
+    let shape = if is_vector {
+        vec![rows.len()]
+    } else {
+        vec![rows.len(), columns]
     };
     let entries = rows.iter().flatten().map(|x| Complex::new(*x, 0.0));
     limited(shape, &entries.collect::<Vec<_>>())

@@ -202,9 +202,10 @@ fn numbers(bytes: &mut Bytes<'_>, shape: Vec<usize>, flags: u32) -> Result<Value
         return Ok(Value::Other("an array that is too large".into()));
     };
     let re = real_numbers(bytes, count)?;
-    let im = match is_complex {
-        true => real_numbers(bytes, count)?,
-        false => vec![0.0; count],
+    let im = if is_complex {
+        real_numbers(bytes, count)?
+    } else {
+        vec![0.0; count]
     };
     if let (true, [flag]) = (flags & LOGICAL_FLAG != 0, re.as_slice()) {
         return Ok(Value::Flag(*flag != 0.0));
@@ -224,9 +225,10 @@ fn real_numbers(bytes: &mut Bytes<'_>, count: usize) -> Result<Vec<f64>, FormatE
         .chunks_exact(number.size)
         .map(|part| number.value(part, big_endian))
         .collect();
-    match numbers.len() == count {
-        true => Ok(numbers),
-        false => Err(bytes.damaged("as many numbers as the size of the array states")),
+    if numbers.len() == count {
+        Ok(numbers)
+    } else {
+        Err(bytes.damaged("as many numbers as the size of the array states"))
     }
 }
 

@@ -36,12 +36,13 @@ pub(super) fn array(bytes: &[u8]) -> Result<Value, FormatError> {
         .chunks_exact(kind.size)
         .map(|part| kind.number(part))
         .collect();
-    Ok(Value::Numbers(match description.by_columns {
-        true => NumericArray {
+    Ok(Value::Numbers(if description.by_columns {
+        NumericArray {
             shape: description.shape,
             entries,
-        },
-        false => NumericArray::from_rows(description.shape, &entries),
+        }
+    } else {
+        NumericArray::from_rows(description.shape, &entries)
     }))
 }
 

@@ -34,30 +34,33 @@ fn vector<'a>(
     let size = array.size();
     let vector = array.vector();
     let vector = vector.ok_or_else(|| format!("`{name}` has the size {size}; {ONE_INPUT}"))?;
-    match vector.len() > limit {
-        true => Err(format!(
+    if vector.len() > limit {
+        Err(format!(
             "`{name}` has {} numbers, but the limit is {limit} (order {MAX_ORDER}); reduce the order",
             vector.len()
-        )),
-        false => Ok((name, vector)),
+        ))
+    } else {
+        Ok((name, vector))
     }
 }
 
 fn finite(name: &str, number: &Complex<f64>) -> Result<(), String> {
-    match number.re.is_finite() && number.im.is_finite() {
-        true => Ok(()),
-        false => Err(format!("`{name}` contains {number}; save finite numbers")),
+    if number.re.is_finite() && number.im.is_finite() {
+        Ok(())
+    } else {
+        Err(format!("`{name}` contains {number}; save finite numbers"))
     }
 }
 
 fn real(name: &str, number: &Complex<f64>) -> Result<f64, String> {
     finite(name, number)?;
-    match number.im == 0.0 {
-        true => Ok(number.re),
-        false => Err(format!(
+    if number.im == 0.0 {
+        Ok(number.re)
+    } else {
+        Err(format!(
             "`{name}` contains the complex number {}{:+}j; save a controller with real coefficients",
             number.re, number.im
-        )),
+        ))
     }
 }
 

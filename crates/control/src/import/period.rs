@@ -105,14 +105,15 @@ fn of_rate(name: &str, value: &Value) -> Result<Period, String> {
 }
 
 fn discrete(name: &str, value: &Value, rate_hz: f64) -> Result<Period, String> {
-    match RATE_LIMITS_HZ.contains(&rate_hz) {
-        true => Ok(Period::Known(Domain::Discrete { rate_hz })),
-        false => Err(format!(
+    if RATE_LIMITS_HZ.contains(&rate_hz) {
+        Ok(Period::Known(Domain::Discrete { rate_hz }))
+    } else {
+        Err(format!(
             "`{name}` = {} is a rate of {rate_hz} Hz; the limits of `rate_hz` are {} and {} Hz; save the sampling period in seconds (0: continuous), as it is used in the loop",
             value.summary(),
             RATE_LIMITS_HZ.start(),
             RATE_LIMITS_HZ.end()
-        )),
+        ))
     }
 }
 

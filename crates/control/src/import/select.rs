@@ -68,9 +68,10 @@ fn selected<'a>(
 ) -> Result<Selected<'a>, String> {
     let fields = group.fields;
     // A structure may leave properties of its system to the top level.
-    let shared: &[(String, Value)] = match group.name.is_empty() {
-        true => &[],
-        false => variables,
+    let shared: &[(String, Value)] = if group.name.is_empty() {
+        &[]
+    } else {
+        variables
     };
     let properties = properties::of(fields, shared, form, options.gain_unit)?;
     let domain = period::domain(fields, shared, properties.time_unit_s, options.domain)?;
@@ -93,9 +94,10 @@ fn groups(variables: &Variables) -> Vec<Group<'_>> {
         let (prefix, fields) = (groups[next].name.clone(), groups[next].fields);
         for (name, value) in fields {
             if let Value::Fields(fields) = value {
-                let name = match prefix.is_empty() {
-                    true => name.clone(),
-                    false => format!("{prefix}.{name}"),
+                let name = if prefix.is_empty() {
+                    name.clone()
+                } else {
+                    format!("{prefix}.{name}")
                 };
                 groups.push(Group { name, fields });
             }
@@ -110,14 +112,16 @@ fn nothing_found(variables: &Variables, options: &ImportOptions) -> String {
         .iter()
         .map(|(name, value)| described(name, value))
         .collect();
-    let contents = match descriptions.is_empty() {
-        true => "it contains no variable".into(),
-        false => format!("it contains {}", descriptions.join(", ")),
+    let contents = if descriptions.is_empty() {
+        "it contains no variable".into()
+    } else {
+        format!("it contains {}", descriptions.join(", "))
     };
     let is_object = |(_, value): &(String, Value)| matches!(value, Value::Other(what) if what.contains("object"));
-    let remedy = match variables.iter().any(is_object) {
-        true => FROM_MATLAB_OBJECT,
-        false => WHAT_TO_SAVE,
+    let remedy = if variables.iter().any(is_object) {
+        FROM_MATLAB_OBJECT
+    } else {
+        WHAT_TO_SAVE
     };
     match &options.variable {
         Some(name) => format!(

@@ -117,15 +117,16 @@ impl OutsideBand {
         let inside = 1.0 / margins.modulus_margin.value;
         let [below, above] = [self.below, self.above].map(|range| range.max_sensitivity);
         let outside = below.max(above);
-        match outside > inside.max(NO_PEAK) {
-            false => Ok(()),
-            true => Err(MeasuredLoopError::PeakOutside {
+        if outside <= inside.max(NO_PEAK) {
+            Ok(())
+        } else {
+            Err(MeasuredLoopError::PeakOutside {
                 first_hz: hz(low),
                 last_hz: hz(high),
                 inside,
                 peak_hz: hz(margins.sensitivity_peak_rad_s),
                 outside,
-            }),
+            })
         }
     }
 }
@@ -144,9 +145,10 @@ impl RangeBound {
         let gains = frequencies.map(|w| model.sampled_loop(w).norm());
         let bound = gains.fold(none, |bound, gain| bound.with(gain).with(ratio * gain));
         RangeBound {
-            max_sensitivity: match bound.passes_one() {
-                true => f64::INFINITY,
-                false => bound.max_sensitivity,
+            max_sensitivity: if bound.passes_one() {
+                f64::INFINITY
+            } else {
+                bound.max_sensitivity
             },
             ..bound
         }

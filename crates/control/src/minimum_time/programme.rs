@@ -205,9 +205,12 @@ impl<'a> Programme<'a> {
             Quantity::Error => settling_ticks,
             _ => 0,
         };
-        let value = |tick| match tick < first {
-            true => 0.0,
-            false => scale * response.at(tick, blocks) - offset,
+        let value = |tick| {
+            if tick < first {
+                0.0
+            } else {
+                scale * response.at(tick, blocks) - offset
+            }
         };
         (0..self.ticks()).map(value).collect()
     }

@@ -195,20 +195,14 @@ impl RootPlace {
     }
 
     fn integrator(&self) -> &'static str {
-        match self.discrete {
-            true => "z = 1",
-            false => "s = 0",
-        }
+        if self.discrete { "z = 1" } else { "s = 0" }
     }
 
     fn remedy(&self) -> &'static str {
-        match self.discrete {
-            true => {
-                "move the pole inside the unit circle (at most two poles at exactly z = 1, integrators, are allowed), leave out `rate_hz` if the controller is continuous, or give `[zpk]` if rounding of the numbers moved the pole there"
-            }
-            false => {
-                "move the pole to the left of the imaginary axis (at most two poles at the origin, integrators, are allowed), add `rate_hz` if the controller is discrete, or give `[zpk]` if rounding of the numbers moved the pole there"
-            }
+        if self.discrete {
+            "move the pole inside the unit circle (at most two poles at exactly z = 1, integrators, are allowed), leave out `rate_hz` if the controller is continuous, or give `[zpk]` if rounding of the numbers moved the pole there"
+        } else {
+            "move the pole to the left of the imaginary axis (at most two poles at the origin, integrators, are allowed), add `rate_hz` if the controller is discrete, or give `[zpk]` if rounding of the numbers moved the pole there"
         }
     }
 }
@@ -216,9 +210,10 @@ impl RootPlace {
 impl fmt::Display for RootPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let RootPlace { re, im, discrete } = self;
-        match discrete {
-            true => write!(f, "z = {re:.12} {im:+.12}j"),
-            false => write!(f, "s = {re:.4} {im:+.4}j rad/s"),
+        if *discrete {
+            write!(f, "z = {re:.12} {im:+.12}j")
+        } else {
+            write!(f, "s = {re:.4} {im:+.4}j rad/s")
         }
     }
 }

@@ -22,9 +22,10 @@ pub(super) fn frequencies(factors: &Factors, domain: Domain) -> Vec<f64> {
     let poles = places(&factors.poles, domain);
     let zeros = places(&factors.zeros, domain);
     let roots: Vec<Complex<f64>> = zeros.iter().chain(&poles).copied().collect();
-    let slowest = match poles.is_empty() {
-        true => slowest(&zeros),
-        false => slowest(&poles),
+    let slowest = if poles.is_empty() {
+        slowest(&zeros)
+    } else {
+        slowest(&poles)
     };
     let fastest = roots.iter().map(|root| root.norm()).fold(0.0, f64::max);
     let (low, high) = limits(slowest, fastest, domain);

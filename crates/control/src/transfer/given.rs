@@ -267,9 +267,10 @@ fn check_finite(key: &'static str, numbers: &[f64]) -> Result<(), TransferError>
 }
 
 fn check_proper(zeros: usize, poles: usize) -> Result<(), TransferError> {
-    match zeros > poles {
-        true => Err(TransferError::Improper { zeros, poles }),
-        false => Ok(()),
+    if zeros > poles {
+        Err(TransferError::Improper { zeros, poles })
+    } else {
+        Ok(())
     }
 }
 
@@ -312,9 +313,10 @@ fn check_stability(poles: &Roots, domain: Domain) -> Result<(), TransferError> {
         return Ok(());
     };
     let place = RootPlace::of(pole, domain);
-    Err(match is_beside_integrator(pole, poles, domain) {
-        true => TransferError::NotIntegrator { pole: place },
-        false => TransferError::Unstable { pole: place },
+    Err(if is_beside_integrator(pole, poles, domain) {
+        TransferError::NotIntegrator { pole: place }
+    } else {
+        TransferError::Unstable { pole: place }
     })
 }
 

@@ -33,13 +33,13 @@ pub(super) fn sections(factors: &Factors, unit: f64, domain: Domain) -> Vec<Sect
     // The last section takes what rounding left of the others.
     let last = groups.len() - 1;
     let others: f64 = norms[..last].iter().map(|norm| share * norm).product();
-    let gains = norms
-        .iter()
-        .enumerate()
-        .map(|(index, norm)| match index == last {
-            true => factors.gain * unit / others,
-            false => share * norm,
-        });
+    let gains = norms.iter().enumerate().map(|(index, norm)| {
+        if index == last {
+            factors.gain * unit / others
+        } else {
+            share * norm
+        }
+    });
     groups
         .iter()
         .zip(gains)
@@ -122,9 +122,10 @@ fn groups_of_pairs(
 
 /// The difference of two roots relative to their size.
 fn distance(a: Complex<f64>, b: Complex<f64>) -> f64 {
-    match a == b {
-        true => 0.0,
-        false => (a - b).norm() / (a.norm() + b.norm()),
+    if a == b {
+        0.0
+    } else {
+        (a - b).norm() / (a.norm() + b.norm())
     }
 }
 

@@ -216,9 +216,10 @@ fn bordered(system: &StateSpace, v: Complex<f64>) -> Vec<Vec<WideComplex>> {
             (false, true) => system.c[(0, j)],
             (false, false) => system.d,
         };
-        match i == j && i < n {
-            true => WideComplex::of(v) + WideComplex::real(constant),
-            false => WideComplex::real(constant),
+        if i == j && i < n {
+            WideComplex::of(v) + WideComplex::real(constant)
+        } else {
+            WideComplex::real(constant)
         }
     };
     let row = |i: usize| (0..=n).map(|j| entry(i, j)).collect();

@@ -44,11 +44,10 @@ impl ConvexBound {
         let (plant, functions) = (&self.plant, self.functions);
         let percent = 100.0 * attained / limit;
         // The value rises with the number of functions, so only one that hardly changes is a bound.
-        let state = match limit / half < CONVERGED {
-            true => "no linear controller of any order attains more".to_string(),
-            false => {
-                format!("not converged ({half:.0} rad/s with half of them), the bound is larger")
-            }
+        let state = if limit / half < CONVERGED {
+            "no linear controller of any order attains more".to_string()
+        } else {
+            format!("not converged ({half:.0} rad/s with half of them), the bound is larger")
         };
         format!(
             "convex bound: {limit:.0} rad/s at {plant} with {functions} functions, {state}; this design attains {percent:.0} % of it"
@@ -182,9 +181,10 @@ impl Basis {
         }
         while high / low - 1.0 > ACCURACY {
             let middle = (low * high).sqrt();
-            match feasible(middle)? {
-                true => low = middle,
-                false => high = middle,
+            if feasible(middle)? {
+                low = middle
+            } else {
+                high = middle
             }
         }
         // The upper end has no solution: the bound.
@@ -214,9 +214,10 @@ impl Basis {
                 constant: Complex::new(0.0, 0.0),
                 factors: phi.clone(),
             };
-            match bound > NEGLIGIBLE * p.norm() {
-                true => programme.limit_sum(sensitivity, control(bound)),
-                false => programme.limit(sensitivity),
+            if bound > NEGLIGIBLE * p.norm() {
+                programme.limit_sum(sensitivity, control(bound))
+            } else {
+                programme.limit(sensitivity)
             }
             if let Some(limit) = requirements.max_control_sensitivity_a_per_m {
                 programme.limit(control(1.0 / limit + bound));

@@ -113,9 +113,10 @@ impl Problem {
             let mut walk = Walk::new(&relaxed, steps_left);
             let ascent = walk.ascend(cascade.clone(), relaxed.requirements.easiest_target());
             steps_left = walk.steps;
-            match ascent.slack >= 0.0 {
-                true => (cascade, relaxation) = (ascent.cascade, next),
-                false => stride *= 0.4,
+            if ascent.slack >= 0.0 {
+                (cascade, relaxation) = (ascent.cascade, next);
+            } else {
+                stride *= 0.4;
             }
         }
         (cascade, relaxation, steps - steps_left)
@@ -170,9 +171,12 @@ impl Problem {
 fn least(slacks: &[Slack]) -> f64 {
     let values = slacks.iter().map(|slack| slack.value);
     // A slack that is not a number must not be overlooked.
-    values.fold(f64::INFINITY, |least, value| match value.is_nan() {
-        true => f64::NEG_INFINITY,
-        false => least.min(value),
+    values.fold(f64::INFINITY, |least, value| {
+        if value.is_nan() {
+            f64::NEG_INFINITY
+        } else {
+            least.min(value)
+        }
     })
 }
 

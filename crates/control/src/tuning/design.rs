@@ -179,17 +179,19 @@ impl DesignTask {
     }
 
     fn disturbance_features(&self) -> Vec<(f64, f64)> {
-        match self.requirements.needs_variances() {
-            true => self.disturbance.features(),
-            false => Vec::new(),
+        if self.requirements.needs_variances() {
+            self.disturbance.features()
+        } else {
+            Vec::new()
         }
     }
 
     /// The sampled plant with what the requirements need.
     pub(super) fn completed(&self, sampled: SampledPlant, plant: &DesignPlant) -> SampledPlant {
-        match self.requirements.needs_variances() {
-            true => with_variances(sampled, plant, &self.disturbance),
-            false => sampled,
+        if self.requirements.needs_variances() {
+            with_variances(sampled, plant, &self.disturbance)
+        } else {
+            sampled
         }
     }
 

@@ -231,9 +231,10 @@ impl Requirements {
         let required = self.required_distance(omega_rad_s, target);
         // Below the least distance the logarithm is continued by its tangent.
         let ratio = at.distance / LEAST_DISTANCE;
-        let logarithm = match ratio > 1.0 {
-            true => libm::log(ratio),
-            false => ratio - 1.0,
+        let logarithm = if ratio > 1.0 {
+            libm::log(ratio)
+        } else {
+            ratio - 1.0
         };
         Some(logarithm + libm::log(LEAST_DISTANCE / required))
     }
@@ -323,9 +324,10 @@ impl Requirements {
     /// The largest factor of |S| that a requirement limits to 1 at a frequency of a grid.
     pub fn sensitivity_weight(&self, grid: &[f64], point: usize, target: f64) -> f64 {
         let w = grid[point];
-        let goal = match w <= target {
-            true => self.required_distance(w, target),
-            false => 0.0,
+        let goal = if w <= target {
+            self.required_distance(w, target)
+        } else {
+            0.0
         };
         let limits = self.max_sensitivity.iter();
         let here = limits.filter(|limit| nearest(grid, limit.omega_rad_s) == point);
@@ -384,9 +386,10 @@ fn nearest(grid: &[f64], omega_rad_s: f64) -> usize {
         .partition_point(|w| *w < omega_rad_s)
         .min(grid.len() - 1);
     let before = after.saturating_sub(1);
-    match omega_rad_s - grid[before] < grid[after] - omega_rad_s {
-        true => before,
-        false => after,
+    if omega_rad_s - grid[before] < grid[after] - omega_rad_s {
+        before
+    } else {
+        after
     }
 }
 

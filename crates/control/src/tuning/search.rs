@@ -141,12 +141,11 @@ fn is_peak(response: &[nalgebra::Complex<f64>], i: usize) -> bool {
 /// The cascade with a biquad that has equal zeros and poles at a random frequency.
 fn with_neutral_biquad(problem: &Problem, cascade: &Cascade, random: &mut Pcg64) -> Cascade {
     let limits = &problem.limits;
-    let omega_rad_s = match uniform(random) < NEAR_MODES {
-        true => near_mode_rad_s(problem, random),
-        false => {
-            let low = 20.0 * limits.lowest_rad_s;
-            low * libm::pow(limits.pole_rad_s / low, uniform(random))
-        }
+    let omega_rad_s = if uniform(random) < NEAR_MODES {
+        near_mode_rad_s(problem, random)
+    } else {
+        let low = 20.0 * limits.lowest_rad_s;
+        low * libm::pow(limits.pole_rad_s / low, uniform(random))
     };
     let least = limits.pole_damping_ratio;
     let damping_ratio = least * libm::pow(1.0 / least, uniform(random));

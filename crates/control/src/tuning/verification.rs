@@ -125,9 +125,10 @@ impl DesignTask {
             };
             (keeps, attained)
         };
-        match rank(&second) > rank(&first) {
-            true => Ok(second),
-            false => Ok(first),
+        if rank(&second) > rank(&first) {
+            Ok(second)
+        } else {
+            Ok(first)
         }
     }
 

@@ -67,12 +67,13 @@ async fn object<T: DeserializeOwned>(
         .await
         .map_err(|rejection| unusable(rejection.status(), &rejection.body_text()))?;
     // An array of the fields can be read as the object, too.
-    match bytes.trim_ascii_start().starts_with(b"{") {
-        true => Ok(body),
-        false => Err(unusable(
+    if bytes.trim_ascii_start().starts_with(b"{") {
+        Ok(body)
+    } else {
+        Err(unusable(
             StatusCode::UNPROCESSABLE_ENTITY,
             "it is no object",
-        )),
+        ))
     }
 }
 

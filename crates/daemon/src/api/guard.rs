@@ -77,9 +77,10 @@ impl Guard {
         self.check_host(headers)?;
         self.check_origin(headers)?;
         let only_reads = matches!(*method, Method::GET | Method::HEAD | Method::OPTIONS);
-        match only_reads || is_stop {
-            true => Ok(()),
-            false => self.check_token(headers),
+        if only_reads || is_stop {
+            Ok(())
+        } else {
+            self.check_token(headers)
         }
     }
 
@@ -87,12 +88,13 @@ impl Guard {
     /// cannot use the daemon (DNS rebinding).
     fn check_host(&self, headers: &HeaderMap) -> Result<(), ApiError> {
         let host = text(headers, header::HOST).unwrap_or_default();
-        match is_own_name(host) {
-            true => Ok(()),
-            false => Err(ApiError::forbidden(format!(
+        if is_own_name(host) {
+            Ok(())
+        } else {
+            Err(ApiError::forbidden(format!(
                 "the host `{host}` is not this daemon; use its address, for example http://{}",
                 self.address
-            ))),
+            )))
         }
     }
 
@@ -103,22 +105,24 @@ impl Guard {
         };
         let origin = String::from_utf8_lossy(origin.as_bytes());
         let host = text(headers, header::HOST).unwrap_or_default();
-        match origin.strip_prefix("http://") == Some(host) {
-            true => Ok(()),
-            false => Err(ApiError::forbidden(format!(
+        if origin.strip_prefix("http://") == Some(host) {
+            Ok(())
+        } else {
+            Err(ApiError::forbidden(format!(
                 "a page of {origin} may not use the daemon; open the page of the daemon itself"
-            ))),
+            )))
         }
     }
 
     fn check_token(&self, headers: &HeaderMap) -> Result<(), ApiError> {
         let given = text(headers, header::AUTHORIZATION);
         let given = given.and_then(|text| text.strip_prefix("Bearer "));
-        match given.is_some_and(|given| self.token.is(given)) {
-            true => Ok(()),
-            false => Err(ApiError::unauthorized(
+        if given.is_some_and(|given| self.token.is(given)) {
+            Ok(())
+        } else {
+            Err(ApiError::unauthorized(
                 "this request needs the token of the daemon; send the header `Authorization: Bearer TOKEN` (the daemon prints where the token is)",
-            )),
+            ))
         }
     }
 }

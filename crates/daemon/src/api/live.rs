@@ -164,9 +164,10 @@ async fn receive_after(
 
 /// What a client gets that was sent before it connected. Each message is made when the client has taken the one before.
 fn first_messages(daemon: &Daemon, query: &LiveQuery) -> impl Iterator<Item = Message> + use<> {
-    let history = match query.history {
-        true => daemon.live.history(),
-        false => Vec::new(),
+    let history = if query.history {
+        daemon.live.history()
+    } else {
+        Vec::new()
     };
     let snapshot = daemon.live.snapshot();
     let events = snapshot.events.into_iter();

@@ -125,9 +125,10 @@ fn with_errors(operation: TransformOperation<'_>) -> TransformOperation<'_> {
     let mut operation = operation.response::<503, ApiError>();
     let responses = operation.inner_mut().responses.as_ref();
     let errors = StatusCode::Range(4);
-    match responses.is_some_and(|responses| responses.responses.contains_key(&errors)) {
-        true => operation,
-        false => operation.response_range::<4, ApiError>(),
+    if responses.is_some_and(|responses| responses.responses.contains_key(&errors)) {
+        operation
+    } else {
+        operation.response_range::<4, ApiError>()
     }
 }
 

@@ -108,9 +108,10 @@ pub async fn check(
 
 /// The name of a profile, or the path of a file in the folder of the recordings, as for a command.
 fn in_folder(daemon: &Daemon, name: String) -> String {
-    match profiles::is_known(&name) {
-        true => name,
-        false => daemon.recordings.join(name).display().to_string(),
+    if profiles::is_known(&name) {
+        name
+    } else {
+        daemon.recordings.join(name).display().to_string()
     }
 }
 

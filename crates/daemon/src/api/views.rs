@@ -218,9 +218,10 @@ pub fn state(daemon: &Daemon) -> StateView {
 fn daemon_view(daemon: &Daemon) -> DaemonView {
     let configuration = daemon.configuration();
     let rig = daemon.owner.status();
-    let kind = match is_simulated(&configuration.config) {
-        true => "simulated",
-        false => "devices",
+    let kind = if is_simulated(&configuration.config) {
+        "simulated"
+    } else {
+        "devices"
     };
     let (amplifier, probe) = rig
         .names

@@ -19,10 +19,7 @@ pub type Sample = [f32; SIGNALS];
 pub fn sample(tick: &TickRecord, is_closed: bool) -> Sample {
     let is_valid = tick.validity == Validity::Valid;
     let is_active = is_closed && tick.flags & flag::ACTIVE != 0;
-    let known = |value: f64, is_known: bool| match is_known {
-        true => value as f32,
-        false => f32::NAN,
-    };
+    let known = |value: f64, is_known: bool| if is_known { value as f32 } else { f32::NAN };
     [
         tick.reference_m as f32,
         known(tick.position_m, is_valid),

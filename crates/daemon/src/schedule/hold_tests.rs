@@ -104,9 +104,10 @@ impl Expected {
                 note: String::new(),
                 on_disconnect: behaviours[random.below(behaviours.len())],
             },
-            carrier: match is_attached {
-                true => Carrier::Attached,
-                false => Carrier::Started { ticket },
+            carrier: if is_attached {
+                Carrier::Attached
+            } else {
+                Carrier::Started { ticket }
             },
             operator: format!("operator {who}"),
             lease: (!is_attached).then(|| Secret::known(self.given[who].clone())),
@@ -114,9 +115,10 @@ impl Expected {
         let queued = self.schedule.enqueue(new, self.now);
         if let Ok(id) = queued {
             let phase = self.schedule.entry(id).map(|entry| entry.phase);
-            let expected = match self.is_held {
-                true => Phase::Held,
-                false => Phase::Queued,
+            let expected = if self.is_held {
+                Phase::Held
+            } else {
+                Phase::Queued
             };
             assert_eq!(phase, Ok(expected), "a new command says whether it waits");
         }
@@ -148,9 +150,10 @@ impl Expected {
     fn begin_run(&mut self, random: &mut Chance) {
         let ids: Vec<u64> = self.schedule.open().map(|entry| entry.id).collect();
         // Also a command that has ended, or waits, may order a run.
-        let id = match ids.is_empty() {
-            true => random.below(5) as u64,
-            false => ids[random.below(ids.len())],
+        let id = if ids.is_empty() {
+            random.below(5) as u64
+        } else {
+            ids[random.below(ids.len())]
         };
         let had_turn = self.turn().is_some_and(|(turn, _)| turn == id);
         let begun = self.schedule.begin_run(id, |entry| {
@@ -171,9 +174,10 @@ impl Expected {
             .current()
             .is_some_and(|entry| entry.stop.was_raised());
         let ended = EndedRun {
-            outcome: match trips {
-                true => RunOutcome::Tripped,
-                false => RunOutcome::Stopped,
+            outcome: if trips {
+                RunOutcome::Tripped
+            } else {
+                RunOutcome::Stopped
             },
             recording: None,
             message: None,
@@ -206,9 +210,10 @@ impl Expected {
         let has_turn = self.turn().is_some_and(|(turn, _)| turn == id);
         let stopped = self.schedule.stop(id, kind, "somebody", self.now);
         assert_eq!(stopped, Ok(()));
-        match has_turn {
-            true => self.note_stop(),
-            false => assert!(self.schedule.open().all(|entry| entry.id != id)),
+        if has_turn {
+            self.note_stop()
+        } else {
+            assert!(self.schedule.open().all(|entry| entry.id != id))
         }
     }
 
@@ -240,9 +245,10 @@ impl Expected {
     fn step(&mut self, random: &mut Chance) {
         let which = random.below(3);
         let who = random.below(OPERATORS);
-        let kind = match random.coin() {
-            true => StopKind::Cut,
-            false => StopKind::Settle,
+        let kind = if random.coin() {
+            StopKind::Cut
+        } else {
+            StopKind::Settle
         };
         match random.below(24) {
             0..3 => self.take_lease(who),

@@ -70,10 +70,7 @@ fn step() -> impl Strategy<Value = Step> {
 }
 
 fn kind(cut: bool) -> StopKind {
-    match cut {
-        true => StopKind::Cut,
-        false => StopKind::Settle,
-    }
+    if cut { StopKind::Cut } else { StopKind::Settle }
 }
 
 fn request(command: Command, on_disconnect: OnDisconnect) -> RunRequest {
@@ -200,9 +197,10 @@ impl Bench {
         };
         let id = running.id;
         let ended = EndedRun {
-            outcome: match trips {
-                true => RunOutcome::Tripped,
-                false => RunOutcome::Completed,
+            outcome: if trips {
+                RunOutcome::Tripped
+            } else {
+                RunOutcome::Completed
             },
             recording: None,
             message: None,

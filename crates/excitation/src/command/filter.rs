@@ -55,9 +55,10 @@ impl CommandFilter {
         let (first, last) = filter.span_ticks();
         let (taps, ticks) = (filter.all_taps().count(), last.saturating_sub(first));
         let max = CommandFilter::MAX_TAPS;
-        match taps > max || ticks > max as i64 {
-            true => Err(CommandFilterError::Long { taps, ticks, max }),
-            false => Ok(filter),
+        if taps > max || ticks > max as i64 {
+            Err(CommandFilterError::Long { taps, ticks, max })
+        } else {
+            Ok(filter)
         }
     }
 

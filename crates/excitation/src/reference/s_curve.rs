@@ -91,9 +91,10 @@ impl Profile {
         let distance_m = settings.amplitude_m.abs();
         let (jerk_s, acceleration_s) = to_speed_s(settings);
         let cruise_s = distance_m / settings.speed_m_per_s - acceleration_s;
-        let (jerk_s, acceleration_s) = match cruise_s >= 0.0 {
-            true => (jerk_s, acceleration_s),
-            false => to_half_way_s(distance_m, settings),
+        let (jerk_s, acceleration_s) = if cruise_s >= 0.0 {
+            (jerk_s, acceleration_s)
+        } else {
+            to_half_way_s(distance_m, settings)
         };
         Profile {
             distance_m,

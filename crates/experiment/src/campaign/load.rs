@@ -128,9 +128,10 @@ impl Load {
 }
 
 fn weight_name(is_down: bool) -> &'static str {
-    match is_down {
-        true => "weight in -Y",
-        false => "weight in +Y",
+    if is_down {
+        "weight in -Y"
+    } else {
+        "weight in +Y"
     }
 }
 
@@ -161,8 +162,9 @@ fn instruction(name: &str, now_kg: f64, before_kg: f64, unit: Unit) -> String {
 }
 
 fn total(name: &str, kg: f64, unit: Unit) -> String {
-    match kg < NEGLIGIBLE_KG {
-        true => format!("{name}: nothing"),
-        false => format!("{name}: {} in total", unit.amount(kg)),
+    if kg < NEGLIGIBLE_KG {
+        format!("{name}: nothing")
+    } else {
+        format!("{name}: {} in total", unit.amount(kg))
     }
 }

@@ -206,17 +206,20 @@ impl ExpectedModes {
     fn finding(&self, k: usize, seen: Option<(f64, char)>, expected_sign: Option<char>) -> Finding {
         let Some((hz, sign)) = seen else {
             let must_be_visible = residue_ratio(&self.loaded, k) > VISIBLE_RATIO;
-            return match must_be_visible {
-                true => Finding::Fails,
-                false => Finding::CannotTell,
+            return if must_be_visible {
+                Finding::Fails
+            } else {
+                Finding::CannotTell
             };
         };
         let is_frequency_off = distance(hz, self.expected_hz(k)) > self.tolerance;
         let is_sign_wrong = expected_sign.is_some_and(|expected| expected != sign);
-        match is_frequency_off || is_sign_wrong {
-            true => Finding::Fails,
-            false if self.distinguishes_the_load(k) => Finding::Holds,
-            false => Finding::CannotTell,
+        if is_frequency_off || is_sign_wrong {
+            Finding::Fails
+        } else if self.distinguishes_the_load(k) {
+            Finding::Holds
+        } else {
+            Finding::CannotTell
         }
     }
 

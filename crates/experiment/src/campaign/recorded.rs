@@ -99,9 +99,10 @@ fn grid(folder: &Path) -> Result<Grid, String> {
     if measured.method == Method::UntilDecided {
         return Err(SHORT_CHIRPS.into());
     }
-    match grid.operating_points.is_empty() || grid.asymmetries.is_empty() {
-        true => Err(format!("has a campaign without points; {remedy}")),
-        false => Ok(grid),
+    if grid.operating_points.is_empty() || grid.asymmetries.is_empty() {
+        Err(format!("has a campaign without points; {remedy}"))
+    } else {
+        Ok(grid)
     }
 }
 

@@ -218,12 +218,13 @@ impl CertificateText {
         }
         let frf = frf_csv::from_str(&self.frf_csv);
         let frf = frf.map_err(|error| damaged(&self.name, error.to_string().replace(';', ",")))?;
-        match frf.is_empty() {
-            true => Err(damaged(
+        if frf.is_empty() {
+            Err(damaged(
                 &self.name,
                 "its response has no frequencies".into(),
-            )),
-            false => Ok(LoadedCertificate { certificate, frf }),
+            ))
+        } else {
+            Ok(LoadedCertificate { certificate, frf })
         }
     }
 }
@@ -286,13 +287,12 @@ fn parsed(name: &str, json: &str) -> Result<Certificate, CertificateError> {
             format!("it is not a certificate of `bench chirp`: {error}"),
         )
     })?;
-    match certificate.format == FORMAT {
-        true => Ok(certificate),
-        false => {
-            let format = certificate.format;
-            let why = format!("its format {format} is not {FORMAT}, that of this version of bench");
-            Err(damaged(name, why))
-        }
+    if certificate.format == FORMAT {
+        Ok(certificate)
+    } else {
+        let format = certificate.format;
+        let why = format!("its format {format} is not {FORMAT}, that of this version of bench");
+        Err(damaged(name, why))
     }
 }
 

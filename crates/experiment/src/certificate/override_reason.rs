@@ -37,9 +37,10 @@ impl FromStr for OverrideReason {
         if !(MIN_CHARACTERS..=MAX_CHARACTERS).contains(&characters) {
             return Err(ReasonError::Length(characters));
         }
-        match text.chars().any(char::is_control) {
-            true => Err(ReasonError::Control),
-            false => Ok(OverrideReason(text.into())),
+        if text.chars().any(char::is_control) {
+            Err(ReasonError::Control)
+        } else {
+            Ok(OverrideReason(text.into()))
         }
     }
 }

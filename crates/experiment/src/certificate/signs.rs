@@ -103,9 +103,10 @@ fn frequencies(modes: &[(f64, char)]) -> Vec<f64> {
 /// The sign of a residue; `?` if it is not certain.
 fn sign(mode: &FittedMode) -> char {
     let residue = mode.residue_per_kg;
-    match residue.value.abs() > SIGMAS_95 * residue.sigma {
-        true => mode.sign(),
-        false => '?',
+    if residue.value.abs() > SIGMAS_95 * residue.sigma {
+        mode.sign()
+    } else {
+        '?'
     }
 }
 

@@ -133,12 +133,13 @@ fn no_shift_text(modes: &[ModeOverAmplitude]) -> String {
         .map(|mode| format!("{:.2} Hz", mode.frequency_hz()))
         .collect();
     let text = "no mode shifts with amplitude by more than its errors";
-    match incomplete.is_empty() {
-        true => text.into(),
-        false => format!(
+    if incomplete.is_empty() {
+        text.into()
+    } else {
+        format!(
             "{text}; not found at every amplitude: {}",
             incomplete.join(", ")
-        ),
+        )
     }
 }
 

@@ -75,9 +75,10 @@ impl RunResult {
         let plan = Plan::of(recording)?;
         let is_loop = plan.kind == RunKind::Control;
         let is_swept = is_loop && plan.config.control.reference.is_swept();
-        let (analysis, why) = match plan.kind == RunKind::Chirp || is_swept {
-            true => analysed(recording, &plan.config, progress)?,
-            false => (None, None),
+        let (analysis, why) = if plan.kind == RunKind::Chirp || is_swept {
+            analysed(recording, &plan.config, progress)?
+        } else {
+            (None, None)
         };
         Ok(RunResult {
             label: label(recording),
@@ -89,9 +90,10 @@ impl RunResult {
             lost_records: recording.lost_records(),
             analysis,
             why,
-            control: match is_loop {
-                true => Some(control_run(recording, &plan)?),
-                false => None,
+            control: if is_loop {
+                Some(control_run(recording, &plan)?)
+            } else {
+                None
             },
             config: plan.config,
         })

@@ -47,9 +47,10 @@ pub(super) fn next_shot(
     let best = best?;
     // The certainty grows with the square root of the time.
     let needs_s = best.shot.duration_s * (RESERVE / best.certainty).powi(2);
-    Some(match needs_s <= left_s {
-        true => NextShot::Take(best.shot),
-        false => NextShot::Needs(needs_s),
+    Some(if needs_s <= left_s {
+        NextShot::Take(best.shot)
+    } else {
+        NextShot::Needs(needs_s)
     })
 }
 

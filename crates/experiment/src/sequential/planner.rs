@@ -115,9 +115,10 @@ impl<'a> SequentialExperiment<'a> {
             Some(NextShot::Take(shot)) => shot,
             Some(NextShot::Needs(_)) | None => repeated(&self.first.shot, self.shots.len()),
         };
-        match shot.duration_s <= left_s {
-            true => Ok(Step::Shot(Box::new(self.planned(shot)?))),
-            false => Ok(Step::End(SequenceEnd::LimitReached)),
+        if shot.duration_s <= left_s {
+            Ok(Step::Shot(Box::new(self.planned(shot)?)))
+        } else {
+            Ok(Step::End(SequenceEnd::LimitReached))
         }
     }
 

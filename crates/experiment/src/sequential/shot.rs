@@ -53,13 +53,14 @@ impl Shot {
             high_hz: high_hz.min(ABOVE_LAST_MODE * last_hz),
             duration_s: FIRST_PERIODS / first_hz,
         };
-        Ok(match around.low_hz < around.high_hz {
-            true => around,
-            false => Shot {
+        Ok(if around.low_hz < around.high_hz {
+            around
+        } else {
+            Shot {
                 low_hz,
                 high_hz,
                 ..around
-            },
+            }
         })
     }
 

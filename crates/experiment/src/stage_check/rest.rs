@@ -76,9 +76,10 @@ impl Vibration {
     /// The rest until a permitted amplitude, at least `least_s`.
     fn rest(&self, permitted_m: f64, least_s: f64) -> RestAfterCheck {
         let excess = (self.amplitude_m / permitted_m).max(1.0);
-        let needed_s = match excess > 1.0 {
-            true => libm::log(excess) / self.decay_per_s,
-            false => 0.0,
+        let needed_s = if excess > 1.0 {
+            libm::log(excess) / self.decay_per_s
+        } else {
+            0.0
         };
         // A mode that does not decay needs an infinite time.
         let rest_s = needed_s.min(LONGEST_S).max(least_s);

@@ -170,13 +170,14 @@ fn check_static_response(
     let major = major_modes_rad_s(fit)
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    match STATIC_RATIO.contains(&ratio) && hz(major) >= first_hz {
-        true => Ok(()),
-        false => Err(TuneSourceError::Static {
+    if STATIC_RATIO.contains(&ratio) && hz(major) >= first_hz {
+        Ok(())
+    } else {
+        Err(TuneSourceError::Static {
             file: source.file.clone(),
             ratio,
             first_hz,
-        }),
+        })
     }
 }
 
@@ -193,16 +194,17 @@ fn check_unit(source: &FrfSource, config: &Config) -> Result<(), TuneSourceError
         config.interlock.soft_limit_m,
     );
     let ratio = response_m_per_a * current_a / travel_m;
-    match (1.0 / MAX_TRAVEL_RATIO..=MAX_TRAVEL_RATIO).contains(&ratio) {
-        true => Ok(()),
-        false => Err(TuneSourceError::Unit {
+    if (1.0 / MAX_TRAVEL_RATIO..=MAX_TRAVEL_RATIO).contains(&ratio) {
+        Ok(())
+    } else {
+        Err(TuneSourceError::Unit {
             file: source.file.clone(),
             response_m_per_a,
             frequency_hz,
             current_a,
             travel_m,
             ratio,
-        }),
+        })
     }
 }
 

@@ -85,12 +85,13 @@ pub(super) fn groups(modes: &[FittedMode]) -> Vec<Vec<usize>> {
         }
     }
     let determined = |group: &Vec<usize>| group.iter().all(|k| is_determined(&modes[*k]));
-    let split = groups
-        .into_iter()
-        .flat_map(|group| match determined(&group) {
-            true => group.into_iter().map(|k| vec![k]).collect(),
-            false => vec![group],
-        });
+    let split = groups.into_iter().flat_map(|group| {
+        if determined(&group) {
+            group.into_iter().map(|k| vec![k]).collect()
+        } else {
+            vec![group]
+        }
+    });
     split.collect()
 }
 

@@ -122,12 +122,13 @@ impl DatumNodes {
         spread_hz: f64,
     ) -> DatumNodes {
         let node = |frequency_hz| Node::new(chain, far, frequency_hz);
-        match spread_hz == 0.0 {
-            true => DatumNodes(node(frequency_hz), None),
-            false => DatumNodes(
+        if spread_hz == 0.0 {
+            DatumNodes(node(frequency_hz), None)
+        } else {
+            DatumNodes(
                 node(frequency_hz - spread_hz),
                 Some(node(frequency_hz + spread_hz)),
-            ),
+            )
         }
     }
 

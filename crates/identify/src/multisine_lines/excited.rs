@@ -61,9 +61,10 @@ fn distortion_limit(lines: &[&Line]) -> f64 {
         _ => true,
     };
     let outside = others.iter().filter(|line| !pattern.contains(line.1));
-    match is_distortion && 4 * outside.count() >= others.len() {
-        true => others[0].0,
-        false => 0.0,
+    if is_distortion && 4 * outside.count() >= others.len() {
+        others[0].0
+    } else {
+        0.0
     }
 }
 

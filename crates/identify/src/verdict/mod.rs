@@ -161,11 +161,10 @@ fn missing_modes(input: &VerdictInput<'_>, found: usize) -> Option<String> {
         return None;
     }
     let (up_to_hz, (_, last_hz)) = (hertz(input.up_to_rad_s), input.fit.band_hz);
-    let remedy = match last_hz < up_to_hz {
-        true => format!(
-            "the excitation ends at {last_hz:.0} Hz: extend it to more than {up_to_hz:.0} Hz"
-        ),
-        false => "increase the amplitude there, or the duration".into(),
+    let remedy = if last_hz < up_to_hz {
+        format!("the excitation ends at {last_hz:.0} Hz: extend it to more than {up_to_hz:.0} Hz")
+    } else {
+        "increase the amplitude there, or the duration".into()
     };
     Some(format!(
         "only {found} of the {expected} modes that the model has up to {up_to_hz:.0} Hz are found; {remedy}"

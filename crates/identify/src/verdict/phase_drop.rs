@@ -227,9 +227,12 @@ mod tests {
             let s = Complex::new(0.0, *w);
             let mode = |(w, z): (f64, f64)| (s * s / (w * w) + s * (2.0 * z / w) + 1.0).inv();
             let poles: Complex<f64> = POLES.map(mode).iter().product();
-            let zero = |z: &Complex<f64>| match z.im == 0.0 {
-                true => (s - z) / z.norm(),
-                false => (s - z) * (s - z.conj()) / z.norm_sqr(),
+            let zero = |z: &Complex<f64>| {
+                if z.im == 0.0 {
+                    (s - z) / z.norm()
+                } else {
+                    (s - z) * (s - z.conj()) / z.norm_sqr()
+                }
             };
             poles * zeros.iter().map(zero).product::<Complex<f64>>()
         };

@@ -107,9 +107,10 @@ impl std::fmt::Display for ZeroCounts {
             named(self.quartets, "CMP-CNMP"),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
-        match parts.is_empty() {
-            true => f.write_str("none"),
-            false => f.write_str(&parts.join(" + ")),
+        if parts.is_empty() {
+            f.write_str("none")
+        } else {
+            f.write_str(&parts.join(" + "))
         }
     }
 }

@@ -205,9 +205,10 @@ fn nice_step(step: f64) -> f64 {
 fn plain(value: f64) -> String {
     let digits = (8 - libm::log10(value.abs().max(1e-9)).ceil() as i32).clamp(0, 15) as usize;
     let text = format!("{value:.digits$}");
-    let text = match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.'),
-        false => &text,
+    let text = if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &text
     };
     text.replace('-', "\u{2212}")
 }

@@ -46,9 +46,10 @@ impl Pen {
     /// The line of the curve with this index among curves of one kind: dashed where its colour is repeated.
     pub(crate) fn of_series(index: usize) -> Pen {
         let colour = series_colour(index);
-        match is_colour_repeated(index) {
-            false => Pen::solid(colour),
-            true => Pen::dashed(colour),
+        if !is_colour_repeated(index) {
+            Pen::solid(colour)
+        } else {
+            Pen::dashed(colour)
         }
     }
 

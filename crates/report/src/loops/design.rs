@@ -173,8 +173,9 @@ pub fn design_nyquist_svg(
 /// A point near the plot; points far away leave a gap.
 fn visible((x, y): (f64, f64)) -> (f64, f64) {
     const FAR: f64 = 50.0;
-    match x.abs() < FAR && y.abs() < FAR {
-        true => (x, y),
-        false => (f64::NAN, f64::NAN),
+    if x.abs() < FAR && y.abs() < FAR {
+        (x, y)
+    } else {
+        (f64::NAN, f64::NAN)
     }
 }

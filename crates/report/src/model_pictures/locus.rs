@@ -86,9 +86,10 @@ fn plane(locus: &Locus, tracks: &[Vec<Option<Complex<f64>>>], limit_rad_s: f64) 
     let (first, last) = (locus.values[0], locus.values[locus.values.len() - 1]);
     let [first, last] = [first, last].map(setting_number);
     chart.heading = format!("From {first} (ring) to {last} (dot)");
-    match places.is_empty() {
-        true => chart,
-        false => chart.points("change of the kind", INK, Symbol::Cross, places),
+    if places.is_empty() {
+        chart
+    } else {
+        chart.points("change of the kind", INK, Symbol::Cross, places)
     }
 }
 

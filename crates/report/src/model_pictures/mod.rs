@@ -49,13 +49,15 @@ fn setting_text(key: &str, value: f64) -> String {
 
 /// A value of a setting with four significant digits, without zeros at its end.
 fn setting_number(value: f64) -> String {
-    let size = match value == 0.0 {
-        true => "0".into(),
-        false => significant(value.abs(), 4),
+    let size = if value == 0.0 {
+        "0".into()
+    } else {
+        significant(value.abs(), 4)
     };
-    let size = match size.contains('.') {
-        true => size.trim_end_matches('0').trim_end_matches('.'),
-        false => &size,
+    let size = if size.contains('.') {
+        size.trim_end_matches('0').trim_end_matches('.')
+    } else {
+        &size
     };
     let sign = if value < 0.0 { "\u{2212}" } else { "" };
     format!("{sign}{size}")

@@ -40,9 +40,10 @@ pub fn model_step_svg(
 
 /// Modes are named by frequency: the response has only the observable ones, so that their numbers differ from those of other results.
 fn part_name(frequency_hz: f64) -> String {
-    match frequency_hz > 0.0 {
-        true => format!("part of the mode at {}", frequency_text(frequency_hz)),
-        false => "part of the rigid body".into(),
+    if frequency_hz > 0.0 {
+        format!("part of the mode at {}", frequency_text(frequency_hz))
+    } else {
+        "part of the rigid body".into()
     }
 }
 

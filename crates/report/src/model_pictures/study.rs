@@ -146,9 +146,10 @@ fn share_chart(heading: &str, shares: &[Share]) -> Chart {
     let mut before = None;
     for (row, share) in (0..).zip(shares) {
         // Only the first bar of a kind has an entry in the legend.
-        let name = match before == Some(share.effect) {
-            true => "",
-            false => share.effect.legend_name(),
+        let name = if before == Some(share.effect) {
+            ""
+        } else {
+            share.effect.legend_name()
         };
         chart = with_share(chart, -f64::from(row), share, name);
         before = Some(share.effect);

@@ -62,9 +62,10 @@ pub fn veering_caption(point: &VeeringPoint, vary: &str) -> String {
 
 /// The gap of two modes that cross is not exactly 0.
 fn gap_text(gap_hz: f64) -> String {
-    match gap_hz < MIN_GAP_HZ {
-        true => format!("below {MIN_GAP_HZ} Hz"),
-        false => format!("{} Hz", significant(gap_hz, 3)),
+    if gap_hz < MIN_GAP_HZ {
+        format!("below {MIN_GAP_HZ} Hz")
+    } else {
+        format!("{} Hz", significant(gap_hz, 3))
     }
 }
 

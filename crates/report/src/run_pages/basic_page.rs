@@ -35,9 +35,10 @@ impl BasicReport<'_> {
     /// When drawing fails.
     pub fn page(&self) -> Result<String, ReportError> {
         let title = &self.config.title;
-        let signals = match self.overview.current_a.is_empty() {
-            true => String::new(),
-            false => signals_section(self.overview)?,
+        let signals = if self.overview.current_a.is_empty() {
+            String::new()
+        } else {
+            signals_section(self.overview)?
         };
         let rate = format!("{} Hz", self.config.servo.rate_hz);
         let conditions = run_facts::conditions(self.recording, self.config);
@@ -137,9 +138,10 @@ fn rest_position(rest: &RestPosition) -> String {
 }
 
 fn stage_check(check: &StageCheck) -> String {
-    let (class, verdict) = match check.agrees {
-        true => ("excluded", "the stage agrees with the certificate"),
-        false => ("detected", "the stage does not agree with the certificate"),
+    let (class, verdict) = if check.agrees {
+        ("excluded", "the stage agrees with the certificate")
+    } else {
+        ("detected", "the stage does not agree with the certificate")
     };
     let why = check.refusal().map(|refusal| refusal.to_string());
     let why = escaped(&why.unwrap_or_default());

@@ -197,9 +197,10 @@ impl<'a> BenchRun<'a> {
 
 /// A least allowed modulus margin of 0 is none, and no limit is drawn.
 fn sensitivity_caption(min_modulus_margin: f64) -> String {
-    let limit = match min_modulus_margin > 0.0 {
-        true => SENSITIVITY_LIMIT_CAPTION,
-        false => "",
+    let limit = if min_modulus_margin > 0.0 {
+        SENSITIVITY_LIMIT_CAPTION
+    } else {
+        ""
     };
     [SENSITIVITY_CAPTION, limit].concat()
 }

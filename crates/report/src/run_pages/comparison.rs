@@ -114,9 +114,10 @@ fn drawn_s(step: &StepResponse) -> f64 {
         .chain(predicted_s)
         .fold(0.0, f64::max);
     let whole_s = step.positions_m.len() as f64 * step.period_s;
-    let wanted_s = match settling_s > 0.0 {
-        true => SETTLING_TIMES * settling_s,
-        false => whole_s,
+    let wanted_s = if settling_s > 0.0 {
+        SETTLING_TIMES * settling_s
+    } else {
+        whole_s
     };
     wanted_s.clamp(DRAWN_S.0, DRAWN_S.1).min(whole_s)
 }

@@ -288,9 +288,10 @@ impl ControlReport<'_> {
 
     /// The subtitle of the plots of the model.
     fn loop_subtitle(&self) -> String {
-        let stability = match self.run.model.margins.stable {
-            true => "stable",
-            false => "UNSTABLE",
+        let stability = if self.run.model.margins.stable {
+            "stable"
+        } else {
+            "UNSTABLE"
         };
         joined(&[&format!("{stability} by the model"), &self.subtitle()])
     }

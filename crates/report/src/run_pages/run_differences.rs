@@ -120,9 +120,10 @@ fn difference_row(name: &str, found: &Difference, factor: f64) -> String {
 
 fn unpaired(text: &str, frequencies_hz: &[f64]) -> String {
     let shown: Vec<String> = frequencies_hz.iter().map(|hz| plain(*hz, 2)).collect();
-    match shown.is_empty() {
-        true => String::new(),
-        false => note(&format!("{text}: modes at {} Hz.", shown.join(", "))),
+    if shown.is_empty() {
+        String::new()
+    } else {
+        note(&format!("{text}: modes at {} Hz.", shown.join(", ")))
     }
 }
 

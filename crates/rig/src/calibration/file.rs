@@ -319,9 +319,10 @@ impl Calibration {
             self.check_gains()?;
         }
         let (offset_a, limit_a) = (self.amplifier.current_offset_a, current_error_a);
-        match offset_a.abs() <= limit_a {
-            true => Ok(()),
-            false => Err(CalibrationDefect::CurrentOffset { offset_a, limit_a }),
+        if offset_a.abs() <= limit_a {
+            Ok(())
+        } else {
+            Err(CalibrationDefect::CurrentOffset { offset_a, limit_a })
         }
     }
 
@@ -330,9 +331,10 @@ impl Calibration {
         if !is_near_one(current) {
             return Err(CalibrationDefect::CurrentGain { gain: current });
         }
-        match is_near_one(probe.abs()) {
-            true => Ok(()),
-            false => Err(CalibrationDefect::ProbeGain { gain: probe }),
+        if is_near_one(probe.abs()) {
+            Ok(())
+        } else {
+            Err(CalibrationDefect::ProbeGain { gain: probe })
         }
     }
 

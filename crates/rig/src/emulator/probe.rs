@@ -138,9 +138,10 @@ fn measuring_rate_hz(probe: &ProbeSettings) -> Result<f64, SerialError> {
         Some(serial) => serial.protocol.decoder()?.request().is_some(),
         None => false,
     };
-    Ok(match is_polled {
-        true => MEASUREMENTS_PER_ANSWER * readings_hz,
-        false => readings_hz,
+    Ok(if is_polled {
+        MEASUREMENTS_PER_ANSWER * readings_hz
+    } else {
+        readings_hz
     })
 }
 

@@ -43,9 +43,10 @@ impl Moment {
     /// that a wall clock that was set forward does not shorten a wait.
     pub fn seconds_since(&self, earlier: &Moment) -> Option<f64> {
         let by_wall_s = self.unix_s - earlier.unix_s;
-        let elapsed_s = match !self.boot.is_empty() && self.boot == earlier.boot {
-            true => by_wall_s.min(self.since_boot_s - earlier.since_boot_s),
-            false => by_wall_s,
+        let elapsed_s = if !self.boot.is_empty() && self.boot == earlier.boot {
+            by_wall_s.min(self.since_boot_s - earlier.since_boot_s)
+        } else {
+            by_wall_s
         };
         (elapsed_s >= 0.0).then_some(elapsed_s)
     }

@@ -55,9 +55,10 @@ impl ThermalModel {
     /// The time in seconds without current until the state falls from `from_a2` to `to_a2`: tau ln(from/to); infinite if
     /// `to_a2` is not above 0.
     pub fn cooling_s(&self, from_a2: f64, to_a2: f64) -> f64 {
-        match from_a2 > to_a2 {
-            true => self.time_constant_s * libm::log(from_a2 / to_a2.max(0.0)),
-            false => 0.0,
+        if from_a2 > to_a2 {
+            self.time_constant_s * libm::log(from_a2 / to_a2.max(0.0))
+        } else {
+            0.0
         }
     }
 

@@ -101,14 +101,16 @@ impl SimulatedRig {
     /// The set-point that the amplifier accepts: limited in slope, rounded to its resolution, limited in size.
     fn accept(&self, current_a: f64) -> f64 {
         let change_a = current_a - self.accepted_a;
-        let reached_a = match change_a.abs() <= self.max_change_a {
-            true => current_a,
-            false => self.accepted_a + self.max_change_a.copysign(change_a),
+        let reached_a = if change_a.abs() <= self.max_change_a {
+            current_a
+        } else {
+            self.accepted_a + self.max_change_a.copysign(change_a)
         };
         let step_a = self.current_step_a;
-        let stepped_a = match step_a > 0.0 {
-            true => libm::round(reached_a / step_a) * step_a,
-            false => reached_a,
+        let stepped_a = if step_a > 0.0 {
+            libm::round(reached_a / step_a) * step_a
+        } else {
+            reached_a
         };
         stepped_a.clamp(-self.current_limit_a, self.current_limit_a)
     }

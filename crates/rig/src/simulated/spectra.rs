@@ -66,9 +66,10 @@ impl DisturbanceSpectra {
     /// The error of a reading, below half the rate of the loop.
     pub fn noise_m2_per_hz(&self, frequency_hz: f64) -> f64 {
         let white = 2.0 * self.noise_m2 / self.reading_hz;
-        match self.reading_hz < self.rate_hz {
-            true => white * squared(sinc(frequency_hz / self.reading_hz)),
-            false => white,
+        if self.reading_hz < self.rate_hz {
+            white * squared(sinc(frequency_hz / self.reading_hz))
+        } else {
+            white
         }
     }
 }
@@ -89,9 +90,10 @@ fn line_spectrum(line: &FloorLine, frequency_hz: f64) -> f64 {
 
 /// sin(pi x)/(pi x).
 fn sinc(x: f64) -> f64 {
-    match x == 0.0 {
-        true => 1.0,
-        false => libm::sin(PI * x) / (PI * x),
+    if x == 0.0 {
+        1.0
+    } else {
+        libm::sin(PI * x) / (PI * x)
     }
 }
 

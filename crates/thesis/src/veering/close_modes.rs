@@ -120,9 +120,10 @@ impl Remainder {
             mode: largest.map(|(mode, _)| mode),
             others_ratio: largest.map_or(0.0, |(_, term)| others.ratio_to(term, middle)),
             nearness_ratio: largest.map_or(0.0, |(_, term)| nearness(term, [wu, wv])),
-            integrator_ratio: match residue_per_kg == 0.0 {
-                true => 0.0,
-                false => deviation(wu).max(deviation(wv)),
+            integrator_ratio: if residue_per_kg == 0.0 {
+                0.0
+            } else {
+                deviation(wu).max(deviation(wv))
             },
         }
     }

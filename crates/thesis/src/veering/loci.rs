@@ -190,9 +190,10 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
         let ends = [self.path[closest - 1].value, self.path[closest + 1].value];
         self.refine(pair, ends)?;
         let at = self.path[self.closest(pair)].clone();
-        let meeting = match at.are_equal(pair) {
-            true => Meeting::Crossing,
-            false => Meeting::Veering,
+        let meeting = if at.are_equal(pair) {
+            Meeting::Crossing
+        } else {
+            Meeting::Veering
         };
         Ok((meeting, at))
     }
@@ -230,15 +231,19 @@ impl<E: From<PlantError>, F: FnMut(f64) -> Result<Structure, E>> Loci<F> {
     /// The modes at any value of the range, followed from those before it.
     pub fn at(&mut self, value: f64) -> Result<&ModesAt, E> {
         let is_rising = self.path[0].value < self.path[self.path.len() - 1].value;
-        let index = self.path.partition_point(|at| match is_rising {
-            true => at.value <= value,
-            false => at.value >= value,
+        let index = self.path.partition_point(|at| {
+            if is_rising {
+                at.value <= value
+            } else {
+                at.value >= value
+            }
         });
         // The range is that of the path, so that some value comes before.
         let next = index.max(1);
-        let index = match self.path[next - 1].value == value {
-            true => next - 1,
-            false => self.extend(next, value)?,
+        let index = if self.path[next - 1].value == value {
+            next - 1
+        } else {
+            self.extend(next, value)?
         };
         Ok(&self.path[index])
     }

@@ -94,18 +94,22 @@ impl ModesAt {
 
     /// Two modes with the remainder of all `terms`; `None` where the modes cross.
     pub(super) fn close_modes(&self, terms: &[ModalTerm], pair: [usize; 2]) -> Option<CloseModes> {
-        match self.are_equal(pair) {
-            true => None,
-            false => CloseModes::of(terms, pair),
+        if self.are_equal(pair) {
+            None
+        } else {
+            CloseModes::of(terms, pair)
         }
     }
 
     /// Gains of all modes; 0 where they are rounding.
     pub(super) fn gains(&self, row: &DVector<f64>) -> Vec<f64> {
         let gains: Vec<f64> = (0..self.count()).map(|mode| self.gain(mode, row)).collect();
-        let rounded = |i: usize| match gains[i].abs() <= self.rounding(&gains, i) {
-            true => 0.0,
-            false => gains[i],
+        let rounded = |i: usize| {
+            if gains[i].abs() <= self.rounding(&gains, i) {
+                0.0
+            } else {
+                gains[i]
+            }
         };
         (0..gains.len()).map(rounded).collect()
     }
@@ -231,9 +235,10 @@ impl ModesAt {
 
     /// 1 or -1 as mode i is faster or slower than mode j; 0 where they are equal.
     fn order(&self, i: usize, j: usize) -> f64 {
-        match self.are_equal([i, j]) {
-            true => 0.0,
-            false => (self.omega_rad_s[i] - self.omega_rad_s[j]).signum(),
+        if self.are_equal([i, j]) {
+            0.0
+        } else {
+            (self.omega_rad_s[i] - self.omega_rad_s[j]).signum()
         }
     }
 }

@@ -100,9 +100,12 @@ impl<'a> Path<'a> {
     /// The modes at the values of a grid, in their order, with those at the veering point.
     pub fn new(mut modes: Vec<&'a ModesAt>, closest: &'a ModesAt, pair: [usize; 2]) -> Path<'a> {
         let is_rising = modes[0].value < modes[modes.len() - 1].value;
-        let place = modes.partition_point(|at| match is_rising {
-            true => at.value < closest.value,
-            false => at.value > closest.value,
+        let place = modes.partition_point(|at| {
+            if is_rising {
+                at.value < closest.value
+            } else {
+                at.value > closest.value
+            }
         });
         if modes.get(place).is_none_or(|at| at.value != closest.value) {
             modes.insert(place, closest);
@@ -143,9 +146,10 @@ impl<'a> Path<'a> {
     /// the shapes do not turn but exchange their places: the diagrams at the neighbouring values are used.
     fn diagram_alternates(&self, ports: &[Ports]) -> bool {
         let (closest, last) = (self.closest, self.modes.len() - 1);
-        let starts = match self.modes[closest].are_equal(self.pair) {
-            true => [closest.saturating_sub(1), (closest + 1).min(last)],
-            false => [closest, closest],
+        let starts = if self.modes[closest].are_equal(self.pair) {
+            [closest.saturating_sub(1), (closest + 1).min(last)]
+        } else {
+            [closest, closest]
         };
         starts.into_iter().zip([0, last]).any(|(start, end)| {
             let (start, end) = (self.diagram(start, ports), self.diagram(end, ports));

@@ -109,9 +109,10 @@ fn all_hold(premises: &[Condition]) -> bool {
 pub fn p4_1(sample: &Sample) -> Option<Proposition> {
     let modes = sample.modes?;
     let premises = vec![c4_1(&modes), c4_2(&modes)];
-    let predicted = match all_hold(&premises) {
-        true => Prediction::Appear,
-        false => Prediction::Absent,
+    let predicted = if all_hold(&premises) {
+        Prediction::Appear
+    } else {
+        Prediction::Absent
     };
     Some(Proposition::new("P4-1", premises, predicted, &[sample]))
 }
@@ -203,9 +204,10 @@ impl<'a> Interval<'a> {
     }
 
     fn sufficient(&self, name: &'static str, premises: Vec<Condition>) -> Proposition {
-        let predicted = match all_hold(&premises) {
-            true => Prediction::Appear,
-            false => Prediction::Nothing,
+        let predicted = if all_hold(&premises) {
+            Prediction::Appear
+        } else {
+            Prediction::Nothing
         };
         Proposition::new(name, premises, predicted, &self.samples)
     }

@@ -56,9 +56,10 @@ impl QuadrantDiagram {
     pub fn of(at: &ModesAt, frame: &ModesAt, pair: [usize; 2], ports: &Ports) -> QuadrantDiagram {
         let [force, sensor] = ports;
         let [i, j] = pair;
-        let ordered = match at.omega_rad_s[i] <= at.omega_rad_s[j] {
-            true => [i, j],
-            false => [j, i],
+        let ordered = if at.omega_rad_s[i] <= at.omega_rad_s[j] {
+            [i, j]
+        } else {
+            [j, i]
         };
         let direction = |mode| unit(pair.map(|other| at.cosine(mode, frame, other)));
         let modes = at.close_modes(&at.terms(force, sensor), pair);
@@ -140,13 +141,17 @@ pub(super) fn residue_signs(residues: [f64; 3]) -> [char; 3] {
 fn components(at: &ModesAt, ordered: [usize; 2], row: &DVector<f64>) -> [f64; 2] {
     let raw: Vec<f64> = (0..at.count()).map(|mode| at.gain(mode, row)).collect();
     let length = raw.iter().map(|gain| gain * gain).sum::<f64>().sqrt();
-    let gains = match at.are_equal(ordered) {
-        true => raw,
-        false => at.gains(row),
+    let gains = if at.are_equal(ordered) {
+        raw
+    } else {
+        at.gains(row)
     };
-    ordered.map(|mode| match length > 0.0 {
-        true => gains[mode] / length,
-        false => 0.0,
+    ordered.map(|mode| {
+        if length > 0.0 {
+            gains[mode] / length
+        } else {
+            0.0
+        }
     })
 }
 

@@ -25,15 +25,16 @@ fn on_signs(modes: &CloseModes) -> String {
     } else {
         "-+-"
     };
-    match condition.holds {
-        true => format!(
+    if condition.holds {
+        format!(
             "C4-1 holds by {percent:.1} %: signs {signs}. To break it, change the sign of the smallest residue, {residue}, \
-             by moving actuator or sensor (`bench model placement`) or by the mass asymmetry"
-        ),
-        false => format!(
+         by moving actuator or sensor (`bench model placement`) or by the mass asymmetry"
+        )
+    } else {
+        format!(
             "C4-1 fails by {percent:.1} % of the largest residue: signs {signs}. \
-             They become {pattern} if {residue} changes its sign; keep its sign to avoid CNMP zeros"
-        ),
+         They become {pattern} if {residue} changes its sign; keep its sign to avoid CNMP zeros"
+        )
     }
 }
 

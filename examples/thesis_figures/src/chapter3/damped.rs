@@ -134,9 +134,12 @@ fn eq_3_15(zeta: f64) -> Model {
 fn furthest_right(locus: &Locus, is_damped: bool) -> f64 {
     let zeros = locus.tracks.iter().flatten().flatten();
     let complex = zeros.filter(|s| s.im.abs() > 1e-3 * s.norm());
-    let ratios = complex.map(|s| match is_damped {
-        true => s.re / s.norm(),
-        false => s.re.abs() / s.norm(),
+    let ratios = complex.map(|s| {
+        if is_damped {
+            s.re / s.norm()
+        } else {
+            s.re.abs() / s.norm()
+        }
     });
     ratios.fold(f64::NEG_INFINITY, f64::max)
 }
@@ -148,9 +151,10 @@ pub(in super::super) fn fig_3_16(_: &Runs) -> Result<Content, FigureError> {
         .assumed("damping ratios 0, 0.05, 0.1, 0.15, 0.2240, 0.3");
     let mut largest = Vec::new();
     for (zeta, colour) in DAMPINGS_3_16 {
-        let (plane, part, option) = match zeta == 0.0 {
-            true => (LocusPlane::Undamped, Part::Upper, ""),
-            false => (LocusPlane::Damped, Part::Damped, "--damped "),
+        let (plane, part, option) = if zeta == 0.0 {
+            (LocusPlane::Undamped, Part::Upper, "")
+        } else {
+            (LocusPlane::Damped, Part::Damped, "--damped ")
         };
         let model = eq_3_15(zeta);
         let locus = locus(&model.varied(KEY_R)?, plane, &geometric(1e5, 1e-5, 401))?;

@@ -55,9 +55,10 @@ pub(in super::super) fn fig_3_9(_: &Runs) -> Result<Content, FigureError> {
         }
         charts.push(chart.points("poles", INK, Symbol::Cross, POLES_3_9.to_vec()));
     }
-    let computed = match is_confined {
-        true => "in no other case",
-        false => "in other cases too",
+    let computed = if is_confined {
+        "in no other case"
+    } else {
+        "in other cases too"
     };
     let expected = "only where αu < 0 and αv > 0";
     let second = charts.split_off(3);

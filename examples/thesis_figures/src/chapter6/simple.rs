@@ -333,9 +333,10 @@ fn compare_6_4(content: Content, margins: &[Margins]) -> Content {
     let moduli: Vec<f64> = margins.iter().map(|m| m.modulus_margin).collect();
     let crossover = margins[1].crossover_rad_s.unwrap_or(f64::NAN);
     let is_stable = margins.iter().all(|m| m.stable);
-    let stability = match is_stable {
-        true => "stable with all four",
-        false => "unstable",
+    let stability = if is_stable {
+        "stable with all four"
+    } else {
+        "unstable"
     };
     content
         .compare(Comparison::within("crossover (printed: around 4)", 4.0, 0, crossover, "rad/s", 0.5))

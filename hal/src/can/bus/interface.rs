@@ -54,9 +54,10 @@ impl Interface {
 
 fn details(name: &str) -> Result<InterfaceDetails, String> {
     let interface = CanInterface::open(name).map_err(|error| error.to_string())?;
-    match is_can(name) {
-        true => interface.details().map_err(|error| error.to_string()),
-        false => Err("this is another kind of network interface".into()),
+    if is_can(name) {
+        interface.details().map_err(|error| error.to_string())
+    } else {
+        Err("this is another kind of network interface".into())
     }
 }
 

@@ -267,9 +267,10 @@ impl Monitor {
             self.shared.latch(faults::COMMANDS_STOPPED);
         }
         // A synchronous drive answers SYNCs, which begin with the first command.
-        let since_ns = match self.is_synchronous {
-            true => on.first_command_ns,
-            false => Some(on.since_ns),
+        let since_ns = if self.is_synchronous {
+            on.first_command_ns
+        } else {
+            Some(on.since_ns)
         };
         let Some(since_ns) = since_ns else { return };
         if now_ns.saturating_sub(since_ns.max(self.status_ns)) > self.status_timeout_ns {

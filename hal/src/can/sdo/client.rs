@@ -89,9 +89,10 @@ impl Client {
     /// Starts writing; the bytes are to be sent. One to four bytes are sent expedited, others in segments.
     pub fn download(address: Address, data: &[u8]) -> (Client, [u8; 8]) {
         let is_expedited = (1..=4).contains(&data.len());
-        let start = match is_expedited {
-            true => Start::Expedited(Part::new(data)),
-            false => Start::Segmented(Some(data.len() as u32)),
+        let start = if is_expedited {
+            Start::Expedited(Part::new(data))
+        } else {
+            Start::Segmented(Some(data.len() as u32))
         };
         let state = State::Started(Download {
             data: data.to_vec(),

@@ -18,11 +18,12 @@ pub struct VescSettings {
 impl VescSettings {
     pub(super) fn check(&self) -> Result<(), String> {
         let limit_a = self.current_limit_a;
-        match limit_a > 0.0 && limit_a <= 1000.0 {
-            true => Ok(()),
-            false => Err(format!(
+        if limit_a > 0.0 && limit_a <= 1000.0 {
+            Ok(())
+        } else {
+            Err(format!(
                 "current_limit_a = {limit_a} is invalid; set it to a value above 0 and at most 1000"
-            )),
+            ))
         }
     }
 }

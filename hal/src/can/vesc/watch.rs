@@ -38,12 +38,13 @@ pub(super) struct OnWatch {
 impl OnWatch {
     /// The state with the present number of commands.
     fn updated(self, commands: u32, now_ns: u64) -> OnWatch {
-        match commands == self.commands {
-            true => self,
-            false => OnWatch {
+        if commands == self.commands {
+            self
+        } else {
+            OnWatch {
                 commands,
                 last_command_ns: Some(now_ns),
-            },
+            }
         }
     }
 
