@@ -12,13 +12,14 @@ use super::modal_output;
 use super::outcome::Outcome;
 use super::output::print_result;
 use bench_base::quantity::{Dimension, Frequency, OfFrequency, OfTime, Time, si};
-use bench_experiment::{AnalysisError, Distortion, DistortionSource, analyse_external};
+use bench_experiment::AnalysisError;
 use bench_identify::external_csv::{self, Columns, Sampling};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
+use bench_identify::{Distortion, DistortionSource, Identification, IdentificationError};
 use bench_identify::{IdentifyError, Signals};
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{
@@ -187,10 +188,22 @@ impl ExternalOptions {
         })
     }
 
+    fn identification(&self, signals: &Signals) -> Result<Identification, CliError> {
+        let mut identification = Identification::new(signals.rate_hz);
+        if let Some((low_hz, high_hz)) = self.band_hz()? {
+            identification = identification.band_hz(low_hz, high_hz);
+        }
+        if let Some(repetition) = self.repetition(signals)? {
+            identification = identification.periods(repetition);
+        }
+        let InputPath { hold_s, lag_s } = self.input_path(signals.rate_hz)?;
+        Ok(identification.held_s(hold_s).lag_s(lag_s))
+    }
+
     /// The error of an analysis: wrong usage, if an option is the cause.
-    fn refused(&self, error: AnalysisError) -> CliError {
-        let AnalysisError::Identify(why) = &error else {
-            return error.into();
+    fn refused(&self, error: IdentificationError) -> CliError {
+        let IdentificationError::Signals(why) = &error else {
+            return AnalysisError::from(error).into();
         };
         let option = match why {
             IdentifyError::Band(_) => self.band.as_ref().map(|band| format!("--band {band}")),
@@ -200,7 +213,7 @@ impl ExternalOptions {
         };
         match option {
             Some(option) => CliError::Usage(format!("{option}: {why}")),
-            None => error.into(),
+            None => AnalysisError::from(error).into(),
         }
     }
 
@@ -233,7 +246,7 @@ impl ExternalOptions {
         let skip = match self.skip_periods {
             Some(skip) => skip,
             None => settling_periods(signals, period)
-                .map_err(|error| self.refused(AnalysisError::from(error)))?,
+                .map_err(|error| self.refused(IdentificationError::from(error)))?,
         };
         Ok(Some(Repetition { period, skip }))
     }
@@ -278,10 +291,8 @@ pub(super) fn run(
     let columns = options.columns(path)?;
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
-    let band_hz = options.band_hz()?;
-    let repetition = options.repetition(&signals)?;
-    let input_path = options.input_path(signals.rate_hz)?;
-    let analysis = analyse_external(&signals, band_hz, repetition, input_path);
+    let identification = options.identification(&signals)?;
+    let analysis = identification.run(&signals.input_a, &signals.output_m);
     let analysis = analysis.map_err(|error| options.refused(error))?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {

@@ -3,7 +3,7 @@
 use super::plan_error::PlanError;
 use bench_control::ControllerError;
 use bench_control::measured::MeasuredLoopError;
-use bench_identify::IdentifyError;
+use bench_identify::{IdentificationError, IdentifyError};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;
 
@@ -56,6 +56,15 @@ pub enum AnalysisError {
         /// Number of ticks that can be interpolated.
         allowed: u64,
     },
+}
+
+impl From<IdentificationError> for AnalysisError {
+    fn from(error: IdentificationError) -> Self {
+        match error {
+            IdentificationError::Signals(error) => error.into(),
+            IdentificationError::Zeros(error) => error.into(),
+        }
+    }
 }
 
 /// A closed-loop recording from which the plant cannot be estimated.

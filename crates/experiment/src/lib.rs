@@ -28,7 +28,6 @@ mod error;
 mod error_kind;
 mod error_spectrum;
 mod excitation_plan;
-mod external;
 mod file_name;
 pub mod linearity;
 mod live_rig;
@@ -46,7 +45,6 @@ mod open_bench;
 mod overview;
 mod plan;
 mod plan_error;
-mod plausibility;
 mod prediction;
 mod read_run;
 mod recorded_rig;
@@ -94,9 +92,6 @@ pub use error::ExperimentError;
 pub use error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
-pub use external::{
-    Distortion, DistortionSource, ExternalAnalysis, PeriodicPart, analyse_external,
-};
 pub use live_rig::{LiveRig, run};
 pub use loop_check::{MarginError, RatedController, Stage, closed_loop, require_margins};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};

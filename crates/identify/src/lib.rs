@@ -7,6 +7,7 @@
 //!
 //! | to find | look in |
 //! |---|---|
+//! | two signals, all steps with the default settings | [`Identification`] |
 //! | the default estimator, for records that begin and end at rest | [`local`] |
 //! | the same without smoothing, for a fit | [`frf_data()`] |
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
@@ -37,11 +38,13 @@ mod fft;
 mod frf;
 pub mod frf_csv;
 mod growing;
+mod identification;
 mod local_model;
 mod mean;
 pub mod modal;
 mod multisine_lines;
 mod noise_parts;
+mod plausibility;
 pub mod record_check;
 pub mod repeated;
 mod settings;
@@ -55,6 +58,10 @@ pub use error::IdentifyError;
 pub use excited_band::excited_band_hz;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};
+pub use identification::{
+    Distortion, DistortionSource, ExternalAnalysis, Identification, IdentificationError,
+    PeriodicPart,
+};
 pub use local_model::frf_data::frf_data;
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};

@@ -5,7 +5,7 @@ use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named};
 use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
-use bench_experiment::ExternalAnalysis;
+use bench_identify::ExternalAnalysis;
 use bench_identify::Unit;
 use bench_identify::modal::MeasurementChain;
 

@@ -1,19 +1,18 @@
-//! The analysis of external signals, from force to displacement or similar quantities, without a model.
+//! From two signals to modes and verdict: force and displacement or similar quantities, without a model of the stage.
 
 use serde::Serialize;
 
-use super::analysis::{VerdictScope, judge, response_band_hz};
-use super::analysis_error::AnalysisError;
-use super::plausibility::{describes, hint, implausible};
-use bench_identify::harmonics::{InputSignal, harmonics};
-use bench_identify::linearity::Linearity;
-use bench_identify::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use bench_identify::periodic::{self, Periods, Repetition};
-use bench_identify::verdict::Verdict;
-use bench_identify::{
-    EstimatorSettings, Frf, FrfDatum, Signals, distortion_ratio, excited_band_hz, frf_data, local,
-    record_check, with_distortion,
+use crate::harmonics::{InputSignal, harmonics};
+use crate::linearity::Linearity;
+use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::periodic::{self, Periods, Repetition};
+use crate::plausibility::{describes, hint, implausible};
+use crate::verdict::{Certainty, Verdict, VerdictInput, verdict};
+use crate::{
+    EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, excited_band_hz,
+    frf_data, local, record_check, with_distortion,
 };
+use bench_plant::PlantError;
 
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
 const RELATIVE_ERROR: f64 = 0.01;
@@ -101,17 +100,128 @@ impl Distortion {
     }
 }
 
+/// Why signals cannot be identified.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IdentificationError {
+    /// The signals allow no estimate.
+    #[error(transparent)]
+    Signals(#[from] IdentifyError),
+    /// The zeros of the fit cannot be computed.
+    #[error(transparent)]
+    Zeros(#[from] PlantError),
+}
+
+/// How two signals are identified.
+///
+/// Units: with input in newtons and output in metres, residues are in 1/kg. With another unit of the input or the output, residues and
+/// responses are in that unit over this one; frequencies, damping ratios, signs, zeros and verdict are the same.
+///
+/// ```
+/// use bench_identify::Identification;
+/// use nalgebra::Complex;
+///
+/// // A mode of 30 Hz with damping ratio 0.02 and residue 0.5/kg, sampled at 2 kHz. With its pole p and a held force u, the state is
+/// // q[k + 1] = exp(p T) q[k] + (exp(p T) - 1)/p u[k], and the position 0.5 Im q/Im p.
+/// let (w, zeta, period_s) = (std::f64::consts::TAU * 30.0, 0.02_f64, 5e-4);
+/// let pole = Complex::new(-zeta, (1.0 - zeta * zeta).sqrt()) * w;
+/// let step = (pole * period_s).exp();
+/// let mut random = 1_u64;
+/// let mut uniform = || {
+///     random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+///     (random >> 40) as f64 / (1 << 24) as f64 - 0.5
+/// };
+///
+/// // Random steps between rest at the beginning and at the end, and noise of 3 nm.
+/// let mut q = Complex::new(0.0, 0.0);
+/// let (mut input, mut output, mut force) = (Vec::new(), Vec::new(), 0.0);
+/// for k in 0..30_000 {
+///     force = match k {
+///         2_000..24_000 if k % 10 == 0 => uniform().signum(),
+///         2_000..24_000 => force,
+///         _ => 0.0,
+///     };
+///     input.push(force);
+///     output.push(0.5 * q.im / pole.im + 1e-8 * uniform());
+///     q = step * q + (step - 1.0) / pole * force;
+/// }
+///
+/// let found = Identification::new(2_000.0).held_s(5e-4).band_hz(5.0, 100.0).run(&input, &output)?;
+/// let modes = found.fit.expect("modes").modes();
+/// assert_eq!(modes.len(), 1);
+/// assert!((modes[0].frequency_hz().value - 30.0).abs() < 0.01);
+/// assert_eq!(modes[0].sign(), '+');
+/// # Ok::<(), bench_identify::IdentificationError>(())
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Identification {
+    rate_hz: f64,
+    band_hz: Option<(f64, f64)>,
+    repetition: Option<Repetition>,
+    input_path: InputPath,
+}
+
+impl Identification {
+    /// Signals with a constant number of samples per second. Without further settings the band is the one that the input excites, the
+    /// record begins and ends at rest, and the input is the force itself.
+    pub fn new(rate_hz: f64) -> Identification {
+        Identification {
+            rate_hz,
+            band_hz: None,
+            repetition: None,
+            input_path: InputPath::default(),
+        }
+    }
+
+    /// Analyses only this band. The verdict covers modes and zeros in it.
+    pub fn band_hz(mut self, low_hz: f64, high_hz: f64) -> Identification {
+        self.band_hz = Some((low_hz, high_hz));
+        self
+    }
+
+    /// The signals are periodic, and periods are averaged: the record need not begin and end at rest.
+    pub fn periods(mut self, repetition: Repetition) -> Identification {
+        self.repetition = Some(repetition);
+        self
+    }
+
+    /// Each sample of the input is held for this time before the next, as by an output of a computer; usually a period.
+    pub fn held_s(mut self, hold_s: f64) -> Identification {
+        self.input_path.hold_s = hold_s;
+        self
+    }
+
+    /// A first-order lag lies between the input and the force, for example a current loop.
+    pub fn lag_s(mut self, lag_s: f64) -> Identification {
+        self.input_path.lag_s = lag_s;
+        self
+    }
+
+    /// Identifies an output as the response to an input, both with the sample of the same time at the same index.
+    ///
+    /// # Errors
+    /// When the signals allow no estimate, or the zeros cannot be computed.
+    pub fn run(
+        &self,
+        input: &[f64],
+        output: &[f64],
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        let signals = Signals {
+            rate_hz: self.rate_hz,
+            input_a: input.to_vec(),
+            output_m: output.to_vec(),
+        };
+        analyse(&signals, self.band_hz, self.repetition, self.input_path)
+    }
+}
+
 /// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
 /// without one, the record must begin and end at rest. `input_path` lies between the recorded input and the force.
-///
-/// # Errors
-/// When the signals allow no estimate, or the zeros cannot be computed.
-pub fn analyse_external(
+fn analyse(
     signals: &Signals,
     band_hz: Option<(f64, f64)>,
     repetition: Option<Repetition>,
     input_path: InputPath,
-) -> Result<ExternalAnalysis, AnalysisError> {
+) -> Result<ExternalAnalysis, IdentificationError> {
     let chain = MeasurementChain::Input(input_path);
     signals.check()?;
     // The lines of a periodic record are estimated one by one.
@@ -138,7 +248,7 @@ pub fn analyse_external(
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => {
-            let verdict = judge(&fit, &data, &chain, VerdictScope::up_to(judged_up_to_rad_s))?;
+            let verdict = judge(&fit, &data, &chain, judged_up_to_rad_s)?;
             let hint = hint(&verdict, signals, repetition.is_some(), &fit);
             verdict.with(hint)
         }
@@ -155,6 +265,34 @@ pub fn analyse_external(
     })
 }
 
+/// The verdict on CNMP zeros up to a frequency.
+fn judge(
+    fit: &Result<ModalFit, FitError>,
+    frf_data: &[FrfDatum],
+    chain: &MeasurementChain,
+    up_to_rad_s: f64,
+) -> Result<Verdict, PlantError> {
+    let fit = match fit {
+        Ok(fit) => fit,
+        Err(error) => return Ok(Verdict::undecided(error.to_string())),
+    };
+    verdict(&VerdictInput {
+        fit,
+        chain,
+        frf_data,
+        up_to_rad_s,
+        expected_modes: None,
+        certainty: Certainty::ONE_LOOK,
+    })
+}
+
+/// Lowest and highest frequency of a response in hertz.
+fn response_band_hz(frf: &Frf) -> (f64, f64) {
+    let ends = [frf.frequency_hz.first(), frf.frequency_hz.last()];
+    let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
+    (from_hz, to_hz)
+}
+
 /// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
 fn default_band_hz(signals: &Signals, repetition: Option<Repetition>) -> (f64, f64) {
     let all = (0.0, signals.rate_hz / 2.0);
@@ -168,7 +306,7 @@ fn response(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
-) -> Result<(Frf, Vec<FrfDatum>, Option<PeriodicPart>), AnalysisError> {
+) -> Result<(Frf, Vec<FrfDatum>, Option<PeriodicPart>), IdentificationError> {
     if let Some(repetition) = repetition {
         let Periods {
             frf,

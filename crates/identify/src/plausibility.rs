@@ -1,8 +1,8 @@
 //! Signs that the columns of an external record are not input and output of a plant that was at rest.
 
-use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
-use bench_identify::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
-use bench_identify::{Frf, FrfDatum, Signals, record_check};
+use crate::modal::{self, FitError, MeasurementChain, ModalFit};
+use crate::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
+use crate::{Frf, FrfDatum, Signals, record_check};
 
 /// Half of the frequencies must have at least this coherence.
 const MIN_COHERENCE: f64 = 0.5;
