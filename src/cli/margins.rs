@@ -204,6 +204,10 @@ fn time_text(config: &Config, margins: &Margins) -> String {
 fn unstable_text(poles: &[Pole]) -> String {
     let unstable = poles.iter().filter(|pole| !pole.stable);
     let rows: Vec<Vec<String>> = unstable.map(pole_row).collect();
+    if rows.is_empty() {
+        let text = "UNSTABLE: the Nyquist curve encircles -1, and so the closed loop has no margins; lower the gain of the controller, or adapt its delays to those of the loop";
+        return wrap(text, 2);
+    }
     let header = ["unstable pole rad/s", "Hz", "damping"];
     let text = "UNSTABLE: the closed loop has poles in the right half plane, and so no margins";
     wrap(text, 2) + &table(&header, &rows)

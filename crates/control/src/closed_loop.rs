@@ -6,9 +6,10 @@ use nalgebra::Complex;
 
 use super::Section;
 use super::controller::continuous_response;
+use super::encirclements::{CurvePoint, refined, turn_rad, unstable_poles};
 use super::error::ControllerError;
 use super::features;
-use super::law::{ControlDesign, LawInput, LinearLaw};
+use super::law::{ControlDesign, LawInput, LinearLaw, OpenLoopPoles};
 use super::margins::{Known, Margins, grid, margins};
 use super::state_space::StateSpace;
 use bench_base::units::UM_PER_M;
@@ -24,21 +25,20 @@ pub struct ClosedLoop {
     linear: Box<dyn LinearLaw>,
     /// Poles of the sampled closed loop, once they are computed.
     poles: OnceLock<Option<Vec<Complex<f64>>>>,
+    /// The Nyquist curve of a law without matrices, once it is computed.
+    curve: OnceLock<Option<Vec<CurvePoint>>>,
 }
 
 /// Upper end of the grid as a ratio of half the rate, where L is real.
 const HIGHEST: f64 = 1.0 - 1e-9;
 /// Lowest frequency of the grid as a ratio of half the rate: poles closer to 1 are not told apart from an integrator.
 const LEAST_PART: f64 = 1e-9;
-
-/// The poles of an open loop that are not inside the unit circle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct OpenLoopPoles {
-    /// Poles at z = 1: integrators of the control law, and two for each free body of the plant.
-    pub integrators: usize,
-    /// Poles of the control law outside the unit circle.
-    pub unstable: usize,
-}
+/// Points of the Nyquist curve for each peak of a delay line, before it is refined.
+const POINTS_PER_PEAK: usize = 8;
+/// The curve begins where |L| of a loop with integrators is at least this ...
+const LARGE_LOOP_GAIN: f64 = 100.0;
+/// ... and at most this many decades below the lowest frequency of interest.
+const DECADES_BELOW: i32 = 12;
 
 /// A mode in the response of a closed loop to a step of its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +73,7 @@ impl ClosedLoop {
             design,
             linear,
             poles: OnceLock::new(),
+            curve: OnceLock::new(),
         })
     }
 
@@ -114,15 +115,11 @@ impl ClosedLoop {
 
     /// The poles of plant and control law that are not stable. `None` if they cannot be computed.
     pub fn open_loop_poles(&self) -> Option<OpenLoopPoles> {
-        // A double pole at 1 is computed with an error of the square root of the rounding, 1e-8.
-        const AT_ONE: f64 = 1e-6;
-        let law = self.linear.state_space().poles()?;
-        let (at_one, others): (Vec<Complex<f64>>, Vec<Complex<f64>>) =
-            law.into_iter().partition(|z| (*z - 1.0).norm() < AT_ONE);
+        let law = self.linear.open_loop_poles()?;
         let free_bodies = self.modes.iter().filter(|mode| mode.omega_rad_s == 0.0);
         Some(OpenLoopPoles {
-            integrators: at_one.len() + 2 * free_bodies.count(),
-            unstable: others.iter().filter(|z| z.norm() > 1.0 + AT_ONE).count(),
+            integrators: law.integrators + 2 * free_bodies.count(),
+            ..law
         })
     }
 
@@ -183,7 +180,14 @@ impl ClosedLoop {
     /// Frequencies in rad/s that follow every resonance of plant, controller and closed loop, also those that sampling moves below half
     /// the rate.
     pub fn frequencies(&self, low_rad_s: f64, high_rad_s: f64) -> Vec<f64> {
-        grid(low_rad_s, high_rad_s, &self.features())
+        let mut frequencies = grid(low_rad_s, high_rad_s, &self.features());
+        if let Some(curve) = self.curve() {
+            let on_curve = curve.iter().map(|point| point.rad_s);
+            frequencies.extend(on_curve.filter(|w| (low_rad_s..=high_rad_s).contains(w)));
+            frequencies.sort_by(f64::total_cmp);
+            frequencies.dedup();
+        }
+        frequencies
     }
 
     /// Reading (in metres, relative to the start) at each tick after a reference of `reference_m(tick)`: the linear loop
@@ -345,7 +349,7 @@ impl ClosedLoop {
         let poles = self.poles.get_or_init(|| {
             let (a, b, c) = self.plant.state_space();
             let plant = StateSpace { a, b, c, d: 0.0 };
-            self.linear.state_space().then(&plant).closed_poles()
+            self.linear.state_space()?.then(&plant).closed_poles()
         });
         poles.as_deref()
     }
@@ -359,10 +363,59 @@ impl ClosedLoop {
         law.then(&plant).closed_poles()
     }
 
-    /// All poles of the sampled closed loop lie inside the unit circle.
+    /// All poles of the sampled closed loop lie inside the unit circle. They are computed, or, for a law without matrices, counted by
+    /// the encirclements of the Nyquist curve.
     pub fn is_stable(&self) -> bool {
-        let poles = self.sampled_poles();
-        poles.is_some_and(|poles| poles.iter().all(|pole| pole.norm() < 1.0))
+        match self.sampled_poles() {
+            Some(poles) => poles.iter().all(|pole| pole.norm() < 1.0),
+            None => self.unstable_poles_of_curve() == Some(0),
+        }
+    }
+
+    /// Number of unstable poles by the Nyquist curve of a law without matrices; `None` for other laws, and if the curve passes
+    /// through -1.
+    fn unstable_poles_of_curve(&self) -> Option<i64> {
+        let (open, curve) = (self.open_loop_poles()?, self.curve()?);
+        let turned_rad = turn_rad(curve.iter().map(|point| point.value));
+        Some(unstable_poles(open, turned_rad))
+    }
+
+    /// The Nyquist curve of a law without matrices.
+    fn curve(&self) -> Option<&[CurvePoint]> {
+        let curve = self.curve.get_or_init(|| {
+            if self.linear.state_space().is_some() {
+                return None;
+            }
+            let high_rad_s = HIGHEST * self.nyquist_rad_s();
+            let low_rad_s = self.asymptote_rad_s(self.lowest_change_rad_s())?;
+            let mut frequencies = grid(low_rad_s, high_rad_s, &self.features());
+            frequencies.extend(self.peaks_of_delay_rad_s(low_rad_s, high_rad_s));
+            frequencies.sort_by(f64::total_cmp);
+            refined(&|w| self.sampled_loop(w) + 1.0, &frequencies)
+        });
+        curve.as_deref()
+    }
+
+    /// The multiples of 1/N of the rate at which a delay line of N ticks may have a peak, with points between them.
+    fn peaks_of_delay_rad_s(
+        &self,
+        low_rad_s: f64,
+        high_rad_s: f64,
+    ) -> impl Iterator<Item = f64> + use<> {
+        let intervals = POINTS_PER_PEAK * self.linear.delay_ticks();
+        let spacing_rad_s = 2.0 * self.nyquist_rad_s() / intervals.max(1) as f64;
+        let multiples = (1..=intervals / 2).map(move |k| k as f64 * spacing_rad_s);
+        multiples.filter(move |w| (low_rad_s..=high_rad_s).contains(w))
+    }
+
+    /// A frequency, not above the given one, below which the curve does not turn: with integrators, |L| is large there. `None` if the
+    /// poles of the law are not known, or there is no such frequency.
+    pub(super) fn asymptote_rad_s(&self, highest_rad_s: f64) -> Option<f64> {
+        let has_integrator = self.open_loop_poles()?.integrators > 0;
+        let decades = 0..=DECADES_BELOW;
+        let mut candidates =
+            decades.map(|decade| highest_rad_s * libm::pow(10.0, -f64::from(decade)));
+        candidates.find(|w| !has_integrator || self.sampled_loop(*w).norm() >= LARGE_LOOP_GAIN)
     }
 }
 

@@ -54,11 +54,12 @@ impl Controller {
 }
 
 impl LinearLaw for Controller {
-    fn state_space(&self) -> StateSpace {
+    fn state_space(&self) -> Option<StateSpace> {
         let gain = StateSpace::gain(UM_PER_M);
-        self.sections.iter().fold(gain, |cascade, section| {
+        let sections = self.sections.iter();
+        Some(sections.fold(gain, |cascade, section| {
             cascade.then(&StateSpace::from(section))
-        })
+        }))
     }
 
     fn response(&self, z: Complex<f64>) -> Complex<f64> {

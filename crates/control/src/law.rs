@@ -69,17 +69,55 @@ pub trait ControlLaw: Send {
 
 /// The feedback path of a linear law, u = -C(z) y at zero reference, if the applied current equals the requested one.
 pub trait LinearLaw: Send + Sync {
-    /// x+ = A x + B e, u = C x + D e with e = -y in metres and u in amperes.
-    fn state_space(&self) -> StateSpace;
+    /// x+ = A x + B e, u = C x + D e with e = -y in metres and u in amperes. `None` for a law with long delay lines, whose matrices
+    /// would be large: it overrides the other functions, and stability is then decided by the encirclements of the Nyquist curve.
+    fn state_space(&self) -> Option<StateSpace>;
 
     /// C(z) in amperes per metre.
     fn response(&self, z: Complex<f64>) -> Complex<f64> {
-        self.state_space().response(z)
+        let unknown = Complex::new(f64::NAN, f64::NAN);
+        self.state_space()
+            .map_or(unknown, |system| system.response(z))
     }
 
-    /// Roots in the z plane near which C(z) changes quickly: all poles, and the zeros if they are known.
+    /// The poles of C(z) that are not inside the unit circle. `None` if they are not known.
+    fn open_loop_poles(&self) -> Option<OpenLoopPoles> {
+        Some(OpenLoopPoles::of(&self.state_space()?.poles()?))
+    }
+
+    /// Roots in the z plane near which C(z) changes quickly: all poles, and the zeros if they are known. Those of delay lines are
+    /// covered by [`delay_ticks`](Self::delay_ticks).
     fn roots(&self) -> Vec<Complex<f64>> {
-        self.state_space().poles().unwrap_or_default()
+        let poles = self.state_space().and_then(|system| system.poles());
+        poles.unwrap_or_default()
+    }
+
+    /// Length N of the longest delay line of a law without matrices: C(z) may have a peak at each multiple of 1/N of the rate.
+    fn delay_ticks(&self) -> usize {
+        0
+    }
+}
+
+/// The poles of an open loop that are not inside the unit circle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OpenLoopPoles {
+    /// Poles at z = 1: integrators of the control law, and two for each free body of the plant.
+    pub integrators: usize,
+    /// Poles of the control law outside the unit circle.
+    pub unstable: usize,
+}
+
+impl OpenLoopPoles {
+    /// Counts the poles of a system.
+    pub fn of(poles: &[Complex<f64>]) -> OpenLoopPoles {
+        // A double pole at 1 is computed with an error of the square root of the rounding, 1e-8.
+        const AT_ONE: f64 = 1e-6;
+        let is_integrator = |z: &&Complex<f64>| (*z - 1.0).norm() < AT_ONE;
+        let is_unstable = |z: &&Complex<f64>| !is_integrator(z) && z.norm() > 1.0 + AT_ONE;
+        OpenLoopPoles {
+            integrators: poles.iter().filter(is_integrator).count(),
+            unstable: poles.iter().filter(is_unstable).count(),
+        }
     }
 }
 

@@ -22,6 +22,7 @@
 mod biquad;
 mod closed_loop;
 mod controller;
+mod encirclements;
 mod error;
 mod features;
 mod file;
@@ -47,15 +48,15 @@ pub mod tuning;
 mod unstable;
 
 pub use biquad::{Biquad, BiquadState};
-pub use closed_loop::{ClosedLoop, OpenLoopPoles, StepMode};
+pub use closed_loop::{ClosedLoop, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use error::ControllerError;
 pub use file::{CONTROLLERS, ControllerFile, ControllerText, LawFile, SectionSettings};
 pub use import::{ImportOptions, Imported, NumericArray, Value, Variables, import, read_variables};
 pub use import_error::{FormatError, ImportError};
 pub use inverse::{InverseFilter, inverse_filter};
-pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
-pub use laws::{LawSettings, StateSpaceLaw};
+pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
+pub use laws::{LawSettings, RepetitiveLaw, StateSpaceLaw};
 pub use margins::grid;
 pub use margins::{Crossing, Margins, PhaseCrossing};
 pub use minimum_time::{

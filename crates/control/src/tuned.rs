@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::law::{ControlDesign, ControlLaw, LawInput, LinearLaw};
+use super::law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
 use super::state_space::StateSpace;
 
 /// A design whose loop gain is `gain` times that of another one (see [`LawInput::with_gain`]).
@@ -51,13 +51,21 @@ impl ControlLaw for TunedLaw {
 }
 
 impl LinearLaw for TunedLinearLaw {
-    fn state_space(&self) -> StateSpace {
-        let law = self.linear.state_space();
-        StateSpace {
+    fn state_space(&self) -> Option<StateSpace> {
+        let law = self.linear.state_space()?;
+        Some(StateSpace {
             c: law.c * self.gain,
             d: law.d * self.gain,
             ..law
-        }
+        })
+    }
+
+    fn open_loop_poles(&self) -> Option<OpenLoopPoles> {
+        self.linear.open_loop_poles()
+    }
+
+    fn delay_ticks(&self) -> usize {
+        self.linear.delay_ticks()
     }
 
     fn response(&self, z: Complex<f64>) -> Complex<f64> {

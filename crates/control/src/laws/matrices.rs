@@ -128,8 +128,8 @@ impl ControlLaw for RunningLaw {
 }
 
 impl LinearLaw for StateSpace {
-    fn state_space(&self) -> StateSpace {
-        self.clone()
+    fn state_space(&self) -> Option<StateSpace> {
+        Some(self.clone())
     }
 }
 

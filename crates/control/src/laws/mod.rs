@@ -42,4 +42,6 @@ macro_rules! control_laws {
 control_laws! {
     /// Matrices of a discrete linear law with reference and position as inputs.
     StateSpace(matrices::StateSpaceLaw),
+    /// A disturbance or reference of a known period is learned from the error of the period before.
+    Repetitive(repetitive::RepetitiveLaw),
 }
