@@ -14,8 +14,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::ControlLawSettings;
-use crate::file::SectionSettings;
 use crate::law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
+use crate::section_settings::SectionSettings;
 use crate::state_space::StateSpace;
 use crate::unstable::{MAX_INTEGRATORS, WHY_TWO};
 use crate::{Controller, ControllerState, Section};
