@@ -1,9 +1,8 @@
 //! Why a controller is refused.
 
 use super::import_error::ImportError;
-use super::section::SectionError;
+use super::section_settings::SectionsError;
 use super::transfer::TransferError;
-use super::unstable::{MAX_INTEGRATORS, WHY_TWO};
 use bench_settings::ConfigError;
 
 /// A controller that is refused, before any motion.
@@ -12,39 +11,13 @@ pub enum ControllerError {
     /// The file is missing or not TOML, or its keys, types and ranges are wrong.
     #[error(transparent)]
     File(#[from] ConfigError),
-    /// An invalid section.
-    #[error("{name}: section {number} {why}")]
-    Section {
+    /// Invalid sections.
+    #[error("{name}: {why}")]
+    Sections {
         /// The controller.
         name: String,
-        /// Number of the section, from 1.
-        number: usize,
         /// What is wrong.
-        why: SectionError,
-    },
-    /// More integrators than a controller may have.
-    #[error(
-        "{name}: its sections have {count} integrators (poles at s = 0); the limit is {MAX_INTEGRATORS}, because {WHY_TWO}"
-    )]
-    Integrators {
-        /// The controller.
-        name: String,
-        /// Their number.
-        count: usize,
-    },
-    /// A prewarping frequency above half the servo rate.
-    #[error(
-        "{name}: section {number} is prewarped at {prewarp_rad_s} rad/s, but the limit at this servo rate is {limit_rad_s:.1} rad/s; lower the frequency, or raise loop.rate_hz"
-    )]
-    Prewarp {
-        /// The controller.
-        name: String,
-        /// Number of the section, from 1.
-        number: usize,
-        /// As given.
-        prewarp_rad_s: f64,
-        /// Half the servo rate.
-        limit_rad_s: f64,
+        why: SectionsError,
     },
     /// A law whose settings are inconsistent with each other or with the servo rate.
     #[error("{name}: `law` {why}")]

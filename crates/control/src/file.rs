@@ -7,11 +7,10 @@ use super::Section;
 use super::error::ControllerError;
 use super::law::ControlDesign;
 use super::laws::LawSettings;
-use super::section_settings::SectionSettings;
+use super::section_settings::{SectionSettings, checked_sections};
 use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
 };
-use super::unstable::MAX_INTEGRATORS;
 use bench_settings::EmbeddedFile;
 
 /// All embedded controllers. To add one, add its file and its name here.
@@ -116,19 +115,10 @@ impl ControllerText {
 
     fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {
         let file: ControllerFile = bench_settings::typed(&self.name, &self.text)?;
-        let numbered = (1..).zip(&file.section);
-        let checked =
-            numbered.map(|(number, settings)| self.checked_section(number, settings, rate_hz));
-        let sections: Vec<Section> = checked.collect::<Result<_, _>>()?;
-        let count = sections.iter().map(Section::integrators).sum();
-        if count > MAX_INTEGRATORS {
-            Err(ControllerError::Integrators {
-                name: self.name.clone(),
-                count,
-            })
-        } else {
-            Ok(sections)
-        }
+        checked_sections(&file.section, rate_hz).map_err(|why| ControllerError::Sections {
+            name: self.name.clone(),
+            why,
+        })
     }
 
     fn cascade(&self, table: TransferTable) -> Result<Cascade, ControllerError> {
@@ -152,33 +142,6 @@ impl ControllerText {
             name: self.name.clone(),
             table: table.key(),
             why,
-        }
-    }
-
-    fn checked_section(
-        &self,
-        number: usize,
-        settings: &SectionSettings,
-        rate_hz: f64,
-    ) -> Result<Section, ControllerError> {
-        let name = || self.name.clone();
-        let section = settings
-            .section()
-            .checked()
-            .map_err(|why| ControllerError::Section {
-                name: name(),
-                number,
-                why,
-            })?;
-        let limit_rad_s = std::f64::consts::PI * rate_hz;
-        match section.prewarp_rad_s {
-            Some(prewarp_rad_s) if prewarp_rad_s >= limit_rad_s => Err(ControllerError::Prewarp {
-                name: name(),
-                number,
-                prewarp_rad_s,
-                limit_rad_s,
-            }),
-            _ => Ok(section),
         }
     }
 }

@@ -65,7 +65,7 @@ pub use minimum_time::{
 };
 pub use pole::{Pole, listed_poles};
 pub use section::{Section, SectionError};
-pub use section_settings::SectionSettings;
+pub use section_settings::{SectionSettings, SectionsError, checked_sections};
 pub use state_space::StateSpace;
 pub use step_metrics::{SETTLING_BAND, StepMeter, StepMetrics, step_metrics};
 pub use swept::{SweptLimits, swept_reference_amplitudes};

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::Section;
+use super::section::{Section, SectionError};
+use super::unstable::{MAX_INTEGRATORS, WHY_TWO};
 
 /// A section as written in a controller file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -79,8 +80,73 @@ pub enum SectionSettings {
     },
 }
 
+/// Sections that no loop can run.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum SectionsError {
+    /// An invalid section.
+    #[error("section {number} {why}")]
+    Section {
+        /// Number of the section, from 1.
+        number: usize,
+        /// What is wrong.
+        why: SectionError,
+    },
+    /// A prewarping frequency above half the servo rate.
+    #[error(
+        "section {number} is prewarped at {prewarp_rad_s} rad/s, but the limit at this servo rate is {limit_rad_s:.1} rad/s; lower the frequency, or raise loop.rate_hz"
+    )]
+    Prewarp {
+        /// Number of the section, from 1.
+        number: usize,
+        /// As given.
+        prewarp_rad_s: f64,
+        /// Half the servo rate.
+        limit_rad_s: f64,
+    },
+    /// More integrators than a controller may have.
+    #[error(
+        "its sections have {count} integrators (poles at s = 0); the limit is {MAX_INTEGRATORS}, because {WHY_TWO}"
+    )]
+    Integrators {
+        /// Their number.
+        count: usize,
+    },
+}
+
+/// The sections of a cascade, checked for a servo rate.
+pub fn checked_sections(
+    settings: &[SectionSettings],
+    rate_hz: f64,
+) -> Result<Vec<Section>, SectionsError> {
+    let numbered = (1..).zip(settings);
+    let checked = numbered.map(|(number, settings)| settings.checked(number, rate_hz));
+    let sections: Vec<Section> = checked.collect::<Result<_, _>>()?;
+    let count = sections.iter().map(Section::integrators).sum();
+    if count > MAX_INTEGRATORS {
+        Err(SectionsError::Integrators { count })
+    } else {
+        Ok(sections)
+    }
+}
+
 impl SectionSettings {
-    pub(super) fn section(&self) -> Section {
+    /// The section, which has a number in its cascade.
+    fn checked(&self, number: usize, rate_hz: f64) -> Result<Section, SectionsError> {
+        let section = self.section().checked();
+        let section = section.map_err(|why| SectionsError::Section { number, why })?;
+        let limit_rad_s = std::f64::consts::PI * rate_hz;
+        match section.prewarp_rad_s {
+            Some(prewarp_rad_s) if prewarp_rad_s >= limit_rad_s => Err(SectionsError::Prewarp {
+                number,
+                prewarp_rad_s,
+                limit_rad_s,
+            }),
+            _ => Ok(section),
+        }
+    }
+
+    /// The continuous section, without checks.
+    pub fn section(&self) -> Section {
         let (numerator, denominator) = self.coefficients();
         Section {
             numerator,

@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 
 use super::ControlLawSettings;
 use crate::law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
-use crate::section_settings::SectionSettings;
+use crate::section_settings::{SectionSettings, checked_sections};
 use crate::state_space::StateSpace;
 use crate::unstable::{MAX_INTEGRATORS, WHY_TWO};
-use crate::{Controller, ControllerState, Section};
+use crate::{Controller, Section, SectionController};
 
 /// A repetitive controller around a cascade of sections.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -60,18 +60,8 @@ impl ControlLawSettings for RepetitiveLaw {
                 self.lead_ticks, self.period_ticks
             ));
         }
-        let nyquist_rad_s = std::f64::consts::PI * rate_hz;
-        for (number, section) in (1..).zip(self.sections()) {
-            if section.prewarp_rad_s.is_some_and(|w| w >= nyquist_rad_s) {
-                return Err(format!(
-                    "has a section {number} with prewarp_rad_s at or above {nyquist_rad_s:.0} rad/s, half the rate; give a lower one"
-                ));
-            }
-            section
-                .checked()
-                .map_err(|why| format!("has an invalid section {number}: {why}"))?;
-        }
-        let sections = self.sections();
+        let sections = checked_sections(&self.section, rate_hz);
+        let sections = sections.map_err(|why| format!("is refused: {why}"))?;
         let in_sections: usize = sections.iter().map(Section::integrators).sum();
         let count = in_sections + usize::from(self.integrates());
         if count > MAX_INTEGRATORS {
@@ -87,7 +77,7 @@ impl ControlDesign for RepetitiveLaw {
     fn law(&self, period_s: f64) -> Box<dyn ControlLaw> {
         let cascade = Controller::new(&self.sections(), period_s);
         Box::new(RunningLaw {
-            state: cascade.at_rest(),
+            feedback: SectionController::new(cascade.clone()),
             cascade,
             learned: Memory::new(self.period_ticks + 2),
             errors: Memory::new(self.period_ticks + 1),
@@ -133,7 +123,7 @@ impl Memory {
 struct RunningLaw {
     settings: RepetitiveLaw,
     cascade: Controller,
-    state: ControllerState,
+    feedback: SectionController,
     learned: Memory,
     errors: Memory,
 }
@@ -150,8 +140,8 @@ impl RunningLaw {
 }
 
 impl ControlLaw for RunningLaw {
-    fn reset(&mut self, _rest_m: f64) {
-        self.state = self.cascade.at_rest();
+    fn reset(&mut self, rest_m: f64) {
+        self.feedback.reset(rest_m);
         self.learned.clear();
         self.errors.clear();
     }
@@ -161,7 +151,10 @@ impl ControlLaw for RunningLaw {
         self.errors.push(error_m);
         let learned_m = self.next_learned();
         self.learned.push(learned_m);
-        self.cascade.update(&mut self.state, error_m + learned_m)
+        self.feedback.update(&LawInput {
+            reference_m: input.reference_m + learned_m,
+            ..*input
+        })
     }
 
     fn linear(&self) -> Option<Box<dyn LinearLaw>> {
