@@ -258,7 +258,7 @@ impl ModalStep<'_> {
         let model_response = ModelResponse::new(config, &modal);
         let frf = estimate.frf;
         let fitted = fit.as_ref().ok();
-        let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, response_band_hz(&frf)));
+        let signs = fitted.map(|fit| SignCheck::of(&fit.modes(), &modal, frf.band_hz()));
         let model = model_response.at(&frf.frequency_hz);
         Ok(Analysis {
             excess_delay: excess_delay(&frf, &model, scope.up_to_rad_s / TAU),
@@ -288,13 +288,6 @@ fn fit_modes(
         Err(FitError::Cancelled) => Err(AnalysisError::Cancelled),
         fit => Ok(fit),
     }
-}
-
-/// Lowest and highest frequency of a response in hertz.
-pub(super) fn response_band_hz(frf: &Frf) -> (f64, f64) {
-    let ends = [frf.frequency_hz.first(), frf.frequency_hz.last()];
-    let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
-    (from_hz, to_hz)
 }
 
 fn highest_mode_rad_s(modal: &ModalModel) -> f64 {

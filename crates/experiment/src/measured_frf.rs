@@ -199,9 +199,7 @@ impl MeasuredFrf {
 
     /// First and last frequency in hertz; 0 without any.
     pub fn band_hz(&self) -> (f64, f64) {
-        let first = self.frf.frequency_hz.first().copied();
-        let last = self.frf.frequency_hz.last().copied();
-        (first.unwrap_or(0.0), last.unwrap_or(0.0))
+        self.frf.band_hz()
     }
 }
 

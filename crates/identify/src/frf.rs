@@ -31,6 +31,7 @@ pub enum Unit {
 ///     variance: 2e-12,
 ///     resolution_hz: 0.1,
 /// });
+/// assert_eq!(frf.band_hz(), (29.3, 29.3));
 /// assert!(added && (frf.phase_rad(0).to_degrees() + 90.0).abs() < 1e-12);
 /// // sigma(|H|) = sqrt(variance/2)
 /// assert!((frf.magnitude_sigma[0] - 1e-6).abs() < 1e-18);
@@ -125,6 +126,13 @@ impl Frf {
     /// Whether there are no frequencies.
     pub fn is_empty(&self) -> bool {
         self.frequency_hz.is_empty()
+    }
+
+    /// Lowest and highest frequency in hertz; 0 and 0 without frequencies.
+    pub fn band_hz(&self) -> (f64, f64) {
+        let ends = [self.frequency_hz.first(), self.frequency_hz.last()];
+        let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
+        (from_hz, to_hz)
     }
 
     /// Median of the coherence over the frequencies.

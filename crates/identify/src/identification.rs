@@ -234,7 +234,7 @@ fn analyse(
     let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
     let band_hz = if band_hz.is_none() && periodic.is_some() {
-        response_band_hz(&frf)
+        frf.band_hz()
     } else {
         requested_hz
     };
@@ -284,13 +284,6 @@ fn judge(
         expected_modes: None,
         certainty: Certainty::ONE_LOOK,
     })
-}
-
-/// Lowest and highest frequency of a response in hertz.
-fn response_band_hz(frf: &Frf) -> (f64, f64) {
-    let ends = [frf.frequency_hz.first(), frf.frequency_hz.last()];
-    let [from_hz, to_hz] = ends.map(|hz| hz.copied().unwrap_or_default());
-    (from_hz, to_hz)
 }
 
 /// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.

@@ -99,13 +99,13 @@ fn certified_loop(analysis: &Analysis, config: &Config) -> CertifiedLoop {
 }
 
 fn certified_response(frf: &Frf, file: ResponseFile<'_>) -> CertifiedResponse {
-    let frequency_hz = &frf.frequency_hz;
+    let (from_hz, to_hz) = frf.band_hz();
     CertifiedResponse {
         file: file.name.into(),
         sha256: sha256(file.csv),
         frequencies: frf.len(),
-        from_hz: frequency_hz.first().copied().unwrap_or_default(),
-        to_hz: frequency_hz.last().copied().unwrap_or_default(),
+        from_hz,
+        to_hz,
     }
 }
 
