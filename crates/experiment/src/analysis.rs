@@ -18,7 +18,7 @@ use bench_config::Config;
 use bench_identify::delay::excess_delay;
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
-use bench_identify::verdict::{Certainty, Verdict, VerdictInput, verdict};
+use bench_identify::verdict::{Certainty, Verdict, VerdictScope, judge};
 use bench_identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
 use bench_plant::{ModalModel, Mode, Sign};
 use bench_recording::Recording;
@@ -253,7 +253,7 @@ impl ModalStep<'_> {
         let modal = ModalModel::of(&bench_plant::build(&config.plant)?)?;
         let chain = MeasurementChain::bench(config);
         let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
-        let scope = VerdictScope::of_model(&modal, self.certainty);
+        let scope = scope_of_model(&modal, self.certainty);
         let verdict = judge(&fit, &estimate.frf_data, &chain, scope)?;
         let model_response = ModelResponse::new(config, &modal);
         let frf = estimate.frf;
@@ -302,65 +302,13 @@ impl Analysis {
     }
 }
 
-/// What a verdict covers, and what it requires.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct VerdictScope {
-    /// It covers modes and zeros up to here.
-    pub(super) up_to_rad_s: f64,
-    /// The number of modes that must be found there, if it is known.
-    pub(super) expected_modes: Option<usize>,
-    /// How certain signs and sides must be.
-    pub(super) certainty: Certainty,
-}
-
-impl VerdictScope {
-    /// Up to a frequency, without a model.
-    pub(super) fn up_to(up_to_rad_s: f64) -> VerdictScope {
-        VerdictScope {
-            up_to_rad_s,
-            expected_modes: None,
-            certainty: Certainty::ONE_LOOK,
-        }
-    }
-
-    /// Above the highest mode of a model, whose visible modes must all be found.
-    pub(super) fn of_model(modal: &ModalModel, certainty: Certainty) -> VerdictScope {
-        let up_to_rad_s = LAST_MODE * highest_mode_rad_s(modal);
-        VerdictScope {
-            up_to_rad_s,
-            expected_modes: Some(visible_modes(modal, up_to_rad_s)),
-            certainty,
-        }
-    }
-
-    /// The input of a verdict.
-    pub(super) fn input<'a>(
-        self,
-        fit: &'a ModalFit,
-        frf_data: &'a [FrfDatum],
-        chain: &'a MeasurementChain,
-    ) -> VerdictInput<'a> {
-        VerdictInput {
-            fit,
-            chain,
-            frf_data,
-            up_to_rad_s: self.up_to_rad_s,
-            expected_modes: self.expected_modes,
-            certainty: self.certainty,
-        }
-    }
-}
-
-/// The verdict on CNMP zeros.
-pub(super) fn judge(
-    fit: &Result<ModalFit, FitError>,
-    frf_data: &[FrfDatum],
-    chain: &MeasurementChain,
-    scope: VerdictScope,
-) -> Result<Verdict, AnalysisError> {
-    match fit {
-        Ok(fit) => Ok(verdict(&scope.input(fit, frf_data, chain))?),
-        Err(error) => Ok(Verdict::undecided(error.to_string())),
+/// The scope of a verdict above the highest mode of a model, whose visible modes must all be found.
+pub(super) fn scope_of_model(modal: &ModalModel, certainty: Certainty) -> VerdictScope {
+    let up_to_rad_s = LAST_MODE * highest_mode_rad_s(modal);
+    VerdictScope {
+        up_to_rad_s,
+        expected_modes: Some(visible_modes(modal, up_to_rad_s)),
+        certainty,
     }
 }
 

@@ -7,7 +7,7 @@ use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{describes, hint, implausible};
-use crate::verdict::{Certainty, Verdict, VerdictInput, verdict};
+use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, excited_band_hz,
     frf_data, local, record_check, with_distortion,
@@ -248,7 +248,8 @@ fn analyse(
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => {
-            let verdict = judge(&fit, &data, &chain, judged_up_to_rad_s)?;
+            let scope = VerdictScope::up_to(judged_up_to_rad_s);
+            let verdict = judge(&fit, &data, &chain, scope)?;
             let hint = hint(&verdict, signals, repetition.is_some(), &fit);
             verdict.with(hint)
         }
@@ -262,27 +263,6 @@ fn analyse(
         band_hz,
         judged_up_to_rad_s,
         periodic,
-    })
-}
-
-/// The verdict on CNMP zeros up to a frequency.
-fn judge(
-    fit: &Result<ModalFit, FitError>,
-    frf_data: &[FrfDatum],
-    chain: &MeasurementChain,
-    up_to_rad_s: f64,
-) -> Result<Verdict, PlantError> {
-    let fit = match fit {
-        Ok(fit) => fit,
-        Err(error) => return Ok(Verdict::undecided(error.to_string())),
-    };
-    verdict(&VerdictInput {
-        fit,
-        chain,
-        frf_data,
-        up_to_rad_s,
-        expected_modes: None,
-        certainty: Certainty::ONE_LOOK,
     })
 }
 

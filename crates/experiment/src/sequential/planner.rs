@@ -8,14 +8,14 @@ use super::information::{FirstShot, InformationByFrequency};
 use super::next_shot::{NextShot, next_shot};
 use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
-use crate::analysis::{Analysis, VerdictScope};
+use crate::analysis::{Analysis, scope_of_model};
 use crate::error::ExperimentError;
 use crate::run::Run;
 use crate::run_summary::RunSummary;
 use bench_config::Config;
 use bench_excitation::AmplitudeCurve;
 use bench_identify::modal::MeasurementChain;
-use bench_identify::verdict::{Certainty, Cnmp, MAX_LOOKS, decisive_quantities};
+use bench_identify::verdict::{Certainty, Cnmp, MAX_LOOKS, VerdictScope, decisive_quantities};
 use bench_plant::ModalModel;
 
 /// The sequence ends early, because nothing can be decided, after this number of shots or more.
@@ -80,7 +80,7 @@ impl<'a> SequentialExperiment<'a> {
             base,
             limits,
             chain: MeasurementChain::bench(base),
-            scope: VerdictScope::of_model(&modal, Certainty::REPEATED_LOOKS),
+            scope: scope_of_model(&modal, Certainty::REPEATED_LOOKS),
             evidence,
             first,
             shots: vec![summary.clone()],

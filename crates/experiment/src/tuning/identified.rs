@@ -7,8 +7,6 @@ use super::distinct::{check_distinct, check_modes};
 use super::error::TuneSourceError;
 use super::mode_fit::{best_fit, groups};
 use super::source::FrfSource;
-use crate::analysis::{VerdictScope, judge};
-use crate::analysis_error::AnalysisError;
 use crate::measured_frf::{FrfError, check_rate, judge_excess};
 use crate::response_points::points;
 use bench_base::units::{hz, rad_s};
@@ -16,7 +14,7 @@ use bench_config::Config;
 use bench_control::measured::{MeasuredLoop, check_gaps};
 use bench_control::tuning::{DISC_SIGMAS_95, IdentifiedResponse, MeasuredPlant, loop_plant};
 use bench_identify::modal::{FittedMode, MeasurementChain, ModalFit, Parameter};
-use bench_identify::verdict::Verdict;
+use bench_identify::verdict::{self, Verdict, VerdictScope};
 use bench_plant::UnmodelledMode;
 use bench_plant::{LoopPlant, Mode, SignalPath};
 
@@ -381,17 +379,6 @@ fn verdict(
         .fold(0.0, f64::max);
     let up_to_rad_s = LAST_MODE * highest;
     let chain = MeasurementChain::bench(config);
-    let verdict = judge(
-        &Ok(fit.clone()),
-        &source.data,
-        &chain,
-        VerdictScope::up_to(up_to_rad_s),
-    );
-    verdict.map_err(|error| match error {
-        AnalysisError::Plant(error) => TuneSourceError::Zeros(error),
-        other => TuneSourceError::File {
-            file: source.file.clone(),
-            why: Box::new(FrfError::Analysis(other)),
-        },
-    })
+    let scope = VerdictScope::up_to(up_to_rad_s);
+    verdict::verdict(&scope.input(fit, &source.data, &chain)).map_err(TuneSourceError::Zeros)
 }

@@ -38,6 +38,45 @@ impl Certainty {
     }
 }
 
+/// What a verdict covers, and what it requires.
+#[derive(Clone, Copy, Debug)]
+pub struct VerdictScope {
+    /// It covers modes and zeros up to here, in rad/s.
+    pub up_to_rad_s: f64,
+    /// The number of modes that must be found there, if it is known.
+    pub expected_modes: Option<usize>,
+    /// How certain signs and sides must be.
+    pub certainty: Certainty,
+}
+
+impl VerdictScope {
+    /// Up to a frequency, without a model, for one look at the data.
+    pub fn up_to(up_to_rad_s: f64) -> VerdictScope {
+        VerdictScope {
+            up_to_rad_s,
+            expected_modes: None,
+            certainty: Certainty::ONE_LOOK,
+        }
+    }
+
+    /// The input of a verdict.
+    pub fn input<'a>(
+        self,
+        fit: &'a ModalFit,
+        frf_data: &'a [FrfDatum],
+        chain: &'a MeasurementChain,
+    ) -> VerdictInput<'a> {
+        VerdictInput {
+            fit,
+            chain,
+            frf_data,
+            up_to_rad_s: self.up_to_rad_s,
+            expected_modes: self.expected_modes,
+            certainty: self.certainty,
+        }
+    }
+}
+
 /// Input of a verdict.
 #[derive(Clone, Copy, Debug)]
 pub struct VerdictInput<'a> {

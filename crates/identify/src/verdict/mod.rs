@@ -27,7 +27,7 @@ mod tests;
 mod zeros;
 
 pub use information::{DecisiveQuantity, decisive_quantities};
-pub use input::{Certainty, MAX_LOOKS, VerdictInput};
+pub use input::{Certainty, MAX_LOOKS, VerdictInput, VerdictScope};
 pub use phase_drop::PhaseDrop;
 pub use zeros::{UncertainZero, zeros};
 
@@ -37,7 +37,7 @@ use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::FrfDatum;
-use crate::modal::FittedMode;
+use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit};
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
 
@@ -110,6 +110,22 @@ impl Verdict {
             self.why = format!("{}; {caution}", self.why);
         }
         self
+    }
+}
+
+/// The verdict of a fit, undecided if no modes could be fitted.
+///
+/// # Errors
+/// Those of [`verdict`].
+pub fn judge(
+    fit: &Result<ModalFit, FitError>,
+    frf_data: &[FrfDatum],
+    chain: &MeasurementChain,
+    scope: VerdictScope,
+) -> Result<Verdict, PlantError> {
+    match fit {
+        Ok(fit) => verdict(&scope.input(fit, frf_data, chain)),
+        Err(error) => Ok(Verdict::undecided(error.to_string())),
     }
 }
 
