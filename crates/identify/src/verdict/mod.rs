@@ -38,6 +38,7 @@ use sign_groups::signs_of;
 
 use crate::FrfDatum;
 use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit};
+use bench_base::decimal::Decimal;
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
 
@@ -212,7 +213,7 @@ fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<Strin
     let real_part = zero.real_part();
     Some(format!(
         "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
-        real_part.value,
+        Decimal(real_part.value),
         real_part.half_width_95(),
         hertz(zero.s.norm()),
         100.0 * zero.rhp_probability
@@ -257,7 +258,8 @@ fn cnmp_pairs(zeros: &[UncertainZero]) -> usize {
 fn disagreement(phase_drop: PhaseDrop) -> String {
     format!(
         "the zeros of the fit predict {:.0} degrees more phase lag than a minimum-phase system of this magnitude, the measured response has {:.0}; increase the amplitude between the modes, or the duration",
-        phase_drop.predicted_deg, phase_drop.drop_deg
+        Decimal(phase_drop.predicted_deg),
+        Decimal(phase_drop.drop_deg)
     )
 }
 

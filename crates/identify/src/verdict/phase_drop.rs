@@ -72,9 +72,9 @@ impl Roots {
     /// The lag of the zeros in the right half plane beyond that of their mirror images, in radians.
     fn all_pass_lag(&self, from_rad_s: f64, to_rad_s: f64) -> f64 {
         let right = self.zeros.iter().filter(|zero| zero.re > 0.0);
-        right
-            .map(|zero| -2.0 * turn(*zero, from_rad_s, to_rad_s))
-            .sum()
+        let lags = right.map(|zero| -2.0 * turn(*zero, from_rad_s, to_rad_s));
+        // The sum of no terms is the negative zero.
+        lags.sum::<f64>() + 0.0
     }
 }
 
@@ -278,6 +278,16 @@ mod tests {
                 "{zeros:?}: {drop:?}"
             );
         }
+    }
+
+    #[test]
+    fn fit_without_zeros_in_the_right_half_plane_predicts_a_positive_zero() {
+        let roots = Roots {
+            poles: poles(),
+            zeros: vec![Complex::new(-2.0, 528.0)],
+        };
+        let lag = roots.all_pass_lag(300.0, 900.0);
+        assert!(lag == 0.0 && lag.is_sign_positive(), "{lag}");
     }
 
     #[test]

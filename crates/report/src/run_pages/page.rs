@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::{Plot, RecordReport};
 use crate::html::{document_with_plots, escaped, facts, note, row, section, table};
 use crate::number::{interval, percent};
+use bench_base::decimal::Decimal;
 use bench_experiment::certificate::SIGNS_DIFFER;
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use bench_identify::verdict::UncertainZero;
@@ -72,7 +73,7 @@ fn evidence(report: &RecordReport<'_>) -> Vec<(String, String)> {
     let limit = format!("{:.1} Hz", report.judged_up_to_rad_s / TAU);
     let chi2 = report.fit.map(|fit| format!("{:.3}", fit.chi2_per_freedom));
     let phase_drop = report.verdict.phase_drop;
-    let drop_deg = phase_drop.map(|phase_drop| format!("{:.1} deg", phase_drop.drop_deg));
+    let drop_deg = phase_drop.map(|phase_drop| format!("{:.1} deg", Decimal(phase_drop.drop_deg)));
     named([
         ("Upper limit of the verdict", Some(limit)),
         ("Reduced chi-square of the fit", chi2),

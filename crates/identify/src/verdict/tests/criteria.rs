@@ -5,7 +5,10 @@ use nalgebra::{Complex, DMatrix};
 use super::stage::{Case, Stage, index};
 use crate::modal::Parameter;
 use crate::verdict::sign_groups::signs_of;
-use crate::verdict::{Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate};
+use crate::verdict::{
+    Certainty, Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate,
+    uncertain_side,
+};
 use bench_plant::zeros::ZeroKind;
 
 const OPPOSITE: [f64; 2] = [1.0, -1.0];
@@ -61,6 +64,26 @@ fn reason_of_a_disagreement_states_both_phase_drops() {
         why.contains("predict 350 degrees") && why.contains("the measured response has 10;"),
         "{why}"
     );
+}
+
+#[test]
+fn reasons_have_no_negative_zero() {
+    let of_phases = |predicted_deg: f64, drop_deg: f64| {
+        let phase_drop = PhaseDrop {
+            predicted_deg,
+            drop_deg,
+        };
+        evaluate(&[left_zero()], &OPPOSITE, Some(phase_drop)).1
+    };
+    for why in [of_phases(-0.0, 350.0), of_phases(350.0, -0.3)] {
+        assert!(why.contains(" 0") && !why.contains("-0"), "{why}");
+    }
+    let near_axis = UncertainZero {
+        s: Complex::new(-1e-5, 100.0),
+        ..left_zero()
+    };
+    let why = uncertain_side(&[near_axis], Certainty::ONE_LOOK).expect("on no side");
+    assert!(why.contains("the zero 0.000 ±"), "{why}");
 }
 
 #[test]
