@@ -1,6 +1,7 @@
 //! Modes and verdict from two vectors: a force and a displacement. `cargo run -p bench-identify --example two_vectors`
 //!
-//! The vectors are those of two simulated modes with residues of opposite signs and a noise of 0.3 um. Replace them by your own.
+//! The vectors are those of two simulated modes with residues of opposite signs and a noise of 0.3 um rms (uniform over
+//! 1 um). Replace them by your own.
 
 use std::error::Error;
 use std::f64::consts::TAU;

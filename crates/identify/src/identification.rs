@@ -131,7 +131,7 @@ pub enum IdentificationError {
 ///     (random >> 40) as f64 / (1 << 24) as f64 - 0.5
 /// };
 ///
-/// // Random steps between rest at the beginning and at the end, and noise of 3 nm.
+/// // Random steps between rest at the beginning and at the end, and noise of 3 nm rms (uniform over 10 nm).
 /// let mut q = Complex::new(0.0, 0.0);
 /// let (mut input, mut output, mut force) = (Vec::new(), Vec::new(), 0.0);
 /// for k in 0..30_000 {
