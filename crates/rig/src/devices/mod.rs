@@ -26,7 +26,7 @@ use bench_plant::PlantError;
 
 use deferred::{ComputingDelayError, OutputTiming};
 
-pub use amplifier::{AmplifierError, CanAmplifier, Requirements, can_amplifier, current_step_a};
+pub use amplifier::{AmplifierError, CanAmplifier, Requirements, can_amplifier};
 pub use probe::ProbeError;
 pub use reservation::{DeviceInUse, Reservation};
 

@@ -20,7 +20,7 @@ mod trajectory;
 use bench_hal::{AmplifierStatus, CurrentAmplifier, DeviceError, DisplacementProbe, Reading, Tick};
 use std::task::Poll;
 
-use super::devices::current_step_a;
+use super::devices::amplifier::current_step_a;
 use bench_config::Config;
 use bench_plant::PlantError;
 use probe::Probe;
