@@ -398,10 +398,13 @@ impl Heat {
 
     fn allows(&self, current_a: f64) -> Result<(), Cause> {
         let after_a2 = self.thermal_a2 + self.share * (current_a * current_a - self.thermal_a2);
-        match current_a.abs() <= self.peak_a {
-            false => Err(Cause::Command),
-            true if after_a2 <= self.limit_a2 => Ok(()),
-            true => Err(Cause::Heat),
+        let is_within_peak = current_a.abs() <= self.peak_a;
+        if !is_within_peak {
+            Err(Cause::Command)
+        } else if after_a2 <= self.limit_a2 {
+            Ok(())
+        } else {
+            Err(Cause::Heat)
         }
     }
 }

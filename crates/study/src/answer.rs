@@ -228,10 +228,13 @@ fn effect(key: &str, index: usize, effects: &Effects) -> Effect {
 fn direction([low, _, high]: &[Cell; 3]) -> char {
     let difference = high.probability() - low.probability();
     let sigma = high.sigma().hypot(low.sigma());
-    match difference.abs() > SIGNIFICANT_SIGMAS * sigma {
-        true if difference > 0.0 => '+',
-        true => '-',
-        false => '0',
+    let is_significant = difference.abs() > SIGNIFICANT_SIGMAS * sigma;
+    if !is_significant {
+        '0'
+    } else if difference > 0.0 {
+        '+'
+    } else {
+        '-'
     }
 }
 

@@ -300,23 +300,23 @@ fn zeros_of_square(u: Complex<f64>) -> [Zero; 2] {
         kind,
     };
     let size = u.re.abs().sqrt();
-    match is_real(u) {
+    if !is_real(u) {
         // Called for u and for its conjugate: each call gives one zero in the right half plane and its mirror image.
-        false => {
-            let s = u.sqrt();
-            [
-                zero(s.re, s.im, ZeroKind::Cnmp),
-                zero(-s.re, -s.im, ZeroKind::Cmp),
-            ]
-        }
-        true if u.re < 0.0 => [
+        let s = u.sqrt();
+        [
+            zero(s.re, s.im, ZeroKind::Cnmp),
+            zero(-s.re, -s.im, ZeroKind::Cmp),
+        ]
+    } else if u.re < 0.0 {
+        [
             zero(0.0, size, ZeroKind::Mmp),
             zero(0.0, -size, ZeroKind::Mmp),
-        ],
-        true => [
+        ]
+    } else {
+        [
             zero(-size, 0.0, ZeroKind::Rmp),
             zero(size, 0.0, ZeroKind::Rnmp),
-        ],
+        ]
     }
 }
 
