@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { createRequire } from "node:module";
-import { mkdirSync, readFileSync } from "node:fs";
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { after, afterEach, before, test } from "node:test";
 import { Daemon, browser, openPage } from "./daemon.mjs";
 
@@ -322,6 +322,39 @@ test("a spike of one tick is visible in ten minutes", async () => {
     return { spike: Math.max(rows(at - 1), rows(at), rows(at + 1)), beside: Math.max(rows(at - 8), rows(at + 8)) };
   });
   assert.ok(heights.spike > 120 && heights.beside < 20, JSON.stringify(heights));
+  await page.context().close();
+});
+
+test("no label of the scope is cut at its left edge", async () => {
+  const page = await openPage(chrome, daemon.url, DESK);
+  // Constant signals have the narrowest range, and so the longest labels.
+  for (const value of [0, -1e-7, -1e-4, -1e-3, -0.0123456, 0.4]) {
+    const { labels, image } = await page.evaluate(async (value) => {
+      const { Samples } = await import("/page/samples.js");
+      const { Scope } = await import("/page/scope.js");
+      const samples = new Samples(), count = 250;
+      const buffer = new ArrayBuffer(32 + 4 * 4 * count), view = new DataView(buffer);
+      view.setUint8(0, 1); view.setUint8(1, 1); view.setUint16(2, 4, true); view.setUint32(4, 1, true);
+      view.setFloat64(8, 0, true); view.setFloat64(16, 2e-4, true); view.setUint32(24, count, true);
+      for (let index = 0; index < 4 * count; index++) view.setFloat32(32 + 4 * index, value, true);
+      samples.add(buffer);
+      const canvas = document.createElement("canvas");
+      canvas.style.cssText = "position: absolute; left: 0; top: 0; width: 700px; height: 600px";
+      document.body.append(canvas);
+      const context = canvas.getContext("2d"), labels = [];
+      context.fillText = (text, x, y) => {
+        if (context.textAlign === "right") labels.push({ text, left: x - context.measureText(text).width });
+        CanvasRenderingContext2D.prototype.fillText.call(context, text, x, y);
+      };
+      new Scope(canvas, document.createElement("p"), samples).draw();
+      const image = canvas.toDataURL("image/png");
+      canvas.remove();
+      return { labels, image };
+    }, value);
+    writeFileSync(`${PICTURES}/labels-${value}.png`, Buffer.from(image.split(",")[1], "base64"));
+    assert.ok(labels.length >= 6 && labels.some(({ text }) => text.length > 4), JSON.stringify(labels));
+    assert.deepEqual(labels.filter(({ left }) => left < 1), [], `of ${value}`);
+  }
   await page.context().close();
 });
 

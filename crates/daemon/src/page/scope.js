@@ -8,6 +8,8 @@ const STRIPS = [
   { title: "error (um)", signals: [2], factor: 1e6, share: 0.3 },
   { title: "current (A)", signals: [3], factor: 1, share: 0.25 },
 ];
+/** Up to 0.1 m, labels have at most a sign and five digits: a range is at least a 500th of its values, see valueRange. */
+const WIDEST_LABEL = "-0.0000";
 const UNITS = ["m", "m", "m", "A"];
 /** Share of the span after a trigger. */
 const AFTER_TRIGGER = 0.8;
@@ -101,7 +103,7 @@ export class Scope {
     this.checkTrigger();
     const { context, width, height, em } = begin(this.canvas);
     const [fromS, toS] = this.range();
-    const left = 4 * em, bottom = 1.7 * em, titles = 1.3 * em;
+    const left = context.measureText(WIDEST_LABEL).width + 8, bottom = 1.7 * em, titles = 1.3 * em;
     let top = 0;
     for (const [index, strip] of STRIPS.entries()) {
       const room = (height - bottom) * strip.share;
