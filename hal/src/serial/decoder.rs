@@ -59,9 +59,10 @@ pub trait Decoder: Send {
     fn message_bytes(&self) -> u32;
 }
 
-/// Counts damaged bytes and reports them in parts that depend on the bytes only, not on the slices.
+/// Counts damaged bytes and reports them in parts that depend on the bytes only, not on the slices. A decoder that calls
+/// [`Event::Damaged`] itself, once per broken message, does not need it.
 #[derive(Debug, Default)]
-pub(super) struct DamageCounter {
+pub struct DamageCounter {
     bytes: u32,
 }
 
@@ -70,23 +71,34 @@ impl DamageCounter {
     /// statistics.
     const PART: u32 = 64;
 
-    pub(super) fn add(&mut self, bytes: u32, out: &mut dyn FnMut(Event)) {
+    /// Adds damaged bytes.
+    pub fn add(&mut self, bytes: u32, out: &mut dyn FnMut(Event)) {
         self.bytes += bytes;
         if self.bytes >= Self::PART {
             self.report(out);
         }
     }
 
-    pub(super) fn report(&mut self, out: &mut dyn FnMut(Event)) {
+    /// Reports what was added since the last report. Call it when a valid message begins.
+    pub fn report(&mut self, out: &mut dyn FnMut(Event)) {
         if self.bytes > 0 {
             out(Event::Damaged(std::mem::take(&mut self.bytes)));
         }
     }
 }
 
-/// The bytes of an incomplete message, oldest first, at most `N`.
+/// The bytes of an incomplete message, oldest first, at most `N`: noise on the line cannot fill the memory.
+///
+/// ```
+/// use bench_hal::serial::Window;
+///
+/// let mut window = Window::<2>::default();
+/// assert!(window.push(b'4') && window.push(b'2'));
+/// assert!(!window.push(b'!'), "full");
+/// assert_eq!(window.bytes(), b"42");
+/// ```
 #[derive(Debug)]
-pub(super) struct Window<const N: usize> {
+pub struct Window<const N: usize> {
     bytes: [u8; N],
     length: usize,
 }
@@ -102,7 +114,7 @@ impl<const N: usize> Default for Window<N> {
 
 impl<const N: usize> Window<N> {
     /// Appends a byte; returns `false` if the window is full.
-    pub(super) fn push(&mut self, byte: u8) -> bool {
+    pub fn push(&mut self, byte: u8) -> bool {
         let Some(slot) = self.bytes.get_mut(self.length) else {
             return false;
         };
@@ -111,18 +123,20 @@ impl<const N: usize> Window<N> {
         true
     }
 
-    pub(super) fn bytes(&self) -> &[u8] {
+    /// The bytes.
+    pub fn bytes(&self) -> &[u8] {
         &self.bytes[..self.length] // `push` keeps length <= N
     }
 
-    pub(super) fn drop_front(&mut self, count: usize) {
+    /// Removes the oldest bytes.
+    pub fn drop_front(&mut self, count: usize) {
         let count = count.min(self.length);
         self.bytes.copy_within(count..self.length, 0);
         self.length -= count;
     }
 
     /// Empties the window and returns the number of bytes that it held.
-    pub(super) fn clear(&mut self) -> u32 {
+    pub fn clear(&mut self) -> u32 {
         std::mem::take(&mut self.length) as u32
     }
 }

@@ -48,7 +48,7 @@ mod protocol;
 mod reader;
 mod statistics;
 
-pub use decoder::{Decoder, Event, Sample};
+pub use decoder::{DamageCounter, Decoder, Event, Sample, Window};
 pub use error::SerialError;
 pub use mounting::Mounting;
 pub use note::Note;
