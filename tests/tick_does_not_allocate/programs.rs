@@ -1,6 +1,6 @@
 //! Programs of every kind, each with a duration of about 1 s.
 use bench_config::{AmplitudePoint, Config, ExcitationKind, ReferenceSettings, Sweep, TravelPoint};
-use bench_control::{ControlDesign, ControllerText};
+use bench_control::ControllerText;
 use bench_excitation::command::{CommandFilter, FilteredCommand, Taps};
 use bench_excitation::{
     Chirp, FileReference, HoldReference, RampReference, ReferenceContext, SineReference,
@@ -14,11 +14,6 @@ pub const NO_CURRENT: &str = "no current";
 /// A program of every kind, with its name.
 pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     let period_s = config.servo.period_s();
-    let folder = tempfile::tempdir().expect("a temporary folder");
-    let own = folder.path().join("own.toml");
-    let text = "title = \"own\"\n[[section]]\nkind = \"integrator\"\ngain_a_per_um = 0.05\n[[section]]\nkind = \"coefficients\"\n\
-                numerator = [1.0, 2.0, 90000.0]\ndenominator = [1.0, 400.0, 90000.0]\nprewarp_rad_s = 300.0\n";
-    std::fs::write(&own, text).expect("a file");
     let references = [
         ReferenceSettings::Hold(HoldReference {}),
         ReferenceSettings::Step(StepReference {
@@ -46,11 +41,9 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         }),
     ];
     let mut programs: Vec<(String, Box<dyn Program>)> = Vec::new();
-    for name in ["fast", "slow", own.to_str().expect("text")] {
-        let sections = ControllerText::find(name)
-            .expect("found")
-            .sections(config.servo.rate_hz)
-            .expect("valid");
+    for controller in controllers() {
+        let name = &controller.name;
+        let design = controller.design(config.servo.rate_hz).expect("valid");
         for settings in &references {
             let points = "time_s,reference_m\n0.0,0.0\n0.2,1e-5\n0.4,2e-5\n";
             let context = ReferenceContext {
@@ -59,12 +52,12 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
                 file: Some(points),
             };
             let reference = settings.design().build(&context).expect("valid");
-            let program = Control::new(sections.law(period_s), reference, 500, 4500);
+            let program = Control::new(design.law(period_s), reference, 500, 4500);
             programs.push((format!("{name}, {settings:?}"), Box::new(program)));
             let reference = settings.design().build(&context).expect("valid");
             let command = FilteredCommand::new(reference, filter());
             let command = Box::new(command);
-            let program = Control::with_command(sections.law(period_s), command, 500, 4500);
+            let program = Control::with_command(design.law(period_s), command, 500, 4500);
             programs.push((format!("{name}, filtered {settings:?}"), Box::new(program)));
         }
     }
@@ -105,6 +98,24 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
         ))),
     ));
     programs
+}
+
+/// A controller of every form and kind.
+fn controllers() -> Vec<ControllerText> {
+    let own = "title = 'own'\n[[section]]\nkind = 'integrator'\ngain_a_per_um = 0.05\n[[section]]\nkind = 'coefficients'\n\
+               numerator = [1.0, 2.0, 90000.0]\ndenominator = [1.0, 400.0, 90000.0]\nprewarp_rad_s = 300.0\n";
+    let transfer = "title = 'transfer'\n[tf]\nnumerator = [0.05]\ndenominator = [1.0, 0.0]\ngain_unit = 'A/um'\n";
+    let matrices = "title = 'matrices'\n[law]\nkind = 'state_space'\nrate_hz = 5000.0\na = [[0.5]]\nb_reference = [1.0]\n\
+                    b_position = [-1.0]\nc = [1.0]\n";
+    let repetitive = "title = 'repetitive'\n[law]\nkind = 'repetitive'\nperiod_ticks = 1000\nlead_ticks = 5\nlearning_gain = 0.1\n\
+                      forgetting = 0.9\n[[law.section]]\nkind = 'integrator'\ngain_a_per_um = 0.05\n";
+    let texts = [own, transfer, matrices, repetitive];
+    let written = texts.iter().map(|text| ControllerText {
+        name: text.lines().next().unwrap_or_default().into(),
+        text: (*text).into(),
+    });
+    let embedded = ["fast", "slow"].map(|name| ControllerText::find(name).expect("found"));
+    embedded.into_iter().chain(written).collect()
 }
 
 /// A shaped reference and a feedforward current, with delays and preview; 1 A for 100 um.

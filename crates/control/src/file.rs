@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Section;
 use super::error::ControllerError;
 use super::law::ControlDesign;
-use super::laws::LawSettings;
+use super::laws::Law;
 use super::section_settings::{SectionSettings, checked_sections};
 use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
@@ -29,14 +29,14 @@ pub struct ControllerFile {
 }
 
 /// A controller file with a control law of another kind.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(title = "bench control law")]
-pub struct LawFile {
+struct LawFile {
     /// Title of the controller.
-    pub title: String,
+    #[serde(rename = "title")]
+    _title: String,
     /// The law.
-    pub law: LawSettings,
+    law: Law,
 }
 
 /// The form of a controller file.
@@ -105,12 +105,14 @@ impl ControllerText {
 
     fn law(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
         let file: LawFile = bench_settings::typed(&self.name, &self.text)?;
-        let checked = file.law.check(rate_hz);
-        checked.map_err(|why| ControllerError::Law {
-            name: self.name.clone(),
-            why,
-        })?;
-        Ok(file.law.design())
+        let Law(settings) = file.law;
+        settings
+            .check(rate_hz)
+            .map_err(|why| ControllerError::Law {
+                name: self.name.clone(),
+                why,
+            })?;
+        Ok(settings)
     }
 
     fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {

@@ -52,12 +52,12 @@ pub use biquad::{Biquad, BiquadState};
 pub use closed_loop::{ClosedLoop, StepMode};
 pub use controller::{Controller, ControllerState, SectionController, continuous_response};
 pub use error::ControllerError;
-pub use file::{CONTROLLERS, ControllerFile, ControllerText, LawFile};
+pub use file::{CONTROLLERS, ControllerFile, ControllerText};
 pub use import::{ImportOptions, Imported, NumericArray, Value, Variables, import, read_variables};
 pub use import_error::{FormatError, ImportError};
 pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
-pub use laws::{LawSettings, RepetitiveLaw, StateSpaceLaw};
+pub use laws::{ControlLawSettings, RepetitiveLaw, StateSpaceLaw, register_law};
 pub use margins::grid;
 pub use margins::{Crossing, Margins, PhaseCrossing};
 pub use minimum_time::{

@@ -19,6 +19,20 @@ pub struct StateSpace {
 }
 
 impl StateSpace {
+    /// A system of N states from the rows of A, from B, C and D.
+    ///
+    /// ```
+    /// use bench_control::StateSpace;
+    /// use nalgebra::Complex;
+    ///
+    /// // x+ = 0.5 x + u, y = x: 1/(z - 0.5).
+    /// let system = StateSpace::from_rows([[0.5]], [1.0], [1.0], 0.0);
+    /// assert_eq!(system.response(Complex::new(1.0, 0.0)), Complex::new(2.0, 0.0));
+    /// ```
+    pub fn from_rows<const N: usize>(a: [[f64; N]; N], b: [f64; N], c: [f64; N], d: f64) -> Self {
+        StateSpace::new(a.as_flattened(), &b, &c, d)
+    }
+
     /// A system from A row by row, B and C.
     fn new(a: &[f64], b: &[f64], c: &[f64], d: f64) -> Self {
         let n = b.len();

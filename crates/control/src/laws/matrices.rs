@@ -108,8 +108,7 @@ impl ControlLaw for RunningLaw {
     fn update(&mut self, input: &LawInput) -> f64 {
         let reference_m = input.reference_m - self.rest_m;
         let position_m = input.position_m - self.rest_m;
-        let request_a =
-            self.c.dot(&self.state) + self.d[0] * reference_m + self.d[1] * position_m;
+        let request_a = self.c.dot(&self.state) + self.d[0] * reference_m + self.d[1] * position_m;
         self.next.gemv(1.0, &self.a, &self.state, 0.0);
         self.next.axpy(reference_m, &self.b[0], 1.0);
         self.next.axpy(position_m, &self.b[1], 1.0);

@@ -263,7 +263,10 @@ mod tests {
             let terms = (0..).zip(&impulse).map(|(k, u)| z.powi(-k) * *u);
             let expected = terms.sum::<Complex<f64>>() * 1e6;
             let found = linear.response(z);
-            assert!((found - expected).norm() < 1e-9 * expected.norm(), "{angle}");
+            assert!(
+                (found - expected).norm() < 1e-9 * expected.norm(),
+                "{angle}"
+            );
         }
     }
 
@@ -281,7 +284,12 @@ mod tests {
             section: vec![integrator.clone(), integrator],
             ..settings()
         };
-        assert!(integrating.check(1000.0).unwrap_err().contains("3 integrators"));
+        assert!(
+            integrating
+                .check(1000.0)
+                .unwrap_err()
+                .contains("3 integrators")
+        );
     }
 
     /// The same law with shift registers as matrices: v of the last N + 1 ticks, then e of the last N - d.
@@ -348,12 +356,20 @@ mod tests {
                 period_ticks,
                 lead_ticks: (uniform(0.0, 6.0) as usize).min(period_ticks - 1),
                 learning_gain: uniform(0.0, 1.0),
-                forgetting: if case % 4 == 0 { 1.0 } else { uniform(0.5, 1.0) },
+                forgetting: if case % 4 == 0 {
+                    1.0
+                } else {
+                    uniform(0.5, 1.0)
+                },
                 section: vec![SectionSettings::Gain { gain_a_per_um }],
             };
             let by_matrices = closed(Box::new(as_matrices(&settings, gain_a_per_um)));
             let by_curve = closed(Box::new(settings.clone()));
-            assert_eq!(by_curve.is_stable(), by_matrices.is_stable(), "{settings:?}");
+            assert_eq!(
+                by_curve.is_stable(),
+                by_matrices.is_stable(),
+                "{settings:?}"
+            );
             stable += usize::from(by_curve.is_stable());
         }
         assert!((20..80).contains(&stable), "{stable}");
@@ -368,7 +384,9 @@ mod tests {
             lead_ticks: 3,
             learning_gain: 0.2,
             forgetting: 0.98,
-            section: vec![SectionSettings::Integrator { gain_a_per_um: 1e-3 }],
+            section: vec![SectionSettings::Integrator {
+                gain_a_per_um: 1e-3,
+            }],
         };
         let closed = closed(Box::new(settings.clone()));
         let cascade = self::closed(Box::new(RepetitiveLaw {
@@ -389,7 +407,11 @@ mod tests {
             (loop_gain + 1.0).norm()
         };
         let least = (1..2048).map(sensitivity).fold(f64::INFINITY, f64::min);
-        assert!(margins.modulus_margin <= least, "{} {least}", margins.modulus_margin);
+        assert!(
+            margins.modulus_margin <= least,
+            "{} {least}",
+            margins.modulus_margin
+        );
         assert!(margins.modulus_margin > 0.1, "{}", margins.modulus_margin);
     }
 }
