@@ -43,7 +43,7 @@ fn config(sets: Vec<String>) -> Config {
 }
 
 fn protocol() -> Arc<dyn Protocol> {
-    config(vec![]).probe.device.serial().unwrap().protocol
+    Arc::clone(&config(vec![]).probe.device.serial().unwrap().protocol)
 }
 
 /// A probe with 650 readings per second. The stage is 10 um from zero, which is the middle of the range of 2 mm.

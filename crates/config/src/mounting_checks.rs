@@ -1,6 +1,6 @@
 //! The scales in the driver of a serial probe, which are between the interlocks and the device.
 
-use super::{CalibrationSettings, Config, MIN_PROBE_GAIN, SerialParts, is_near_one};
+use super::{CalibrationSettings, Config, MIN_PROBE_GAIN, SerialDevice, is_near_one};
 use bench_base::finding::Finding;
 
 const GAIN: &str = "probe.device.mounting.gain";
@@ -16,7 +16,7 @@ pub(super) fn mounting(config: &Config) -> Vec<Finding> {
     let errors = [
         vanishing_gain(gain),
         unconfirmed_gain(gain, &config.calibration),
-        unmeasured_travel(&serial, config.interlock.soft_limit_m),
+        unmeasured_travel(serial, config.interlock.soft_limit_m),
     ];
     errors.into_iter().flatten().collect()
 }
@@ -38,7 +38,7 @@ fn unconfirmed_gain(gain: f64, calibration: &CalibrationSettings) -> Option<Find
 }
 
 /// The range of a probe is its scale: with one that is too small all positions are too small.
-fn unmeasured_travel(serial: &SerialParts, soft_m: f64) -> Option<Finding> {
+fn unmeasured_travel(serial: &SerialDevice, soft_m: f64) -> Option<Finding> {
     let [lowest_m, highest_m] = serial.stage_range_m()?;
     let needed_m = soft_m * (1.0 - ROUNDING);
     let is_measured = lowest_m <= -needed_m && needed_m <= highest_m;

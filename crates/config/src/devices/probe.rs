@@ -1,83 +1,249 @@
 //! The register of probes.
+//!
+//! A new serial probe is its protocol in `hal`, and one line in [`PROBES`]. A probe of another crate is added by
+//! [`register_probe`].
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bench_hal::serial::{Mounting, PortSettings, Protocol, ascii, capancdt, optoncdt};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use bench_settings::{Kind, KindExists, Kinds};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::{DeserializeOwned, Error as _};
+use serde::ser::{Error as _, Serializer};
+use serde::{Deserialize, Deserializer, Serialize};
+use toml::Table;
 
-/// Makes [`ProbeDevice`] from the registered serial probes: documentation, variant, `kind` in the configuration and settings of
-/// the protocol.
-macro_rules! serial_probes {
-    ($($(#[$doc:meta])+ $variant:ident = $kind:literal: $settings:ty;)+) => {
-        /// The device that reads the stage.
-        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(tag = "kind")]
-        pub enum ProbeDevice {
-            /// The probe of the simulated stage.
-            #[serde(rename = "simulated")]
-            Simulated(SimulatedProbe),
-            $($(#[$doc])+ #[serde(rename = $kind)] $variant(SerialDevice<$settings>),)+
-        }
+/// The devices that read the stage by the `kind` of their table.
+static PROBES: Kinds<ProbeKind> = Kinds::new(
+    const {
+        &[
+            ProbeKind::SIMULATED,
+            ProbeKind::serial::<capancdt::Settings>("capancdt"),
+            ProbeKind::serial::<optoncdt::Settings>("optoncdt"),
+            ProbeKind::serial::<ascii::Settings>("ascii"),
+        ]
+    },
+);
 
-        impl ProbeDevice {
-            /// The name of the kind, as in a configuration.
-            pub fn kind(&self) -> &'static str {
-                match self {
-                    ProbeDevice::Simulated(_) => "simulated",
-                    $(ProbeDevice::$variant(_) => $kind,)+
-                }
-            }
-
-            /// Line, mounting and protocol; `None` for the simulated probe.
-            pub fn serial(&self) -> Option<SerialParts> {
-                match self {
-                    ProbeDevice::Simulated(_) => None,
-                    $(ProbeDevice::$variant(device) => Some(device.parts()),)+
-                }
-            }
-        }
-    };
+/// Settings of the protocol of a serial probe.
+pub trait ProtocolSettings:
+    Protocol + Clone + Serialize + DeserializeOwned + JsonSchema + 'static
+{
 }
 
-serial_probes! {
-    /// Micro-Epsilon capaNCDT 61xx over RS485.
-    Capancdt = "capancdt": capancdt::Settings;
-    /// Micro-Epsilon RS422 stream (optoNCDT family).
-    Optoncdt = "optoncdt": optoncdt::Settings;
-    /// A probe that sends lines of text.
-    Ascii = "ascii": ascii::Settings;
+impl<P> ProtocolSettings for P where
+    P: Protocol + Clone + Serialize + DeserializeOwned + JsonSchema + 'static
+{
 }
 
-/// The probe of the simulated stage; its settings are in `[sim]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SimulatedProbe {}
-
-/// A probe on a serial port: line, mounting, and the settings of its protocol.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct SerialDevice<P> {
-    /// The serial line.
-    pub line: PortSettings,
-    /// How the probe is mounted.
-    pub mounting: Mounting,
-    /// The protocol.
-    #[serde(flatten)]
-    pub protocol: P,
+/// Adds a serial probe that a configuration may name as `kind` in its table `[probe.device]`. Call it before the command line's
+/// `main`.
+///
+/// ```
+/// use bench_config::{Source, load, register_probe};
+/// use bench_hal::serial::{Decoder, Event, Protocol, Sample, SerialError};
+/// use schemars::JsonSchema;
+/// use serde::{Deserialize, Serialize};
+///
+/// /// A probe that sends one byte per measurement.
+/// #[derive(Clone, Copy, Debug, Serialize, Deserialize, JsonSchema)]
+/// struct ByteProbe {
+///     /// Displacement of one count in metres.
+///     #[schemars(range(min = 1e-12, max = 1e-3))]
+///     count_m: f64,
+/// }
+///
+/// impl Protocol for ByteProbe {
+///     fn decoder(&self) -> Result<Box<dyn Decoder>, SerialError> {
+///         Ok(Box::new(*self))
+///     }
+/// }
+///
+/// impl Decoder for ByteProbe {
+///     fn feed(&mut self, bytes: &[u8], out: &mut dyn FnMut(Event)) {
+///         for byte in bytes {
+///             let position_m = f64::from(*byte) * self.count_m;
+///             out(Event::Value(Sample { raw: (*byte).into(), position_m }));
+///         }
+///     }
+///     fn message_bytes(&self) -> u32 {
+///         1
+///     }
+/// }
+///
+/// register_probe::<ByteProbe>("byte")?;
+/// let device = "probe.device={ kind = 'byte', line = { port = '/dev/ttyUSB0', baud = 921600 }, \
+///               mounting = { gain = 1.0, offset_m = 0.0 }, count_m = 1e-6 }";
+/// let config = load(&Source { config: Some("lab".into()), sets: vec![device.into()], ..Source::default() })?;
+/// assert_eq!(config.probe.device.kind(), "byte");
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn register_probe<P: ProtocolSettings>(kind: &'static str) -> Result<(), KindExists> {
+    PROBES.add(ProbeKind::serial::<P>(kind))
 }
 
-/// The parts of a serial probe, for any protocol.
+/// The device that reads the stage.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ProbeDevice {
+    /// The probe of the simulated stage; its settings are in `[sim]`.
+    Simulated,
+    /// A probe on a serial port.
+    Serial(SerialDevice),
+}
+
+/// A probe on a serial port, with any protocol.
 #[derive(Clone, Debug)]
-pub struct SerialParts {
+pub struct SerialDevice {
     /// The serial line.
     pub line: PortSettings,
     /// How the probe is mounted.
     pub mounting: Mounting,
     /// The protocol.
     pub protocol: Arc<dyn Protocol>,
+    kind: &'static str,
+    /// The settings of the protocol.
+    settings: Table,
+}
+
+impl PartialEq for SerialDevice {
+    /// A protocol is given by its kind and its settings.
+    fn eq(&self, other: &SerialDevice) -> bool {
+        (self.kind, &self.line, &self.mounting, &self.settings)
+            == (other.kind, &other.line, &other.mounting, &other.settings)
+    }
+}
+
+/// The table of a serial probe: line, mounting, and the settings of its protocol.
+#[derive(Serialize, Deserialize, JsonSchema)]
+struct SerialTable<P> {
+    /// The serial line.
+    line: PortSettings,
+    /// How the probe is mounted.
+    mounting: Mounting,
+    /// The protocol.
+    #[serde(flatten)]
+    protocol: P,
+}
+
+/// The probe of the simulated stage; its settings are in `[sim]`.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct SimulatedTable {}
+
+/// A device that a configuration may name.
+#[derive(Clone, Copy)]
+struct ProbeKind {
+    name: &'static str,
+    schema: fn(&mut SchemaGenerator) -> Schema,
+    read: fn(&'static str, Table) -> Result<ProbeDevice, toml::de::Error>,
+}
+
+impl ProbeKind {
+    const SIMULATED: ProbeKind = ProbeKind {
+        name: "simulated",
+        schema: SimulatedTable::json_schema,
+        read: |_, table| {
+            table.try_into::<SimulatedTable>()?;
+            Ok(ProbeDevice::Simulated)
+        },
+    };
+
+    const fn serial<P: ProtocolSettings>(name: &'static str) -> ProbeKind {
+        ProbeKind {
+            name,
+            schema: SerialTable::<P>::json_schema,
+            read: read_serial::<P>,
+        }
+    }
+}
+
+fn read_serial<P: ProtocolSettings>(
+    kind: &'static str,
+    table: Table,
+) -> Result<ProbeDevice, toml::de::Error> {
+    let table: SerialTable<P> = table.try_into()?;
+    // With all defaults, so that a recording has each setting.
+    let settings = Table::try_from(&table.protocol).map_err(toml::de::Error::custom)?;
+    Ok(ProbeDevice::Serial(SerialDevice {
+        line: table.line,
+        mounting: table.mounting,
+        protocol: Arc::new(table.protocol),
+        kind,
+        settings,
+    }))
+}
+
+impl Kind for ProbeKind {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
+        (self.schema)(generator)
+    }
+}
+
+impl<'de> Deserialize<'de> for ProbeDevice {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let mut table = Table::deserialize(from)?;
+        let kind = PROBES.take(&mut table).map_err(D::Error::custom)?;
+        (kind.read)(kind.name, table).map_err(D::Error::custom)
+    }
+}
+
+impl Serialize for ProbeDevice {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.table().map_err(S::Error::custom)?.serialize(to)
+    }
+}
+
+impl JsonSchema for ProbeDevice {
+    fn schema_name() -> Cow<'static, str> {
+        "ProbeDevice".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let mut schema = PROBES.schema(generator);
+        schema.insert(
+            "description".into(),
+            "The device that reads the stage.".into(),
+        );
+        schema
+    }
 }
 
 impl ProbeDevice {
+    /// The name of the kind, as in a configuration.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            ProbeDevice::Simulated => ProbeKind::SIMULATED.name,
+            ProbeDevice::Serial(device) => device.kind,
+        }
+    }
+
+    /// Line, mounting and protocol; `None` for the simulated probe.
+    pub fn serial(&self) -> Option<&SerialDevice> {
+        match self {
+            ProbeDevice::Simulated => None,
+            ProbeDevice::Serial(device) => Some(device),
+        }
+    }
+
+    /// The table in a configuration.
+    fn table(&self) -> Result<Table, toml::ser::Error> {
+        let mut table = match self {
+            ProbeDevice::Simulated => Table::new(),
+            ProbeDevice::Serial(device) => Table::try_from(SerialTable {
+                line: device.line.clone(),
+                mounting: device.mounting,
+                protocol: device.settings.clone(),
+            })?,
+        };
+        table.insert("kind".into(), self.kind().into());
+        Ok(table)
+    }
+
     /// Metres of the stage per metre of the probe, by the mounting; 1 for the simulated probe.
     pub fn mounting_gain(&self) -> f64 {
         self.serial().map_or(1.0, |serial| serial.mounting.gain)
@@ -99,22 +265,12 @@ impl ProbeDevice {
     }
 }
 
-impl SerialParts {
+impl SerialDevice {
     /// Lowest and highest position of the stage in metres that the probe can measure as mounted; `None` if its range is unknown.
     pub fn stage_range_m(&self) -> Option<[f64; 2]> {
         let Mounting { gain, offset_m } = self.mounting;
         let [first_m, last_m] = self.protocol.range_m()?;
         let ends_m = [gain * first_m + offset_m, gain * last_m + offset_m];
         Some([ends_m[0].min(ends_m[1]), ends_m[0].max(ends_m[1])])
-    }
-}
-
-impl<P: Protocol + Clone + 'static> SerialDevice<P> {
-    fn parts(&self) -> SerialParts {
-        SerialParts {
-            line: self.line.clone(),
-            mounting: self.mounting,
-            protocol: Arc::new(self.protocol.clone()),
-        }
     }
 }

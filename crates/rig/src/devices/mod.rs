@@ -101,13 +101,13 @@ pub struct OpenRig {
 /// Whether amplifier and probe are simulated.
 pub fn is_simulated(config: &Config) -> bool {
     matches!(config.amplifier.device, AmplifierDevice::Simulated(_))
-        && matches!(config.probe.device, ProbeDevice::Simulated(_))
+        && matches!(config.probe.device, ProbeDevice::Simulated)
 }
 
 /// Refuses a configuration in which only one of amplifier and probe is simulated.
 pub fn check_kinds(config: &Config) -> Result<(), DevicesError> {
     let amplifier_is_simulated = matches!(config.amplifier.device, AmplifierDevice::Simulated(_));
-    let probe_is_simulated = matches!(config.probe.device, ProbeDevice::Simulated(_));
+    let probe_is_simulated = matches!(config.probe.device, ProbeDevice::Simulated);
     if amplifier_is_simulated == probe_is_simulated {
         return Ok(());
     }

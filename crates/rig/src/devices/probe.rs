@@ -1,5 +1,6 @@
 //! From the settings of a serial probe to its driver.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use bench_hal::serial::{self, SerialError, SerialProbe};
@@ -61,11 +62,11 @@ pub fn open(probe: &ProbeSettings, loop_priority: i32) -> Result<SerialProbe, Pr
 
 /// The settings of the driver; `None` for the simulated probe.
 pub fn driver_settings(probe: &ProbeSettings) -> Option<serial::ProbeSettings> {
-    let parts = probe.device.serial()?;
+    let device = probe.device.serial()?;
     Some(serial::ProbeSettings {
-        port: parts.line,
-        protocol: parts.protocol,
-        mounting: parts.mounting,
+        port: device.line.clone(),
+        protocol: Arc::clone(&device.protocol),
+        mounting: device.mounting,
         latency: Duration::from_secs_f64(probe.latency_s),
     })
 }

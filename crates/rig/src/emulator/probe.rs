@@ -62,7 +62,7 @@ impl ProbeServer {
         let rate_hz = rate_hz.map_or_else(|| measuring_rate_hz(&config.probe), Ok)?;
         let probe = EmulatedProbe::new(&*serial.protocol, rate_hz)?;
         let device: SharedProbe = Arc::new(Mutex::new(probe));
-        let (line, notes) = open_line(serial.line, endpoint)?;
+        let (line, notes) = open_line(serial.line.clone(), endpoint)?;
         let place = line.path().to_owned();
         let link = endpoint.link_to(&place)?;
         let measure = measurement(Sensor::new(&config.sim), serial.mounting, stage);
