@@ -53,5 +53,15 @@
 
 #![deny(unsafe_code)]
 
+use std::process::ExitCode;
+
 pub mod cli;
 pub mod doctor;
+mod log;
+
+/// The `bench` program: log to standard error, run the command, exit with its code. A program with probes or control laws of its
+/// own registers them before it calls this function (`examples/own_bench`).
+pub fn main() -> ExitCode {
+    log::start();
+    cli::main().into()
+}

@@ -1,0 +1,13 @@
+//! The command line of `bench` with a probe and a control law of its own: docs/own-bench.md explains it.
+
+mod damped_integral;
+mod interferometer;
+
+use std::error::Error;
+use std::process::ExitCode;
+
+fn main() -> Result<ExitCode, Box<dyn Error>> {
+    bench_config::register_probe::<interferometer::Interferometer>("interferometer")?;
+    bench_control::register_law::<damped_integral::DampedIntegral>("damped_integral")?;
+    Ok(bench::main())
+}
