@@ -22,6 +22,7 @@
 mod biquad;
 mod closed_loop;
 mod controller;
+mod convex;
 mod encirclements;
 mod error;
 mod features;
@@ -39,7 +40,6 @@ mod pole;
 mod quadratic;
 mod section;
 mod section_settings;
-mod solver_settings;
 mod state_space;
 mod step_metrics;
 mod swept;

@@ -1,9 +1,6 @@
-//! The linear programme as matrices for the interior-point solver.
+//! The programme of the blocks, as rows.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus, SupportedConeT};
-
-use crate::solver_settings::solver_settings;
+use crate::convex::ConvexProgramme;
 
 /// Weight of sum (x - 1)^2 beside t: of several solutions the one with the smoothest reference.
 const SMOOTHNESS: f64 = 1e-6;
@@ -23,68 +20,33 @@ pub(super) struct Solution {
 
 /// Minimises t over the values x of `count` blocks, each at most `bound` in magnitude. `None` if there is no solution.
 pub(super) fn minimise(count: usize, rows: &[Row], bound: f64) -> Option<Solution> {
-    let (matrix, limits) = constraints(count, rows, bound);
-    let (weights, costs) = objective(count);
-    let cones: [SupportedConeT<f64>; 1] = [NonnegativeConeT(limits.len())];
-    let settings = solver_settings();
-    let mut solver =
-        DefaultSolver::new(&weights, &costs, &matrix, &limits, &cones, settings).ok()?;
-    solver.solve();
-    let solution = &solver.solution;
-    let is_solved = matches!(
-        solution.status,
-        SolverStatus::Solved | SolverStatus::AlmostSolved
-    );
-    let (error, blocks) = solution.x.split_last()?;
-    let is_finite = solution.x.iter().all(|value| value.is_finite());
-    (is_solved && is_finite).then(|| Solution {
+    let mut programme = objective(count);
+    for row in rows {
+        let coefficients = row.coefficients.iter().copied().enumerate();
+        let needed = coefficients.filter(|(_, coefficient)| *coefficient != 0.0);
+        if row.is_error {
+            programme.at_most(needed.chain([(count, -1.0)]), -row.rest);
+        } else {
+            programme.at_most(needed, 1.0 - row.rest);
+        }
+    }
+    for block in 0..count {
+        programme.at_most([(block, 1.0)], bound);
+        programme.at_most([(block, -1.0)], bound);
+    }
+    let solution = programme.solve().filter(|solution| solution.is_exact)?;
+    let (error, blocks) = solution.unknowns.split_last()?;
+    Some(Solution {
         blocks: blocks.to_vec(),
         error: *error,
     })
 }
 
-/// A z <= b for z = (x, t): the rows, then the bounds of x from above and below.
-fn constraints(count: usize, rows: &[Row], bound: f64) -> (CscMatrix<f64>, Vec<f64>) {
-    let height = rows.len() + 2 * count;
-    let (mut starts, mut places, mut values) = (vec![0], Vec::new(), Vec::new());
-    for block in 0..count {
-        for (place, row) in rows.iter().enumerate() {
-            if row.coefficients[block] != 0.0 {
-                places.push(place);
-                values.push(row.coefficients[block]);
-            }
-        }
-        places.extend([rows.len() + 2 * block, rows.len() + 2 * block + 1]);
-        values.extend([1.0, -1.0]);
-        starts.push(places.len());
-    }
-    for (place, _) in rows.iter().enumerate().filter(|(_, row)| row.is_error) {
-        places.push(place);
-        values.push(-1.0);
-    }
-    starts.push(places.len());
-    let limit = |row: &Row| {
-        if row.is_error {
-            -row.rest
-        } else {
-            1.0 - row.rest
-        }
-    };
-    let mut limits: Vec<f64> = rows.iter().map(limit).collect();
-    limits.extend(vec![bound; 2 * count]);
-    let matrix = CscMatrix::new(height, count + 1, starts, places, values);
-    (matrix, limits)
-}
-
-/// t + SMOOTHNESS sum (x - 1)^2, as z' P z/2 + q' z.
-fn objective(count: usize) -> (CscMatrix<f64>, Vec<f64>) {
-    let mut starts: Vec<usize> = (0..=count).collect();
-    starts.push(count);
-    let weights = vec![2.0 * SMOOTHNESS; count];
-    let matrix = CscMatrix::new(count + 1, count + 1, starts, (0..count).collect(), weights);
+/// t + SMOOTHNESS sum (x - 1)^2, without rows. The unknowns are x, then t.
+fn objective(count: usize) -> ConvexProgramme {
     let mut costs = vec![-2.0 * SMOOTHNESS; count];
     costs.push(1.0);
-    (matrix, costs)
+    ConvexProgramme::quadratic(vec![2.0 * SMOOTHNESS; count], costs)
 }
 
 #[cfg(test)]

@@ -4,13 +4,9 @@
 //!  minimise v   subject to   weight |constant + sum of factors_n x_n| <= 1 + v        for each limit
 //! ```
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{
-    DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SolverStatus, SupportedConeT,
-};
 use nalgebra::Complex;
 
-use crate::solver_settings::solver_settings;
+use crate::convex::{ConvexProgramme, Entry};
 
 /// weight |constant + sum of factors_n x_n|.
 #[derive(Clone, Debug)]
@@ -26,110 +22,60 @@ pub struct Term {
 /// A programme with the unknowns x, v, and one magnitude for each term of a sum.
 #[derive(Clone, Debug)]
 pub struct ConeProgramme {
-    unknowns: usize,
-    /// Magnitudes that are unknowns of their own.
-    magnitudes: usize,
-    rows: Vec<usize>,
-    columns: Vec<usize>,
-    values: Vec<f64>,
-    limits: Vec<f64>,
-    cones: Vec<SupportedConeT<f64>>,
+    /// Place of v among the unknowns.
+    violation: usize,
+    programme: ConvexProgramme,
 }
 
 impl ConeProgramme {
     /// A programme with `unknowns` unknowns x and without limits.
     pub fn new(unknowns: usize) -> ConeProgramme {
+        let mut costs = vec![0.0; unknowns];
+        costs.push(1.0);
         ConeProgramme {
-            unknowns,
-            magnitudes: 0,
-            rows: Vec::new(),
-            columns: Vec::new(),
-            values: Vec::new(),
-            limits: Vec::new(),
-            cones: Vec::new(),
+            violation: unknowns,
+            programme: ConvexProgramme::linear(costs),
         }
     }
 
     /// Adds the limit that a term is at most 1 + v.
     pub fn limit(&mut self, term: Term) {
-        let violation = self.unknowns;
-        self.push(self.limits.len(), violation, -1.0);
-        self.limits.push(1.0);
-        self.push_term(&term, term.weight);
+        self.limit_by(&term, self.violation, 1.0);
     }
 
     /// Adds the limit that the sum of two terms is at most 1 + v.
     pub fn limit_sum(&mut self, first: Term, second: Term) {
-        let violation = self.unknowns;
-        let own = [&first, &second].map(|term| self.magnitude(term));
-        let row = self.limits.len();
-        self.push(row, violation, -1.0);
-        for column in own {
-            self.push(row, column, 1.0);
-        }
-        self.limits.push(1.0);
-        self.cones.push(NonnegativeConeT(1));
+        let [first, second] = [&first, &second].map(|term| self.magnitude(term));
+        let sum = [(self.violation, -1.0), (first, 1.0), (second, 1.0)];
+        self.programme.at_most(sum, 1.0);
     }
 
     /// An unknown that is at least the term.
     fn magnitude(&mut self, term: &Term) -> usize {
-        self.magnitudes += 1;
-        let column = self.unknowns + self.magnitudes;
-        self.push(self.limits.len(), column, -1.0);
-        self.limits.push(0.0);
-        self.push_term(term, term.weight);
-        column
+        let unknown = self.programme.unknown();
+        self.limit_by(term, unknown, 0.0);
+        unknown
     }
 
-    /// Real and imaginary part of a term below the first row of its cone.
-    fn push_term(&mut self, term: &Term, weight: f64) {
-        let parts: [fn(&Complex<f64>) -> f64; 2] = [|z| z.re, |z| z.im];
-        for part in parts {
-            let row = self.limits.len();
-            for (column, factor) in term.factors.iter().enumerate() {
-                self.push(row, column, -weight * part(factor));
-            }
-            self.limits.push(weight * part(&term.constant));
-        }
-        self.cones.push(SecondOrderConeT(3));
-    }
-
-    fn push(&mut self, row: usize, column: usize, value: f64) {
-        self.rows.push(row);
-        self.columns.push(column);
-        self.values.push(value);
+    /// Adds the limit that a term is at most an unknown and a constant.
+    fn limit_by(&mut self, term: &Term, unknown: usize, constant: f64) {
+        let side = |part: fn(&Complex<f64>) -> f64| {
+            let factors = term.factors.iter().map(|factor| term.weight * part(factor));
+            let entries: Vec<Entry> = factors.enumerate().collect();
+            (entries, term.weight * part(&term.constant))
+        };
+        let sides = [
+            (vec![(unknown, 1.0)], constant),
+            side(|z| z.re),
+            side(|z| z.im),
+        ];
+        self.programme.in_cone(sides);
     }
 
     /// The smallest v. `None` if the solver fails.
     pub fn least_violation(self) -> Option<f64> {
-        let columns = self.unknowns + 1 + self.magnitudes;
-        let matrix = CscMatrix::new_from_triplets(
-            self.limits.len(),
-            columns,
-            self.rows,
-            self.columns,
-            self.values,
-        );
-        let mut objective = vec![0.0; columns];
-        objective[self.unknowns] = 1.0;
-        let quadratic = CscMatrix::zeros((columns, columns));
-        let solver = DefaultSolver::new(
-            &quadratic,
-            &objective,
-            &matrix,
-            &self.limits,
-            &self.cones,
-            solver_settings(),
-        );
-        let mut solver = solver.ok()?;
-        solver.solve();
-        let solution = &solver.solution;
-        let solved = matches!(
-            solution.status,
-            SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
-        );
         // The dual value is a lower bound of the violation: a target that it excludes is excluded.
-        solved.then_some(solution.obj_val_dual)
+        Some(self.programme.solve()?.lower_bound)
     }
 }
 

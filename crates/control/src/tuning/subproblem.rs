@@ -7,10 +7,7 @@
 //! Only few of the many slacks limit the step, so the programme begins with the smallest ones and adds those that its solution
 //! violates. Slacks of neighbouring frequencies follow each other: of each valley the lowest one is enough.
 
-use clarabel::algebra::CscMatrix;
-use clarabel::solver::{DefaultSolver, IPSolver, NonnegativeConeT, SolverStatus};
-
-use crate::solver_settings::solver_settings;
+use crate::convex::ConvexProgramme;
 
 /// A slack c and its derivatives g.
 #[derive(Clone, Debug)]
@@ -88,78 +85,30 @@ fn lowest_minima(values: &[f64]) -> Vec<usize> {
     indices
 }
 
-/// The programme with some of the rows. Its unknowns are d and t; clarabel minimises q . x subject to A x + s = b, s >= 0.
+/// The programme with some of the rows. Its unknowns are d and t.
 fn solve(rows: &[Row], chosen: &[usize], range: &[(f64, f64)]) -> Option<Step> {
     let n = range.len();
-    let (mut matrix, mut limits) = (Triplets::default(), Vec::new());
-    for &j in chosen {
-        let row = limits.len();
-        let entries = rows[j].gradient.iter().enumerate();
-        entries.for_each(|(i, g)| matrix.push(row, i, -g));
-        matrix.push(row, n, 1.0);
-        limits.push(rows[j].value);
+    let mut costs = vec![0.0; n];
+    costs.push(-1.0);
+    let mut programme = ConvexProgramme::linear(costs);
+    for row in chosen.iter().map(|j| &rows[*j]) {
+        let slopes = row.gradient.iter().map(|g| -g).enumerate();
+        programme.at_most(slopes.chain([(n, 1.0)]), row.value);
     }
     for (i, (low, high)) in range.iter().enumerate() {
-        matrix.push(limits.len(), i, -1.0);
-        limits.push(-low);
-        matrix.push(limits.len(), i, 1.0);
-        limits.push(*high);
+        programme.at_most([(i, -1.0)], -low);
+        programme.at_most([(i, 1.0)], *high);
     }
-    matrix.push(limits.len(), n, 1.0);
-    limits.push(MOST);
-    let mut objective = vec![0.0; n + 1];
-    objective[n] = -1.0;
-    let x = minimise(
-        &objective,
-        &matrix.into_matrix(limits.len(), n + 1),
-        &limits,
-    )?;
-    let (change, predicted) = (x[..n].to_vec(), x[n]);
-    let within = change
-        .iter()
-        .zip(range)
-        .map(|(d, (low, high))| d.clamp(*low, *high));
+    programme.at_most([(n, 1.0)], MOST);
+    let solution = programme.solve()?;
+    let (predicted, change) = solution.unknowns.split_last()?;
+    let within = change.iter().zip(range);
     Some(Step {
-        change: within.collect(),
-        predicted,
+        change: within
+            .map(|(d, (low, high))| d.clamp(*low, *high))
+            .collect(),
+        predicted: *predicted,
     })
-}
-
-fn minimise(objective: &[f64], matrix: &CscMatrix<f64>, limits: &[f64]) -> Option<Vec<f64>> {
-    let n = objective.len();
-    let quadratic = CscMatrix::zeros((n, n));
-    let cones = [NonnegativeConeT(limits.len())];
-    let settings = solver_settings();
-    let solver = DefaultSolver::new(&quadratic, objective, matrix, limits, &cones, settings);
-    let mut solver = solver.ok()?;
-    solver.solve();
-    let solution = &solver.solution;
-    let solved = matches!(
-        solution.status,
-        SolverStatus::Solved | SolverStatus::AlmostSolved | SolverStatus::InsufficientProgress
-    );
-    let finite = solution.x.iter().all(|x| x.is_finite());
-    (solved && finite).then(|| solution.x.clone())
-}
-
-/// The entries of a sparse matrix.
-#[derive(Default)]
-struct Triplets {
-    rows: Vec<usize>,
-    columns: Vec<usize>,
-    values: Vec<f64>,
-}
-
-impl Triplets {
-    fn push(&mut self, row: usize, column: usize, value: f64) {
-        self.rows.push(row);
-        self.columns.push(column);
-        self.values.push(value);
-    }
-
-    fn into_matrix(self, rows: usize, columns: usize) -> CscMatrix<f64> {
-        CscMatrix::new_from_triplets(rows, columns, self.rows, self.columns, self.values)
-    }
 }
 
 #[cfg(test)]
