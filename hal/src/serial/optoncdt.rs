@@ -39,6 +39,9 @@ pub const RANGE_START: u32 = 643;
 pub const RANGE_END: u32 = 64877;
 /// Highest 16-bit value; a larger number is an error code.
 const VALUE_MAX: u32 = 0xFFFF;
+/// Stands beside the number of an error. The manual that this module follows says only that errors have 18 bits, so it gives no
+/// number a meaning.
+const ERROR_TEXT: &str = "the probe reports an error; see its manual for the number";
 
 /// The values that the probe sends at each measurement.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -102,7 +105,7 @@ impl Settings {
         if x > VALUE_MAX {
             return Event::Fault {
                 code: i64::from(x),
-                text: error_text(x),
+                text: ERROR_TEXT,
             };
         }
         let sample = Sample {
@@ -142,21 +145,6 @@ impl Protocol for Settings {
 pub fn message(x: u32, is_first: bool) -> [u8; 3] {
     let [low, middle, high] = [0, 6, 12].map(|shift| (x >> shift) as u8 & 0x3F);
     [low, 0x40 | middle, 0x80 | u8::from(!is_first) << 6 | high]
-}
-
-/// Text for an error value. The manual used for this module states only that errors have 18 bits. The numbers were written
-/// from memory and have not been verified.
-fn error_text(x: u32) -> &'static str {
-    match x {
-        262_075 => "the data rate of the probe exceeds its baud rate",
-        262_076 => "the probe detects no peak: no target, or too little light",
-        262_077 => "the peak lies before the measuring range",
-        262_078 => "the peak lies behind the measuring range",
-        262_080 => "the probe cannot compute a value",
-        262_082 => "the peak is too wide",
-        262_083 => "the laser is off",
-        _ => "the probe reports an error; see its manual for the number",
-    }
 }
 
 /// Decodes the stream of one probe.

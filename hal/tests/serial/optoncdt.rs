@@ -68,7 +68,7 @@ fn range_has_the_limits_of_the_manual() {
 fn value_of_more_than_16_bits_is_an_error_with_a_text() {
     let found = decode(&message(262_076, true));
     assert!(
-        matches!(found[..], [Event::Fault { code: 262_076, text }] if text.contains("no peak")),
+        matches!(found[..], [Event::Fault { code: 262_076, text }] if text.contains("see its manual")),
         "{found:?}"
     );
     assert!(matches!(
