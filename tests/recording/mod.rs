@@ -2,6 +2,7 @@
 mod common;
 mod damage;
 mod disk_full;
+mod python;
 mod round_trip;
 mod syncing;
 mod thread;
