@@ -85,7 +85,7 @@ impl Draw {
                 plant.mass_asymmetry = asymmetry;
             }
             PlantSettings::Xy(plant) => plant.operating_point_m = point * plant.beam_length_m,
-            PlantSettings::Lumped(_) | PlantSettings::Modal(_) => {}
+            PlantSettings::Lumped(_) | PlantSettings::Modal(_) | PlantSettings::Own(_) => {}
         }
         actual
     }

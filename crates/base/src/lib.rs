@@ -1,4 +1,4 @@
-//! Small helpers that several crates use: quantities with units, numbers, atomic files, locks, checkpoints, progress.
+//! Small helpers that several crates use: quantities with units, numbers, kinds of settings, atomic files, locks, checkpoints, progress.
 
 #![deny(unsafe_code)]
 
@@ -8,6 +8,7 @@ pub mod decimal;
 pub mod estimate;
 pub mod finding;
 pub mod input_file;
+pub mod kinds;
 pub mod lock_file;
 pub mod locked;
 pub mod nearest;

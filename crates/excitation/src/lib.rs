@@ -47,9 +47,10 @@ pub use multisine::{Lines, MultisineSettings};
 pub use periodic::Periodic;
 pub use prbs::PrbsSettings;
 pub use reference::{
-    FileReference, HoldReference, RampReference, RandomReference, ReferenceContext,
+    FileReference, HoldReference, OwnReference, RampReference, RandomReference, ReferenceContext,
     ReferenceDesign, ReferenceError, ReferenceSettings, SCurveReference, SineReference,
     SquareReference, StepOfReference, StepReference, SweptReference, TriangleReference,
+    register_reference,
 };
 pub use shape::{CurrentLimit, MAX_POINTS, shaped_amplitude};
 pub use stage_check::{StageCheckSettings, StageCheckSignal, Tone};

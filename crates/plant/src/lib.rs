@@ -14,7 +14,8 @@
 //! | `lumped` | `lumped.rs` | named masses and springs: sections 4.4.1 and 4.4.3, Fig 4-3, or a stage of your own |
 //! | `modal` | `modal.rs` | residues, frequencies and damping ratios: Eqs. (3-3) to (3-15), (6-1), (6-3) |
 //!
-//! A new model is one file with its settings and their `PlantModel`, and one line in `plant_models!` below. To the rest of
+//! A new model is one file with its settings and their `PlantModel`, and one line in `plant_models!` below; a model of another crate
+//! is added by [`register_plant`]. To the rest of
 //! the program it is a [`Structure`]. `docs/own-stage.md` shows how to describe a stage as masses and springs without
 //! any code.
 //!
@@ -33,6 +34,7 @@ mod lumped;
 mod matrix_exponential;
 mod modal;
 mod modes;
+mod own;
 mod port;
 mod quadratic;
 mod sr4dof;
@@ -47,7 +49,6 @@ use nalgebra::DMatrix;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use beam::Beam;
 use damping::damping_matrix;
 pub use damping::{DampingPoint, DampingSettings};
 pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
@@ -57,23 +58,24 @@ pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
 pub use matrix_exponential::matrix_exponential;
 pub use modal::{ModalSettings, ModeSettings};
 pub use modes::{ModalModel, Mode, Sign};
+pub use own::{OwnPlant, register_plant};
 pub use port::{Port, PortWeights};
 pub use quadratic::{Disturbance, QuadraticSr4dof, QuadraticState};
 pub use sr4dof::Sr4dofSettings;
-pub use structure::Structure;
+pub use structure::{Assembly, Structure};
 pub use unmodelled::{FloorLine, UnmodelledMode};
 pub use xy::{SecondaryMassDeviation, XyLayout, XySettings};
 
 use bench_base::finding::Finding;
 use bench_base::numeric::to_four_decimals;
 
-/// The functions that the settings of each model provide.
-trait PlantModel {
+/// The settings of a model of the mechanics. This trait provides everything in which the models differ.
+pub trait PlantModel: Send + Sync {
     /// Names of the coordinates of a mode's shape, in their order.
     fn coordinates(&self) -> Vec<&str>;
 
-    /// The beams, of a model that has them.
-    fn beam(&self) -> Option<Beam> {
+    /// Length of the beams in metres, of a model that has them: 100 % of an operating point.
+    fn beam_length_m(&self) -> Option<f64> {
         None
     }
 
@@ -120,21 +122,31 @@ macro_rules! plant_models {
         /// The settings of a model of the mechanics.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(tag = "model", rename_all = "snake_case")]
+        #[schemars(transform = own::add_to_schema)]
         pub enum PlantSettings {
             $($(#[$doc])* $variant($settings),)*
+            /// A model of another crate.
+            #[serde(untagged)]
+            #[schemars(skip)]
+            Own(OwnPlant),
         }
+
+        /// The names of the models of this crate.
+        const MODELS: &[&str] = &[$($name,)*];
 
         impl PlantSettings {
             /// The name of the model, as in `plant.model`.
             pub fn model(&self) -> &'static str {
                 match self {
                     $(PlantSettings::$variant(_) => $name,)*
+                    PlantSettings::Own(own) => own.0.kind(),
                 }
             }
 
             fn as_model(&self) -> &dyn PlantModel {
                 match self {
                     $(PlantSettings::$variant(settings) => settings,)*
+                    PlantSettings::Own(own) => &*own.0,
                 }
             }
 
@@ -148,6 +160,7 @@ macro_rules! plant_models {
                     $(PlantSettings::$variant(_) => {
                         $settings::deserialize(table).map(PlantSettings::$variant)
                     })*
+                    PlantSettings::Own(own) => own.with_table(table).map(PlantSettings::Own),
                 }
             }
         }
@@ -173,7 +186,7 @@ impl PlantSettings {
 
     /// Length of the beams in metres, of a model with beams.
     pub fn beam_length_m(&self) -> Option<f64> {
-        self.as_model().beam().map(|beam| beam.length_m)
+        self.as_model().beam_length_m()
     }
 
     /// Static Y displacement of the motion stage in metres, of a model with an operating point.
@@ -196,7 +209,9 @@ impl PlantSettings {
         match &mut plant {
             PlantSettings::Sr4dof(settings) => settings.operating_point_m = point_m,
             PlantSettings::Xy(settings) => settings.operating_point_m = point_m,
-            PlantSettings::Lumped(_) | PlantSettings::Modal(_) => return None,
+            PlantSettings::Lumped(_) | PlantSettings::Modal(_) | PlantSettings::Own(_) => {
+                return None;
+            }
         }
         Some(plant)
     }

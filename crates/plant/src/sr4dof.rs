@@ -115,8 +115,8 @@ impl PlantModel for Sr4dofSettings {
         vec!["x1", "y1", "y2", "y3"]
     }
 
-    fn beam(&self) -> Option<Beam> {
-        Some(self.beam())
+    fn beam_length_m(&self) -> Option<f64> {
+        Some(self.beam_length_m)
     }
 
     fn operating_point_m(&self) -> Option<f64> {

@@ -21,15 +21,17 @@ pub struct Structure {
     pub free_bodies: usize,
 }
 
-/// Sums up masses and springs on coordinates x_i = row_i z: M = sum of m row^T row, K = sum of k row^T row.
+/// Sums up masses and springs on coordinates x_i = row_i z: M = sum of m row^T row, K = sum of k row^T row. Each row has one number
+/// for each degree of freedom.
 #[derive(Clone, Debug)]
-pub(super) struct Assembly {
+pub struct Assembly {
     mass: DMatrix<f64>,
     stiffness: DMatrix<f64>,
     floor: DVector<f64>,
 }
 
 impl Assembly {
+    /// Without masses and springs.
     pub fn new(degrees_of_freedom: usize) -> Self {
         let square = DMatrix::zeros(degrees_of_freedom, degrees_of_freedom);
         Assembly {

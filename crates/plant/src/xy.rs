@@ -231,8 +231,8 @@ impl PlantModel for XySettings {
         ]
     }
 
-    fn beam(&self) -> Option<Beam> {
-        Some(self.beam())
+    fn beam_length_m(&self) -> Option<f64> {
+        Some(self.beam_length_m)
     }
 
     fn operating_point_m(&self) -> Option<f64> {

@@ -25,12 +25,10 @@
 pub mod check;
 mod error;
 pub mod files;
-mod kinds;
 pub mod layer;
 mod place;
 mod typed;
 
 pub use error::{ConfigError, MAX_ERRORS};
 pub use files::{EmbeddedFile, text_of, text_of_file};
-pub use kinds::{Kind, KindExists, Kinds};
 pub use typed::typed;

@@ -6,16 +6,17 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use bench_base::kinds::{Kind, KindExists, Kinds, Table};
 use bench_hal::serial::{Mounting, PortSettings, Protocol, ascii, capancdt, optoncdt};
-use bench_settings::{Kind, KindExists, Kinds};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::{Error as _, Serializer};
 use serde::{Deserialize, Deserializer, Serialize};
-use toml::Table;
+use serde_json::Value;
 
 /// The devices that read the stage by the `kind` of their table.
 static PROBES: Kinds<ProbeKind> = Kinds::new(
+    "kind",
     const {
         &[
             ProbeKind::SIMULATED,
@@ -136,7 +137,7 @@ struct SimulatedTable {}
 struct ProbeKind {
     name: &'static str,
     schema: fn(&mut SchemaGenerator) -> Schema,
-    read: fn(&'static str, Table) -> Result<ProbeDevice, toml::de::Error>,
+    read: fn(&'static str, Table) -> Result<ProbeDevice, serde_json::Error>,
 }
 
 impl ProbeKind {
@@ -144,7 +145,7 @@ impl ProbeKind {
         name: "simulated",
         schema: SimulatedTable::json_schema,
         read: |_, table| {
-            table.try_into::<SimulatedTable>()?;
+            serde_json::from_value::<SimulatedTable>(Value::Object(table))?;
             Ok(ProbeDevice::Simulated)
         },
     };
@@ -161,10 +162,10 @@ impl ProbeKind {
 fn read_serial<P: ProtocolSettings>(
     kind: &'static str,
     table: Table,
-) -> Result<ProbeDevice, toml::de::Error> {
-    let table: SerialTable<P> = table.try_into()?;
+) -> Result<ProbeDevice, serde_json::Error> {
+    let table: SerialTable<P> = serde_json::from_value(Value::Object(table))?;
     // With all defaults, so that a recording has each setting.
-    let settings = Table::try_from(&table.protocol).map_err(toml::de::Error::custom)?;
+    let settings = table_of(&table.protocol)?;
     Ok(ProbeDevice::Serial(SerialDevice {
         line: table.line,
         mounting: table.mounting,
@@ -172,6 +173,14 @@ fn read_serial<P: ProtocolSettings>(
         kind,
         settings,
     }))
+}
+
+/// Settings as a table, without those that are absent.
+fn table_of(settings: &impl Serialize) -> Result<Table, serde_json::Error> {
+    let value = serde_json::to_value(settings)?;
+    let mut table: Table = serde_json::from_value(value)?;
+    table.retain(|_, value| !value.is_null());
+    Ok(table)
 }
 
 impl Kind for ProbeKind {
@@ -231,16 +240,18 @@ impl ProbeDevice {
     }
 
     /// The table in a configuration.
-    fn table(&self) -> Result<Table, toml::ser::Error> {
-        let mut table = match self {
+    fn table(&self) -> Result<Table, serde_json::Error> {
+        let settings = match self {
             ProbeDevice::Simulated => Table::new(),
-            ProbeDevice::Serial(device) => Table::try_from(SerialTable {
+            ProbeDevice::Serial(device) => table_of(&SerialTable {
                 line: device.line.clone(),
                 mounting: device.mounting,
                 protocol: device.settings.clone(),
             })?,
         };
+        let mut table = Table::new();
         table.insert("kind".into(), self.kind().into());
+        table.extend(settings);
         Ok(table)
     }
 

@@ -10,15 +10,16 @@ pub use repetitive::RepetitiveLaw;
 
 use std::borrow::Cow;
 
-use bench_settings::{Kind, KindExists, Kinds};
+use bench_base::kinds::{Kind, KindExists, Kinds, Table};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
-use toml::Table;
+use serde_json::Value;
 
 use super::law::ControlDesign;
 
 /// The laws by the `kind` of their table.
 static LAWS: Kinds<LawKind> = Kinds::new(
+    "kind",
     const {
         &[
             LawKind::of::<StateSpaceLaw>("state_space"),
@@ -89,7 +90,7 @@ where
 struct LawKind {
     name: &'static str,
     schema: fn(&mut SchemaGenerator) -> Schema,
-    read: fn(Table) -> Result<Law, toml::de::Error>,
+    read: fn(Table) -> Result<Law, serde_json::Error>,
 }
 
 impl LawKind {
@@ -100,7 +101,10 @@ impl LawKind {
         LawKind {
             name,
             schema: L::json_schema,
-            read: |table| Ok(Law(Box::new(table.try_into::<L>()?))),
+            read: |table| {
+                let settings: L = serde_json::from_value(Value::Object(table))?;
+                Ok(Law(Box::new(settings)))
+            },
         }
     }
 }

@@ -1,10 +1,12 @@
 //! References for the closed loop, in metres relative to the rest position at which the loop closes.
 //!
-//! A new reference is one file here with its settings, and one line in `references!`.
+//! A new reference is one file here with its settings, and one line in `references!`; a reference of another crate is added by
+//! [`register_reference`].
 
 mod design;
 mod file;
 mod hold;
+mod own;
 mod ramp;
 mod random;
 mod s_curve;
@@ -21,6 +23,7 @@ use serde::{Deserialize, Serialize};
 pub use design::{ReferenceContext, ReferenceDesign, ReferenceError, StepOfReference};
 pub use file::FileReference;
 pub use hold::HoldReference;
+pub use own::{OwnReference, register_reference};
 pub use ramp::RampReference;
 pub use random::RandomReference;
 pub use s_curve::SCurveReference;
@@ -30,15 +33,23 @@ pub use step::StepReference;
 pub use swept::SweptReference;
 pub use triangle::TriangleReference;
 
-/// Declares the kinds of reference: `/// documentation, Kind(Settings)`.
+/// Declares the kinds of reference: `/// documentation, Kind(Settings) = "kind"`.
 macro_rules! references {
-    ($($(#[$doc:meta])* $kind:ident($settings:ty)),* $(,)?) => {
+    ($($(#[$doc:meta])* $kind:ident($settings:ty) = $name:literal),* $(,)?) => {
         /// A reference, relative to the rest position at which the loop closes; zero before its start.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(tag = "kind", rename_all = "snake_case")]
+        #[schemars(transform = own::add_to_schema)]
         pub enum ReferenceSettings {
             $($(#[$doc])* $kind($settings),)*
+            /// A reference of another crate.
+            #[serde(untagged)]
+            #[schemars(skip)]
+            Own(OwnReference),
         }
+
+        /// The names of the kinds of this crate.
+        const KINDS: &[&str] = &[$($name,)*];
 
         impl ReferenceSettings {
             /// Whether it is the sweep of `[chirp]`, whose amplitudes are planned with the model.
@@ -48,7 +59,10 @@ macro_rules! references {
 
             /// The settings of the kind.
             pub fn design(&self) -> &dyn ReferenceDesign {
-                match self { $(ReferenceSettings::$kind(settings) => settings,)* }
+                match self {
+                    $(ReferenceSettings::$kind(settings) => settings,)*
+                    ReferenceSettings::Own(own) => own.design(),
+                }
             }
         }
     };
@@ -56,26 +70,26 @@ macro_rules! references {
 
 references! {
     /// Constant: the position at which the loop closed.
-    Hold(HoldReference),
+    Hold(HoldReference) = "hold",
     /// A step.
-    Step(StepReference),
+    Step(StepReference) = "step",
     /// From 0 to a height at a constant speed, then constant.
-    Ramp(RampReference),
+    Ramp(RampReference) = "ramp",
     /// A sine that starts at zero.
-    Sine(SineReference),
+    Sine(SineReference) = "sine",
     /// A square wave.
-    Square(SquareReference),
+    Square(SquareReference) = "square",
     /// A triangle wave that starts at zero.
-    Triangle(TriangleReference),
+    Triangle(TriangleReference) = "triangle",
     /// From 0 to a height with bounded speed, acceleration and jerk, then constant.
-    SCurve(SCurveReference),
+    SCurve(SCurveReference) = "s_curve",
     /// A random signal, limited to a band and to a peak.
-    Random(RandomReference),
+    Random(RandomReference) = "random",
     /// The sweep of `[chirp]` in metres, with its rest before and after: for identification in closed loop. The run
     /// lasts as long as the sweep; `control.duration_s` is not used.
-    Chirp(SweptReference),
+    Chirp(SweptReference) = "chirp",
     /// A CSV file with the columns `time_s,reference_m`; straight lines between its points.
-    File(FileReference),
+    File(FileReference) = "file",
 }
 
 #[cfg(test)]
