@@ -292,7 +292,7 @@ pub(super) fn run(
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
     let identification = options.identification(&signals)?;
-    let analysis = identification.run(&signals.input_a, &signals.output_m);
+    let analysis = identification.run(&signals.input, &signals.output);
     let analysis = analysis.map_err(|error| options.refused(error))?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {

@@ -22,7 +22,7 @@ fn lines(step: usize) -> Vec<usize> {
 #[test]
 fn response_is_exact_despite_drift_and_a_settling_first_period() {
     let mut signals = multisine(&lines(1), 8, 3e-3, 0.0, 1);
-    signals.output_m[..PERIOD]
+    signals.output[..PERIOD]
         .iter_mut()
         .enumerate()
         .for_each(|(n, y)| *y += 1e-2 * (-(n as f64) / 30.0).exp());
@@ -57,8 +57,8 @@ fn distortion_of_a_measured_input_is_no_excitation() {
     let odd: Vec<usize> = (5..=199).step_by(2).collect();
     let even: Vec<usize> = (6..=198).step_by(2).collect();
     let mut signals = multisine(&odd, 6, 0.0, 1e-7, 2);
-    let distortion = multisine(&even, 6, 0.0, 0.0, 3).input_a;
-    for (input, distortion) in signals.input_a.iter_mut().zip(distortion) {
+    let distortion = multisine(&even, 6, 0.0, 0.0, 3).input;
+    for (input, distortion) in signals.input.iter_mut().zip(distortion) {
         *input += 0.02 * distortion;
     }
     let periods = estimate(&signals, BAND_HZ, repetition(0)).unwrap();
@@ -74,8 +74,8 @@ fn distortion_beside_a_band_of_all_lines_is_no_excitation() {
     let mut signals = multisine(&band, 6, 0.0, 1e-7, 2);
     for (k, line) in beside.iter().enumerate() {
         let amplitude = 0.05 * (1.0 + 0.8 * (3.0 * k as f64).sin()) / 1.8;
-        let distortion = multisine(&[*line], 6, 0.0, 0.0, 3).input_a;
-        for (input, distortion) in signals.input_a.iter_mut().zip(distortion) {
+        let distortion = multisine(&[*line], 6, 0.0, 0.0, 3).input;
+        for (input, distortion) in signals.input.iter_mut().zip(distortion) {
             *input += amplitude * distortion;
         }
     }
@@ -89,7 +89,7 @@ fn periods_in_which_the_plant_settles_are_skipped() {
     let settling = |decay: f64, sigma: f64| {
         let mut signals = multisine(&lines(1), 12, 1e-4, sigma, 1);
         let transient = |n: usize| 1e-3 * (-(n as f64) / (decay * PERIOD as f64)).exp();
-        let samples = signals.output_m.iter_mut().enumerate();
+        let samples = signals.output.iter_mut().enumerate();
         samples.for_each(|(n, y)| *y += transient(n));
         settling_periods(&signals, PERIOD).unwrap()
     };
@@ -107,10 +107,10 @@ fn weak_lines_of_the_same_pattern_are_excited() {
     let (weak, strong) = lines.split_at(20);
     let mut signals = multisine(strong, 6, 0.0, 1e-7, 2);
     let more = multisine(weak, 6, 0.0, 0.0, 3);
-    for (input, more) in signals.input_a.iter_mut().zip(&more.input_a) {
+    for (input, more) in signals.input.iter_mut().zip(&more.input) {
         *input += 0.1 * more;
     }
-    for (output, more) in signals.output_m.iter_mut().zip(&more.output_m) {
+    for (output, more) in signals.output.iter_mut().zip(&more.output) {
         *output += 0.1 * more;
     }
     let periods = estimate(&signals, BAND_HZ, repetition(0)).unwrap();
@@ -143,9 +143,9 @@ fn errors_match_their_standard_deviations() {
 fn response_and_variance_equal_numpy() {
     let signals = multisine(&lines(3), 7, 1e-3, 1e-6, 3);
     let rows: String = signals
-        .input_a
+        .input
         .iter()
-        .zip(&signals.output_m)
+        .zip(&signals.output)
         .map(|(u, y)| format!("{u:e} {y:e}\n"))
         .collect();
     let arguments = [

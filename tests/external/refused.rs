@@ -278,8 +278,8 @@ fn unrelated_output_gives_an_undecided_verdict_with_the_reason() {
     let noise = |normal: &mut dyn FnMut() -> f64| (0..8000).map(|_| normal()).collect();
     let signals = Signals {
         rate_hz: 1000.0,
-        input_a: noise(&mut normal),
-        output_m: noise(&mut normal),
+        input: noise(&mut normal),
+        output: noise(&mut normal),
     };
     let bench = Bench::new();
     bench.write("data.csv", csv(&signals));

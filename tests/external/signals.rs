@@ -60,8 +60,8 @@ pub fn multisine(lines: &[usize], periods: usize, drift: f64, sigma: f64, seed: 
     let samples = 0..periods * PERIOD;
     Signals {
         rate_hz: PERIOD as f64,
-        input_a: samples.clone().map(|n| input[n % PERIOD]).collect(),
-        output_m: samples
+        input: samples.clone().map(|n| input[n % PERIOD]).collect(),
+        output: samples
             .map(|n| output[n % PERIOD] + drift * n as f64 / PERIOD as f64 + sigma * normal())
             .collect(),
     }
@@ -73,9 +73,9 @@ pub fn csv(signals: &Signals) -> String {
         format!("{},{u:e},{y:e}\n", n as f64 / signals.rate_hz)
     };
     let rows: String = signals
-        .input_a
+        .input
         .iter()
-        .zip(&signals.output_m)
+        .zip(&signals.output)
         .enumerate()
         .map(row)
         .collect();

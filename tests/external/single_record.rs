@@ -30,10 +30,10 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
         let sweep = (std::f64::consts::TAU * (5.0 * t + 0.5 * 15.0 * t * t)).sin();
         if (0.0..10.0).contains(&t) { sweep } else { 0.0 }
     };
-    let input_a: Vec<f64> = (0..20_000).map(force).collect();
+    let input: Vec<f64> = (0..20_000).map(force).collect();
     let mut states = STAGE.map(|_| (0.0, 0.0));
     let mut normal = crate::external::signals::normal(5);
-    let output_m = input_a.iter().map(|force| {
+    let output = input.iter().map(|force| {
         let position: f64 = states.iter().map(|(x, _)| x).sum();
         states
             .iter_mut()
@@ -44,8 +44,8 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
     });
     let signals = Signals {
         rate_hz: RATE_HZ,
-        output_m: output_m.collect(),
-        input_a,
+        output: output.collect(),
+        input,
     };
     let bench = Bench::new();
     bench.write("data.csv", csv(&signals));
@@ -71,7 +71,7 @@ fn sweep_from_rest_to_rest_gives_the_modes_and_the_delay_of_the_hold() {
 #[test]
 fn external_record_gets_the_same_plots_and_page_as_a_run() {
     let impulse = |n: usize| if n == 100 { RATE_HZ } else { 0.0 };
-    let input_a: Vec<f64> = (0..20_000).map(impulse).collect();
+    let input: Vec<f64> = (0..20_000).map(impulse).collect();
     let impulse_response = |t: f64| -> f64 {
         let one = |(hz, zeta, residue): (f64, f64, f64)| {
             let w = std::f64::consts::TAU * hz;
@@ -84,7 +84,7 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
         }
     };
     let mut normal = crate::external::signals::normal(5);
-    let output_m = (0..20_000)
+    let output = (0..20_000)
         .map(|n| impulse_response((n as f64 - 100.0) / RATE_HZ) + 3e-7 * normal())
         .collect();
     let bench = Bench::new();
@@ -92,8 +92,8 @@ fn external_record_gets_the_same_plots_and_page_as_a_run() {
         "data.csv",
         csv(&Signals {
             rate_hz: RATE_HZ,
-            output_m,
-            input_a,
+            output,
+            input,
         }),
     );
     let answer =

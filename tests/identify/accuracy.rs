@@ -115,7 +115,7 @@ fn offset_and_drift_do_not_change_sigma() {
 
 fn with_drift(mut signals: Signals) -> Signals {
     let samples = signals.len() as f64;
-    for (k, y) in signals.output_m.iter_mut().enumerate() {
+    for (k, y) in signals.output.iter_mut().enumerate() {
         *y += 1e-3 + 5e-6 * k as f64 / samples;
     }
     signals
@@ -137,8 +137,8 @@ fn probe_offset_does_not_change_the_estimate_in_the_first_bin() {
     let output_m = plant.simulate(&input_a).iter().map(|y| y + 1e-3).collect();
     let signals = Signals {
         rate_hz: stage::RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     };
     let frf = local::estimate(&signals, (0.0, 10.0), &EstimatorSettings::default()).unwrap();
     assert!((frf.frequency_hz[0] - 1.0 / 20.2).abs() < 1e-12);
@@ -157,20 +157,20 @@ fn accepts_records_of_any_length() {
     let signals = stage::clean_run();
     let cut = |from: usize, samples: usize| Signals {
         rate_hz: signals.rate_hz,
-        input_a: signals.input_a[from..from + samples].to_vec(),
-        output_m: signals.output_m[from..from + samples].to_vec(),
+        input: signals.input[from..from + samples].to_vec(),
+        output: signals.output[from..from + samples].to_vec(),
     };
     assert_close(&estimate(&cut(1, 599_999)), &SampledPlant::stage());
     let short = Signals {
-        input_a: stage::chirp_of(15.0, 1.0, 4.0),
+        input: stage::chirp_of(15.0, 1.0, 4.0),
         ..signals.clone()
     };
     let mut short = Signals {
-        output_m: SampledPlant::stage().simulate(&short.input_a),
+        output: SampledPlant::stage().simulate(&short.input),
         ..short
     };
-    short.input_a.truncate(99_991);
-    short.output_m.truncate(99_991);
+    short.input.truncate(99_991);
+    short.output.truncate(99_991);
     let frf = estimate(&short);
     let dc = SampledPlant::stage().response(0.5).norm();
     assert!((frf.response[0].norm() / dc - 1.0).abs() < 0.01);

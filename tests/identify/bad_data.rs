@@ -9,8 +9,8 @@ fn valid() -> Signals {
     let output_m = input_a.iter().map(|u| 1e-4 * u).collect();
     Signals {
         rate_hz: 1000.0,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }
 
@@ -43,7 +43,7 @@ fn accepts_valid_signals() {
 #[test]
 fn rejects_constant_output() {
     let signals = Signals {
-        output_m: vec![1.25e-3; 200],
+        output: vec![1.25e-3; 200],
         ..valid()
     };
     assert_contains(
@@ -55,7 +55,7 @@ fn rejects_constant_output() {
 #[test]
 fn rejects_constant_input() {
     let signals = Signals {
-        input_a: vec![0.0; 200],
+        input: vec![0.0; 200],
         ..valid()
     };
     assert_contains(
@@ -67,8 +67,8 @@ fn rejects_constant_input() {
 #[test]
 fn rejects_a_single_sample() {
     let signals = Signals {
-        input_a: vec![1.0],
-        output_m: vec![1e-4],
+        input: vec![1.0],
+        output: vec![1e-4],
         ..valid()
     };
     assert_contains(
@@ -80,7 +80,7 @@ fn rejects_a_single_sample() {
 #[test]
 fn rejects_columns_of_different_lengths() {
     let signals = Signals {
-        output_m: vec![0.0; 199],
+        output: vec![0.0; 199],
         ..valid()
     };
     assert_contains(
@@ -92,15 +92,15 @@ fn rejects_columns_of_different_lengths() {
 #[test]
 fn rejects_samples_that_are_not_finite_with_column_and_index() {
     let mut signals = valid();
-    signals.output_m[37] = f64::NAN;
+    signals.output[37] = f64::NAN;
     assert_contains(
         &rejection(&signals, (10.0, 400.0)),
-        &["output_m is NaN at sample 37", "finite"],
+        &["output is NaN at sample 37", "finite"],
     );
-    signals.input_a[5] = f64::INFINITY;
+    signals.input[5] = f64::INFINITY;
     assert_contains(
         &rejection(&signals, (10.0, 400.0)),
-        &["input_a is inf at sample 5", "finite"],
+        &["input is inf at sample 5", "finite"],
     );
 }
 
@@ -254,7 +254,7 @@ proptest! {
         segment in 0_usize..310,
     ) {
         let samples = if lengths_agree { input_a.len() } else { outputs.len() };
-        let signals = Signals { rate_hz, input_a, output_m: outputs[..samples].to_vec() };
+        let signals = Signals { rate_hz, input: input_a, output: outputs[..samples].to_vec() };
         let settings = EstimatorSettings { min_half_width_bins: half_width, resolution_ratio: ratio, ..EstimatorSettings::default() };
         if let Ok(frf) = local::estimate(&signals, band_hz, &settings) {
             assert_valid(&frf, band_hz);

@@ -20,8 +20,8 @@ fn ten_seconds() -> Signals {
     let output_m = SampledPlant::stage().simulate(&input_a);
     Signals {
         rate_hz: RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }
 
@@ -107,8 +107,8 @@ fn rational_model_equals_the_parabola_away_from_modes() {
         .collect();
     let signals = Signals {
         rate_hz: 1000.0,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     };
     let [parabola, rational] = [LocalModel::Polynomial, LocalModel::Rational]
         .map(|curve| local::estimate(&signals, (10.0, 490.0), &settings(curve)).unwrap());
@@ -202,8 +202,8 @@ fn transient_model_removes_leakage_of_a_record_cut_from_a_longer_one() {
     let middle = 100_000..200_000;
     let cut = Signals {
         rate_hz: RATE_HZ,
-        input_a: input_a[middle.clone()].to_vec(),
-        output_m: output_m[middle].to_vec(),
+        input: input_a[middle.clone()].to_vec(),
+        output: output_m[middle].to_vec(),
     };
     let off = |transient| {
         let settings = EstimatorSettings {

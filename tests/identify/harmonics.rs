@@ -86,8 +86,8 @@ fn record(seed: u64, (a, b): (f64, f64), noise_m: f64, periods: usize) -> Signal
         .collect();
     Signals {
         rate_hz: PERIOD as f64,
-        input_a: repeated(&input),
-        output_m,
+        input: repeated(&input),
+        output: output_m,
     }
 }
 
@@ -203,10 +203,10 @@ fn with_distorted_input(mut signals: Signals) -> Signals {
     for line in lines {
         let (re, im) = gain(line as f64);
         let phase = 2.4 * (line * line) as f64;
-        for n in 0..signals.input_a.len() {
+        for n in 0..signals.input.len() {
             let (sin, cos) = (turn * (line * n % PERIOD) as f64 + phase).sin_cos();
-            signals.input_a[n] += 0.01 * cos;
-            signals.output_m[n] += 0.01 * (re * cos - im * sin);
+            signals.input[n] += 0.01 * cos;
+            signals.output[n] += 0.01 * (re * cos - im * sin);
         }
     }
     signals
@@ -273,7 +273,7 @@ fn ignores_omitted_lines_with_input_and_needs_at_least_one_omitted_line() {
     let mut signals = record(1, (0.0, 0.0), 1e-3, 6);
     let all = omitted_lines(&signals);
     let (omitted, turn) = (5.0, std::f64::consts::TAU / PERIOD as f64);
-    for (n, u) in signals.input_a.iter_mut().enumerate() {
+    for (n, u) in signals.input.iter_mut().enumerate() {
         *u += 1e-3 * (turn * omitted * n as f64).cos();
     }
     let fewer = omitted_lines(&signals);
@@ -283,7 +283,7 @@ fn ignores_omitted_lines_with_input_and_needs_at_least_one_omitted_line() {
     );
     assert!(fewer.odd.iter().all(|line| line.frequency_hz != omitted));
     // A pulse excites every line.
-    for (n, u) in signals.input_a.iter_mut().enumerate() {
+    for (n, u) in signals.input.iter_mut().enumerate() {
         *u = f64::from(u8::from(n % PERIOD == 0));
     }
     let repetition = Repetition {

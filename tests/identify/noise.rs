@@ -30,8 +30,8 @@ fn coherence_is_low_if_the_output_is_only_noise() {
     let frf = estimate(
         &Signals {
             rate_hz: RATE_HZ,
-            input_a,
-            output_m,
+            input: input_a,
+            output: output_m,
         },
         (1.0, 400.0),
     );
@@ -71,8 +71,8 @@ fn band_of_cosines() -> Signals {
         .collect();
     Signals {
         rate_hz: RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }
 

@@ -13,8 +13,8 @@ fn once() -> Signals {
     let output_m = SampledPlant::stage().simulate(&input_a);
     Signals {
         rate_hz: RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }
 
@@ -34,8 +34,8 @@ fn repetitions(seed: u64, noise_a: f64, noise_m: f64) -> Signals {
     };
     Signals {
         rate_hz: RATE_HZ,
-        input_a: noisy(&once.input_a, noise_a),
-        output_m: noisy(&once.output_m, noise_m),
+        input: noisy(&once.input, noise_a),
+        output: noisy(&once.output, noise_m),
     }
 }
 
@@ -92,8 +92,8 @@ fn sigma_falls_with_the_square_root_of_the_number_of_repetitions() {
     let length = once().len();
     let first = Signals {
         rate_hz: RATE_HZ,
-        input_a: all.input_a[..length].to_vec(),
-        output_m: all.output_m[..length].to_vec(),
+        input: all.input[..length].to_vec(),
+        output: all.output[..length].to_vec(),
     };
     let one = local::estimate(&first, BAND_HZ, &EstimatorSettings::default()).unwrap();
     let mean = estimate(&all);
@@ -113,8 +113,8 @@ fn sigma_falls_with_the_square_root_of_the_number_of_repetitions() {
 fn ignores_samples_after_the_last_whole_repetition() {
     let mut all = repetitions(7, 0.0, 1e-6);
     let whole = estimate(&all);
-    all.input_a.extend([1.0; 100]);
-    all.output_m.extend([1e-3; 100]);
+    all.input.extend([1.0; 100]);
+    all.output.extend([1e-3; 100]);
     assert_eq!(estimate(&all), whole);
 }
 
@@ -123,15 +123,12 @@ fn mean_is_over_whole_repetitions() {
     let samples: Vec<f64> = (0..11).map(f64::from).collect();
     let signals = Signals {
         rate_hz: 1.0,
-        input_a: samples.clone(),
-        output_m: samples,
+        input: samples.clone(),
+        output: samples,
     };
     // Samples 0 to 3 and 4 to 7; 8 to 10 are not a whole repetition.
-    assert_eq!(repeated::mean(&signals, 4, 3).input_a, [2.0, 3.0, 4.0, 5.0]);
-    assert_eq!(
-        repeated::mean(&signals, 4, 1).output_m,
-        [0.0, 1.0, 2.0, 3.0]
-    );
+    assert_eq!(repeated::mean(&signals, 4, 3).input, [2.0, 3.0, 4.0, 5.0]);
+    assert_eq!(repeated::mean(&signals, 4, 1).output, [0.0, 1.0, 2.0, 3.0]);
     assert_eq!(
         repeated::mean(&signals, 20, 1).len(),
         11,

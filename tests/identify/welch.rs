@@ -17,13 +17,13 @@ fn noisy_run(samples: usize, noise_m: f64) -> Signals {
         .collect();
     Signals {
         rate_hz: stage::RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }
 
 fn assert_equals_scipy(signals: &Signals, segment: usize) {
-    let samples = signals.input_a.iter().zip(&signals.output_m);
+    let samples = signals.input.iter().zip(&signals.output);
     let text: String = samples.map(|(u, y)| format!("{u:e} {y:e}\n")).collect();
     let Some(rows) = python::numbers("welch.py", &["5000", &segment.to_string()], &text) else {
         return;
@@ -97,8 +97,8 @@ fn welch_errors_are_within_two_sigma_in_95_percent_of_the_bins() {
     let frf = welch::estimate(
         &Signals {
             rate_hz: 1000.0,
-            input_a,
-            output_m,
+            input: input_a,
+            output: output_m,
         },
         (1.0, 499.0),
         2000,

@@ -44,12 +44,10 @@ fn external(path: &Path, bytes: &[u8], columns: &Columns) -> bool {
         return false;
     };
     assert!(signals.rate_hz > 0.0 && signals.rate_hz.is_finite());
-    assert_eq!(signals.input_a.len(), signals.output_m.len());
-    let values = signals.input_a.iter().chain(&signals.output_m);
+    assert_eq!(signals.input.len(), signals.output.len());
+    let values = signals.input.iter().chain(&signals.output);
     assert!(values.clone().all(|x| x.is_finite()));
-    assert!(
-        signals.input_a.len() <= naive_rows(&String::from_utf8_lossy(bytes).replace('\r', "\n"))
-    );
+    assert!(signals.input.len() <= naive_rows(&String::from_utf8_lossy(bytes).replace('\r', "\n")));
     true
 }
 

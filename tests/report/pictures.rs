@@ -37,8 +37,8 @@ pub fn short_and_noisy() -> Frf {
     let signals = stage::with_noise(
         &Signals {
             rate_hz: RATE_HZ,
-            input_a,
-            output_m,
+            input: input_a,
+            output: output_m,
         },
         1,
     );

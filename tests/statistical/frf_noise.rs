@@ -94,8 +94,8 @@ fn short_runs(seeds: u64, min_half_width_bins: usize) -> Vec<(f64, f64, f64)> {
     let output_m = plant.simulate(&input_a);
     let clean = Signals {
         rate_hz: RATE_HZ,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     };
     let settings = EstimatorSettings {
         min_half_width_bins,

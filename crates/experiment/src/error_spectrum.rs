@@ -115,8 +115,8 @@ impl Welch {
     fn spectrum(&self, values: &[f64]) -> Result<welch::PowerSpectra, IdentifyError> {
         let signals = Signals {
             rate_hz: self.rate_hz,
-            input_a: values.to_vec(),
-            output_m: values.to_vec(),
+            input: values.to_vec(),
+            output: values.to_vec(),
         };
         welch::spectra(&signals, self.segment)
     }

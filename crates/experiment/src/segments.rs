@@ -104,8 +104,8 @@ fn part(signals: &Signals, start: usize, length: usize) -> Signals {
     let of = |samples: &[f64]| samples.iter().skip(start).take(length).copied().collect();
     Signals {
         rate_hz: signals.rate_hz,
-        input_a: of(&signals.input_a),
-        output_m: of(&signals.output_m),
+        input: of(&signals.input),
+        output: of(&signals.output),
     }
 }
 

@@ -154,8 +154,8 @@ impl SignalBuilder {
         let aligned_m = self.aligned_positions();
         let signals = Signals {
             rate_hz: self.rate_hz,
-            input_a: aligned_currents(self.input_a, self.late),
-            output_m: aligned_m.unwrap_or(self.output_m),
+            input: aligned_currents(self.input_a, self.late),
+            output: aligned_m.unwrap_or(self.output_m),
         };
         Ok(RunSignals {
             loop_signals: LoopSignals {
@@ -314,13 +314,11 @@ mod tests {
         let nine =
             gathered(10_000, |tick| tick % 1000 == 500 && tick < 9000).expect("nine are few");
         assert_eq!(nine.filled_ticks, 9);
-        let Signals {
-            input_a, output_m, ..
-        } = nine.loop_signals.signals;
-        assert!(input_a.len() == 10_000 && input_a.iter().all(|u| *u == 0.5));
+        let Signals { input, output, .. } = nine.loop_signals.signals;
+        assert!(input.len() == 10_000 && input.iter().all(|u| *u == 0.5));
         let straight = |(tick, y): (usize, &f64)| (y - tick as f64 * 1e-9).abs() < 1e-18;
         assert!(
-            output_m.iter().enumerate().all(straight),
+            output.iter().enumerate().all(straight),
             "on a straight line"
         );
         assert_eq!(

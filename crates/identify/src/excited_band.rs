@@ -24,7 +24,7 @@ const PINK_RATIO: f64 = 1e-2;
 
 /// The lowest and the highest frequency in hertz that the input excites; `None` without any input.
 pub fn excited_band_hz(signals: &Signals) -> Option<(f64, f64)> {
-    let spectrum = RealFft::new(signals.len()).below_nyquist(signals.input_a.clone());
+    let spectrum = RealFft::new(signals.len()).below_nyquist(signals.input.clone());
     let power: Vec<f64> = spectrum.iter().map(|u| u.norm_sqr()).collect();
     let bins = excited_bins(&power)?;
     let bin_hz = signals.rate_hz / signals.len() as f64;
@@ -78,11 +78,11 @@ mod tests {
 
     fn band_of(input: impl Fn(f64) -> f64, seconds: f64) -> (f64, f64) {
         let samples = (seconds * RATE_HZ) as usize;
-        let input_a: Vec<f64> = (0..samples).map(|n| input(n as f64 / RATE_HZ)).collect();
+        let input: Vec<f64> = (0..samples).map(|n| input(n as f64 / RATE_HZ)).collect();
         excited_band_hz(&Signals {
             rate_hz: RATE_HZ,
-            output_m: input_a.clone(),
-            input_a,
+            output: input.clone(),
+            input,
         })
         .expect("an input")
     }
@@ -134,8 +134,8 @@ mod tests {
     fn zero_input_has_no_band() {
         let signals = Signals {
             rate_hz: RATE_HZ,
-            input_a: vec![0.0; 100],
-            output_m: vec![0.0; 100],
+            input: vec![0.0; 100],
+            output: vec![0.0; 100],
         };
         assert_eq!(excited_band_hz(&signals), None);
     }

@@ -1,7 +1,7 @@
 //! External records: CSV files with a header that names the columns, one sample per line.
 //!
 //! Columns are separated by commas, semicolons or tabs, whichever is most frequent in the first line. Input and output may have
-//! any units: these replace the amperes and metres of [`Signals`], and a residue is output per input per second squared.
+//! any units: the [`Signals`] have them as well, and a residue is output per input per second squared.
 
 use std::path::{Path, PathBuf};
 
@@ -63,12 +63,12 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Signals, ExternalCsvError>
         Sampling::RateHz(rate_hz) => *rate_hz,
         Sampling::TimeColumn(time) => table.rate_hz(time, &values[2], &lines)?,
     };
-    let output_m = values.swap_remove(1);
-    let input_a = values.swap_remove(0);
+    let output = values.swap_remove(1);
+    let input = values.swap_remove(0);
     Ok(Signals {
         rate_hz,
-        input_a,
-        output_m,
+        input,
+        output,
     })
 }
 

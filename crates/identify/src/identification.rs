@@ -207,8 +207,8 @@ impl Identification {
     ) -> Result<ExternalAnalysis, IdentificationError> {
         let signals = Signals {
             rate_hz: self.rate_hz,
-            input_a: input.to_vec(),
-            output_m: output.to_vec(),
+            input: input.to_vec(),
+            output: output.to_vec(),
         };
         analyse(&signals, self.band_hz, self.repetition, self.input_path)
     }

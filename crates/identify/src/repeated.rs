@@ -16,8 +16,8 @@ pub fn mean(signals: &Signals, length: usize, count: usize) -> Signals {
     }
     Signals {
         rate_hz: signals.rate_hz,
-        input_a: mean_of(&signals.input_a, length, count),
-        output_m: mean_of(&signals.output_m, length, count),
+        input: mean_of(&signals.input, length, count),
+        output: mean_of(&signals.output, length, count),
     }
 }
 

@@ -19,21 +19,21 @@ const MIN_QUIET_S: f64 = 0.25;
 pub struct Signals {
     /// Ticks per second.
     pub rate_hz: f64,
-    /// Current in amperes, as applied by the amplifier.
-    pub input_a: Vec<f64>,
-    /// Displacement in metres.
-    pub output_m: Vec<f64>,
+    /// Input in the unit of the record; for a run of the bench the current in amperes, as applied by the amplifier.
+    pub input: Vec<f64>,
+    /// Output in the unit of the record; for a run of the bench the displacement in metres.
+    pub output: Vec<f64>,
 }
 
 impl Signals {
     /// Number of ticks.
     pub fn len(&self) -> usize {
-        self.input_a.len()
+        self.input.len()
     }
 
     /// Whether there are no ticks.
     pub fn is_empty(&self) -> bool {
-        self.input_a.is_empty()
+        self.input.is_empty()
     }
 
     /// The samples of both signals in a range of ticks.
@@ -43,8 +43,8 @@ impl Signals {
     pub fn slice(&self, ticks: Range<usize>) -> Signals {
         Signals {
             rate_hz: self.rate_hz,
-            input_a: self.input_a[ticks.clone()].to_vec(),
-            output_m: self.output_m[ticks].to_vec(),
+            input: self.input[ticks.clone()].to_vec(),
+            output: self.output[ticks].to_vec(),
         }
     }
 
@@ -53,7 +53,7 @@ impl Signals {
     /// # Errors
     /// When the signals differ in length, are too short, hold samples that are not finite, or do not change.
     pub fn check(&self) -> Result<(), IdentifyError> {
-        check_lengths(self.input_a.len(), self.output_m.len())?;
+        check_lengths(self.input.len(), self.output.len())?;
         check_min_samples(self.len(), MIN_SAMPLES)?;
         if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
             return Err(IdentifyError::Signals(format!(
@@ -61,18 +61,18 @@ impl Signals {
                 self.rate_hz
             )));
         }
-        check_samples("input_a", &self.input_a)?;
-        check_samples("output_m", &self.output_m)?;
+        check_samples("input", &self.input)?;
+        check_samples("output", &self.output)?;
         self.check_motion()
     }
 
     fn check_motion(&self) -> Result<(), IdentifyError> {
         let samples = self.len();
-        let why = if let Some(value) = constant_value(&self.input_a) {
+        let why = if let Some(value) = constant_value(&self.input) {
             format!(
                 "the input is {value} A at every one of {samples} samples: nothing was excited; check that the amplifier was enabled and that the excitation is not zero"
             )
-        } else if let Some(value) = constant_value(&self.output_m) {
+        } else if let Some(value) = constant_value(&self.output) {
             format!(
                 "the output is {value} m at every one of {samples} samples: the probe does not measure the stage; check its range, its cable and its validity flag"
             )
@@ -82,45 +82,38 @@ impl Signals {
         Err(IdentifyError::Signals(why))
     }
 
-    /// The output minus the straight line through its rest positions before and after the excitation, in metres.
+    /// The output minus the straight line through its rest positions before and after the excitation, in the unit of the
+    /// output.
     ///
     /// An FFT treats the record as one period of a periodic signal. A constant offset of the probe stays in bin 0,
-    /// which no estimate uses. A drift of d metres over the record is a step from the last sample to the first; it
-    /// adds d/(2 pi f) metre seconds at every frequency. d follows from the interval of zero input before the
+    /// which no estimate uses. A drift by d over the record is a step from the last sample to the first; it
+    /// adds d/(2 pi f) at every frequency. d follows from the interval of zero input before the
     /// excitation and from the second half of the one after it (when the stage has rung out). Without both intervals
     /// only the mean is subtracted.
-    pub(super) fn output_without_drift_m(&self) -> Vec<f64> {
+    pub(super) fn output_without_drift(&self) -> Vec<f64> {
         let (offset, slope) = self.drift();
-        let output_m = self.output_m.iter().enumerate();
-        output_m
-            .map(|(k, y)| y - offset - slope * k as f64)
-            .collect()
+        let output = self.output.iter().enumerate();
+        output.map(|(k, y)| y - offset - slope * k as f64).collect()
     }
 
-    /// Offset in metres and slope in metres per sample of the drift.
+    /// Offset and slope per sample of the drift, in the unit of the output.
     fn drift(&self) -> (f64, f64) {
         let (before, after) = self.quiet_intervals();
         let min_samples = (MIN_QUIET_S * self.rate_hz).max(8.0);
         if before.len().min(after.len()) as f64 >= min_samples {
-            let (start, end) = (
-                centre(&self.output_m, before),
-                centre(&self.output_m, after),
-            );
+            let (start, end) = (centre(&self.output, before), centre(&self.output, after));
             line_through(start, end)
         } else {
-            (mean(&self.output_m), 0.0)
+            (mean(&self.output), 0.0)
         }
     }
 
     /// The interval of zero input before the excitation and the second half of the one after it.
     fn quiet_intervals(&self) -> (Range<usize>, Range<usize>) {
-        let peak = self
-            .input_a
-            .iter()
-            .fold(0.0_f64, |peak, u| peak.max(u.abs()));
+        let peak = self.input.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
         let quiet = |u: &&f64| u.abs() <= QUIET_RATIO * peak;
-        let before = self.input_a.iter().take_while(quiet).count();
-        let after = self.input_a.iter().rev().take_while(quiet).count();
+        let before = self.input.iter().take_while(quiet).count();
+        let after = self.input.iter().rev().take_while(quiet).count();
         (0..before, self.len() - after / 2..self.len())
     }
 }

@@ -74,7 +74,7 @@ pub fn spectra(signals: &Signals, segment: usize) -> Result<PowerSpectra, Identi
     let step = segment - segment / 2;
     for start in (0..=signals.len() - segment).step_by(step) {
         let range = start..start + segment;
-        sums.add(&signals.input_a[range.clone()], &signals.output_m[range]);
+        sums.add(&signals.input[range.clone()], &signals.output[range]);
     }
     Ok(sums.mean(signals.rate_hz))
 }

@@ -54,8 +54,8 @@ pub fn run(noise: f64, seed: u64) -> LoopSignals {
     LoopSignals {
         signals: Signals {
             rate_hz: RATE_HZ,
-            input_a,
-            output_m,
+            input: input_a,
+            output: output_m,
         },
         reference_m,
     }

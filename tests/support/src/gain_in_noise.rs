@@ -27,8 +27,8 @@ pub fn signals(seed: u64, on_input: f64, on_output: f64) -> Signals {
     };
     Signals {
         rate_hz: 1000.0,
-        input_a: noisy(1.0, on_input),
-        output_m: noisy(GAIN, on_output),
+        input: noisy(1.0, on_input),
+        output: noisy(GAIN, on_output),
     }
 }
 

@@ -173,8 +173,8 @@ pub fn clean_run() -> Signals {
         let output_m = SampledPlant::stage().simulate(&input_a);
         Signals {
             rate_hz: RATE_HZ,
-            input_a,
-            output_m,
+            input: input_a,
+            output: output_m,
         }
     });
     RUN.clone()
@@ -190,9 +190,9 @@ pub fn with_noise(signals: &Signals, seed: u64) -> Signals {
     let noisy = |(k, y): (usize, &f64)| {
         ((y + slow[k] + fast[k] + 40e-9 * dice.normal()) / step).round() * step
     };
-    let output_m = signals.output_m.iter().enumerate().map(noisy).collect();
+    let output_m = signals.output.iter().enumerate().map(noisy).collect();
     Signals {
-        output_m,
+        output: output_m,
         ..signals.clone()
     }
 }

@@ -24,7 +24,7 @@ pub fn chirp(config: &Config) -> Signals {
     }
     Signals {
         rate_hz: config.servo.rate_hz,
-        input_a,
-        output_m,
+        input: input_a,
+        output: output_m,
     }
 }

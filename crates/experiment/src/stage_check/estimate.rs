@@ -65,7 +65,7 @@ pub(super) fn estimate(shot: &Shot, signals: &Signals) -> Option<ShotResponse> {
         let window = DVector::from_column_slice(&samples[measured.clone()]);
         fit(&regressors, &inverse, &window, mean, shot.responses.len())
     };
-    let (current, position) = (fitted(&signals.input_a), fitted(&signals.output_m));
+    let (current, position) = (fitted(&signals.input), fitted(&signals.output));
     let noise = Noise {
         residual: &position.residual,
         times_s: &times_s,

@@ -122,8 +122,8 @@ impl ReferenceResponses {
     ) -> Self {
         let fft = RealFft::new(signals.len());
         let reference = fft.below_nyquist(reference_m.clone());
-        let command = fft.below_nyquist(signals.input_a.clone());
-        let position = fft.below_nyquist(signals.output_m.clone());
+        let command = fft.below_nyquist(signals.input.clone());
+        let position = fft.below_nyquist(signals.output.clone());
         let difference = reference.iter().zip(&position).map(|(r, y)| r - y);
         let error = difference.collect();
         let bin_hz = signals.rate_hz / signals.len() as f64;

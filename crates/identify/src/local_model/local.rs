@@ -55,10 +55,10 @@ use crate::{
 /// use bench_identify::{EstimatorSettings, Signals, local};
 ///
 /// // An impulse through a gain of 2: H = 2 at every frequency.
-/// let mut input_a = vec![0.0; 1000];
-/// input_a[10] = 1.0;
-/// let output_m = input_a.iter().map(|u| 2.0 * u).collect();
-/// let signals = Signals { rate_hz: 1000.0, input_a, output_m };
+/// let mut input = vec![0.0; 1000];
+/// input[10] = 1.0;
+/// let output = input.iter().map(|u| 2.0 * u).collect();
+/// let signals = Signals { rate_hz: 1000.0, input, output };
 /// let frf = local::estimate(&signals, (50.0, 400.0), &EstimatorSettings::default())?;
 /// assert!(frf.response.iter().all(|h| (h - 2.0).norm() < 1e-9));
 /// # Ok::<(), bench_identify::IdentifyError>(())

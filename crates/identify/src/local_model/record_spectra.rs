@@ -23,8 +23,8 @@ impl RecordSpectra {
     /// The spectra of a record, without the drift of its output.
     pub(super) fn of_signals(signals: &Signals) -> Self {
         let fft = RealFft::new(signals.len());
-        let input = fft.below_nyquist(signals.input_a.clone());
-        let output = fft.below_nyquist(signals.output_without_drift_m());
+        let input = fft.below_nyquist(signals.input.clone());
+        let output = fft.below_nyquist(signals.output_without_drift());
         Self::new(input, output, signals.rate_hz / signals.len() as f64)
     }
 

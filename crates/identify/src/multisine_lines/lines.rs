@@ -38,8 +38,8 @@ pub(super) fn lines(
     signals.check()?;
     let count = averaged_periods(signals.len(), repetition)?;
     let bins = band::bins(band_hz, signals.rate_hz, repetition.period)?;
-    let input = spectra(&signals.input_a, repetition, count);
-    let output = spectra(&signals.output_m, repetition, count);
+    let input = spectra(&signals.input, repetition, count);
+    let output = spectra(&signals.output, repetition, count);
     Ok(bins.map(|k| Line::new(k, &input, &output)).collect())
 }
 

@@ -20,7 +20,7 @@ const UNSETTLED_RATIO: f64 = 2.0;
 pub fn settling_periods(signals: &Signals, period: usize) -> Result<usize, IdentifyError> {
     signals.check()?;
     let count = averaged_periods(signals.len(), Repetition { period, skip: 0 })?;
-    let records = [&signals.input_a, &signals.output_m];
+    let records = [&signals.input, &signals.output];
     let skips = records.map(|samples| leading_unsettled(&distances(samples, period, count)));
     Ok(skips[0].max(skips[1]).min(most_skipped(count)))
 }

@@ -15,13 +15,13 @@ const PARTS: usize = 200;
 
 /// The RMS value of the input at the start of the record as a ratio of that of the whole record.
 pub fn input_ratio_at_start(signals: &Signals) -> f64 {
-    let input = &signals.input_a;
+    let input = &signals.input;
     rms(&input[..input.len().div_ceil(PARTS)]) / rms(input)
 }
 
 /// Motion of the output at its ends, where its noise has the given standard deviation.
 pub(super) fn motion_at_ends(signals: &Signals, noise: f64) -> Vec<Defect> {
-    let output = &signals.output_m;
+    let output = &signals.output;
     let count = END_SAMPLES * END_INTERVALS;
     if output.len() < 4 * count {
         return Vec::new();

@@ -55,9 +55,9 @@ mod tests {
             let fade = (t / 1.0).min(20.0 - t).clamp(0.0, 1.0);
             fade * (std::f64::consts::TAU * (3.0 * t + 1.5 * t * t)).sin()
         };
-        let input_a: Vec<f64> = (0..25_000).map(force).collect();
+        let input: Vec<f64> = (0..25_000).map(force).collect();
         let (mut x, mut v) = (0.0, 0.0);
-        let output_m = input_a.iter().map(|u| {
+        let output = input.iter().map(|u| {
             let position = x;
             // Semi-implicit Euler: any stable recursion of second order serves.
             v += step * (w * w * (u - x) - 2.0 * zeta * w * v);
@@ -66,15 +66,15 @@ mod tests {
         });
         Signals {
             rate_hz: RATE_HZ,
-            output_m: output_m.collect(),
-            input_a,
+            output: output.collect(),
+            input,
         }
     }
 
     fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
         let mut signals = signals();
-        let output = signals.output_m.iter().enumerate();
-        signals.output_m = output.map(|(k, y)| change(k, *y)).collect();
+        let output = signals.output.iter().enumerate();
+        signals.output = output.map(|(k, y)| change(k, *y)).collect();
         defects(&signals, false)
     }
 
@@ -110,7 +110,7 @@ mod tests {
         assert_eq!(stray_lines(&sound), []);
         let (hz, height, phase) = (50.0123, 0.2, 0.7);
         let mut disturbed = sound.clone();
-        for (n, y) in disturbed.output_m.iter_mut().enumerate() {
+        for (n, y) in disturbed.output.iter_mut().enumerate() {
             *y += height * (std::f64::consts::TAU * hz * n as f64 / RATE_HZ + phase).cos();
         }
         let found = stray_lines(&disturbed);
@@ -123,7 +123,7 @@ mod tests {
             "{line:?}"
         );
         let cleaned = without(&disturbed, &found);
-        let left = cleaned.output_m.iter().zip(&sound.output_m);
+        let left = cleaned.output.iter().zip(&sound.output);
         let left = left.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / sound.len() as f64;
         // 2 % of the line's 0.14.
         assert!(left.sqrt() < 2.8e-3, "{}", left.sqrt());
@@ -133,11 +133,11 @@ mod tests {
     fn line_of_the_input_is_no_stray_line() {
         let line = |n: usize| 0.2 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
         let mut signals = signals();
-        for (n, y) in signals.output_m.iter_mut().enumerate() {
+        for (n, y) in signals.output.iter_mut().enumerate() {
             *y += line(n);
         }
         assert_eq!(stray_lines(&signals).len(), 1, "in the output alone");
-        for (n, u) in signals.input_a.iter_mut().enumerate() {
+        for (n, u) in signals.input.iter_mut().enumerate() {
             *u += line(n);
         }
         assert_eq!(stray_lines(&signals), []);
@@ -155,7 +155,7 @@ mod tests {
     fn repeated_samples_are_found_with_their_number() {
         let sound = signals();
         let inside = |k: usize| (9_000..9_100).contains(&k);
-        let found = spoiled(|k, y| if inside(k) { sound.output_m[9_000] } else { y });
+        let found = spoiled(|k, y| if inside(k) { sound.output[9_000] } else { y });
         assert_eq!(
             found,
             [Defect::Repeated {
@@ -192,8 +192,8 @@ mod tests {
     #[test]
     fn impulse_of_the_input_is_no_defect() {
         let mut signals = signals();
-        signals.input_a.fill(0.0);
-        signals.input_a[1000] = 1.0;
+        signals.input.fill(0.0);
+        signals.input[1000] = 1.0;
         let response = |k: usize| {
             let t = (k as f64 - 1000.0) / RATE_HZ;
             if t > 0.0 {
@@ -202,7 +202,7 @@ mod tests {
                 0.0
             }
         };
-        signals.output_m = (0..25_000).map(response).collect();
+        signals.output = (0..25_000).map(response).collect();
         assert_eq!(defects(&signals, false), []);
     }
 
@@ -211,7 +211,7 @@ mod tests {
     fn flat_peaks_of_a_coarse_quantisation_are_no_clipping() {
         let mut signals = signals();
         let sine = |k: usize| (std::f64::consts::TAU * 30.003 * k as f64 / RATE_HZ).sin();
-        signals.output_m = (0..25_000)
+        signals.output = (0..25_000)
             .map(|k| (40.0 * sine(k)).round() / 40.0)
             .collect();
         let found = defects(&signals, true);

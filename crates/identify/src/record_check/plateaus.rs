@@ -19,14 +19,14 @@ const MIN_PILE_RATIO: usize = 5;
 
 /// The longest run of equal samples, if it is no chance.
 pub(super) fn repeated(signals: &Signals) -> Option<Defect> {
-    let output = &signals.output_m;
+    let output = &signals.output;
     let runs = output.chunk_by(|a, b| a == b);
     let starts = runs.scan(0, |end, run| {
         *end += run.len();
         Some((*end - run.len(), run.len()))
     });
     let moving = starts.filter(|(start, samples)| {
-        let input = &signals.input_a[*start..start + samples];
+        let input = &signals.input[*start..start + samples];
         let changes = input.windows(2).filter(|pair| pair[0] != pair[1]);
         2 * changes.count() >= *samples
     });
@@ -43,7 +43,7 @@ pub(super) fn repeated(signals: &Signals) -> Option<Defect> {
 
 /// The output at its largest or smallest value, if it stays there in several places.
 pub(super) fn clipped(signals: &Signals) -> Option<Defect> {
-    let output = &signals.output_m;
+    let output = &signals.output;
     let limits = [f64::max, f64::min].map(|extreme| {
         let first = output.first().copied().unwrap_or(0.0);
         output.iter().copied().fold(first, extreme)

@@ -60,7 +60,7 @@ impl<'a> Prediction<'a> {
                 .zip(coefficients.iter())
                 .map(|(x, c)| x * c)
                 .sum();
-            (signals.output_m[k] - scale.offset) - predicted * scale.output
+            (signals.output[k] - scale.offset) - predicted * scale.output
         };
         let mut error = vec![0.0; ORDER];
         error.extend((ORDER..signals.len()).map(row_error));
@@ -85,7 +85,7 @@ impl<'a> Prediction<'a> {
     /// The first spike and the first step.
     pub(super) fn jumps(&self) -> Vec<Defect> {
         let mut found: Vec<Defect> = Vec::new();
-        let jumps_of_input = jumps(&self.signals.input_a);
+        let jumps_of_input = jumps(&self.signals.input);
         let mut k = ORDER;
         while k < self.error.len() {
             if !self.is_outlier(k) || after_a_jump(&jumps_of_input, k) {
@@ -157,15 +157,15 @@ struct Scale {
 
 impl Scale {
     fn new(signals: &Signals) -> Scale {
-        let offset = mean::mean(&signals.output_m);
+        let offset = mean::mean(&signals.output);
         let rms = |samples: &[f64], offset: f64| {
             let sum: f64 = samples.iter().map(|x| (x - offset) * (x - offset)).sum();
             (sum / samples.len() as f64).sqrt().max(f64::MIN_POSITIVE)
         };
         Scale {
             offset,
-            output: rms(&signals.output_m, offset),
-            input: rms(&signals.input_a, 0.0),
+            output: rms(&signals.output, offset),
+            input: rms(&signals.input, 0.0),
         }
     }
 }
@@ -174,9 +174,9 @@ impl Scale {
 fn row(signals: &Signals, scale: &Scale, k: usize) -> [f64; COEFFICIENTS] {
     std::array::from_fn(|i| {
         if i < ORDER {
-            (signals.output_m[k - 1 - i] - scale.offset) / scale.output
+            (signals.output[k - 1 - i] - scale.offset) / scale.output
         } else {
-            signals.input_a[k - (i - ORDER)] / scale.input
+            signals.input[k - (i - ORDER)] / scale.input
         }
     })
 }
@@ -188,7 +188,7 @@ fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
     let step = (signals.len() / MAX_EQUATIONS).max(1);
     for k in (ORDER..signals.len()).step_by(step) {
         let row = row(signals, scale, k);
-        let output = (signals.output_m[k] - scale.offset) / scale.output;
+        let output = (signals.output[k] - scale.offset) / scale.output;
         for i in 0..COEFFICIENTS {
             for j in 0..=i {
                 matrix[(i, j)] += row[i] * row[j];

@@ -59,7 +59,7 @@ impl fmt::Display for StrayLine {
 
 /// The lines of the output, the strongest first.
 pub fn stray_lines(signals: &Signals) -> Vec<StrayLine> {
-    let (output, input) = (power(&signals.output_m), power(&signals.input_a));
+    let (output, input) = (power(&signals.output), power(&signals.input));
     let first = (MIN_PERIODS * PARTS).max(AROUND.1);
     let end = output.len().saturating_sub(AROUND.1);
     let is_stray =
@@ -81,7 +81,7 @@ pub fn without<'a>(signals: &'a Signals, lines: &[StrayLine]) -> Cow<'a, Signals
     let mut cleaned = signals.clone();
     for line in lines {
         let omega = TAU * line.frequency_hz / signals.rate_hz;
-        for (n, y) in cleaned.output_m.iter_mut().enumerate() {
+        for (n, y) in cleaned.output.iter_mut().enumerate() {
             *y -= (line.amplitude * Complex::cis(omega * n as f64)).re;
         }
     }
@@ -118,7 +118,7 @@ fn is_line(power: &[f64], bin: usize, factor: f64) -> bool {
 
 /// The line near a bin, if its amplitude is the same in most parts of the record.
 fn steady_line(signals: &Signals, bin: usize) -> Option<StrayLine> {
-    let output = &signals.output_m;
+    let output = &signals.output;
     let length = output.len() / PARTS;
     let mut omega = TAU * bin as f64 / output.len() as f64;
     omega += median_advance(&amplitudes(output, omega)) / length as f64;
