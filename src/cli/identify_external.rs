@@ -208,7 +208,9 @@ impl ExternalOptions {
         let option = match why {
             IdentifyError::Band(_) => self.band.as_ref().map(|band| format!("--band {band}")),
             IdentifyError::Setting { .. } => self.period.as_ref().map(|n| format!("--period {n}")),
-            IdentifyError::Periods(_) => self.skip_periods.map(|n| format!("--skip-periods {n}")),
+            IdentifyError::Periods { .. } => {
+                self.skip_periods.map(|n| format!("--skip-periods {n}"))
+            }
             IdentifyError::Signals(_) | IdentifyError::NotExcited { .. } => None,
         };
         match option {

@@ -1,7 +1,7 @@
 //! Identification in closed loop, on a loop simulated independently of the library.
 
 use bench_identify::joint::estimate;
-use bench_identify::{EstimatorSettings, Frf, local};
+use bench_identify::{EstimatorSettings, Frf, SignalsError, local};
 use bench_test_support::feedback_loop::{BAND_HZ, loop_gain, plant, run};
 use nalgebra::Complex;
 
@@ -64,5 +64,13 @@ fn rejects_constant_reference_and_columns_of_different_lengths() {
         "{error}"
     );
     signals.reference_m.pop();
-    assert!(estimate(&signals, BAND_HZ, &EstimatorSettings::default()).is_err());
+    let reference = signals.reference_m.len();
+    let error = SignalsError::ReferenceLength {
+        reference,
+        signals: reference + 1,
+    };
+    assert_eq!(
+        estimate(&signals, BAND_HZ, &EstimatorSettings::default()).unwrap_err(),
+        error.into()
+    );
 }

@@ -2,7 +2,7 @@
 
 use core::ops::RangeInclusive;
 
-use super::IdentifyError;
+use super::BandError;
 
 /// The bins k = 1 ..= (samples - 1)/2 of an FFT over `samples` whose frequency k rate/samples lies within the band,
 /// limits included. Bin 0 (offset of the probe) and the bin at the Nyquist frequency (no phase) are excluded.
@@ -10,7 +10,7 @@ pub(super) fn bins(
     band_hz: (f64, f64),
     rate_hz: f64,
     samples: usize,
-) -> Result<RangeInclusive<usize>, IdentifyError> {
+) -> Result<RangeInclusive<usize>, BandError> {
     let (low_hz, high_hz) = band_hz;
     check(band_hz, rate_hz)?;
     let bin_hz = rate_hz / samples as f64;
@@ -22,14 +22,12 @@ pub(super) fn bins(
     if low <= high {
         Ok(low..=high)
     } else {
-        Err(no_bin(band_hz, bin_hz))
+        Err(BandError::NoBin {
+            low_hz,
+            high_hz,
+            bin_hz,
+        })
     }
-}
-
-fn no_bin((low_hz, high_hz): (f64, f64), bin_hz: f64) -> IdentifyError {
-    IdentifyError::Band(format!(
-        "no frequency bin lies between {low_hz} and {high_hz} Hz (first bin at {bin_hz} Hz, spacing {bin_hz} Hz); widen the band, or use a longer record or segment"
-    ))
 }
 
 /// The highest bin below the Nyquist frequency.
@@ -37,17 +35,16 @@ pub(super) fn last_bin(samples: usize) -> usize {
     samples.saturating_sub(1) / 2
 }
 
-fn check((low_hz, high_hz): (f64, f64), rate_hz: f64) -> Result<(), IdentifyError> {
+fn check((low_hz, high_hz): (f64, f64), rate_hz: f64) -> Result<(), BandError> {
     if !(low_hz >= 0.0 && low_hz < high_hz && high_hz.is_finite()) {
-        return Err(IdentifyError::Band(format!(
-            "the band from {low_hz} to {high_hz} Hz is invalid; give finite limits with 0 <= lower < upper"
-        )));
+        return Err(BandError::Limits { low_hz, high_hz });
     }
-    let limit_hz = rate_hz / 2.0;
-    if high_hz > limit_hz {
-        return Err(IdentifyError::Band(format!(
-            "the band reaches {high_hz} Hz, beyond the Nyquist frequency of {limit_hz} Hz; lower its upper limit, or record at a higher rate"
-        )));
+    let nyquist_hz = rate_hz / 2.0;
+    if high_hz > nyquist_hz {
+        return Err(BandError::BeyondNyquist {
+            high_hz,
+            nyquist_hz,
+        });
     }
     Ok(())
 }

@@ -54,7 +54,7 @@ pub mod verdict;
 pub mod welch;
 
 pub use bench_base::estimate::{Estimate, SIGMAS_95};
-pub use error::IdentifyError;
+pub use error::{BandError, IdentifyError, Signal, SignalsError};
 pub use excited_band::excited_band_hz;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};

@@ -2,7 +2,7 @@
 
 use core::ops::Range;
 
-use super::IdentifyError;
+use super::error::{IdentifyError, Signal, SignalsError};
 use super::mean::mean;
 
 /// A shorter record has too few neighbouring bins to separate a response from noise.
@@ -56,30 +56,25 @@ impl Signals {
         check_lengths(self.input.len(), self.output.len())?;
         check_min_samples(self.len(), MIN_SAMPLES)?;
         if !(self.rate_hz.is_finite() && self.rate_hz > 0.0) {
-            return Err(IdentifyError::Signals(format!(
-                "the sampling rate is {} Hz; give a finite rate above 0 Hz",
-                self.rate_hz
-            )));
+            return Err(SignalsError::Rate {
+                rate_hz: self.rate_hz,
+            }
+            .into());
         }
-        check_samples("input", &self.input)?;
-        check_samples("output", &self.output)?;
-        self.check_motion()
+        check_samples(Signal::Input, &self.input)?;
+        check_samples(Signal::Output, &self.output)?;
+        Ok(self.check_motion()?)
     }
 
-    fn check_motion(&self) -> Result<(), IdentifyError> {
+    fn check_motion(&self) -> Result<(), SignalsError> {
         let samples = self.len();
-        let why = if let Some(value) = constant_value(&self.input) {
-            format!(
-                "the input is {value} A at every one of {samples} samples: nothing was excited; check that the amplifier was enabled and that the excitation is not zero"
-            )
-        } else if let Some(value) = constant_value(&self.output) {
-            format!(
-                "the output is {value} m at every one of {samples} samples: the probe does not measure the stage; check its range, its cable and its validity flag"
-            )
-        } else {
-            return Ok(());
-        };
-        Err(IdentifyError::Signals(why))
+        if let Some(value) = constant_value(&self.input) {
+            return Err(SignalsError::ConstantInput { value, samples });
+        }
+        if let Some(value) = constant_value(&self.output) {
+            return Err(SignalsError::ConstantOutput { value, samples });
+        }
+        Ok(())
     }
 
     /// The output minus the straight line through its rest positions before and after the excitation, in the unit of the
@@ -119,33 +114,33 @@ impl Signals {
 }
 
 /// Checks that input and output have the same number of samples.
-pub(super) fn check_lengths(input: usize, output: usize) -> Result<(), IdentifyError> {
+fn check_lengths(input: usize, output: usize) -> Result<(), SignalsError> {
     if input == output {
-        return Ok(());
+        Ok(())
+    } else {
+        Err(SignalsError::Lengths { input, output })
     }
-    Err(IdentifyError::Signals(format!(
-        "the input has {input} samples, the output {output}; give both one sample for each tick, with the same tick at the same index"
-    )))
 }
 
 /// Checks that there are enough samples.
-pub(super) fn check_min_samples(samples: usize, min: usize) -> Result<(), IdentifyError> {
+pub(super) fn check_min_samples(samples: usize, min: usize) -> Result<(), SignalsError> {
     if samples >= min {
-        return Ok(());
+        Ok(())
+    } else {
+        Err(SignalsError::TooShort { samples, min })
     }
-    Err(IdentifyError::Signals(format!(
-        "{samples} samples are too few, at least {min} are needed; record for longer"
-    )))
 }
 
-fn check_samples(column: &str, samples: &[f64]) -> Result<(), IdentifyError> {
+fn check_samples(signal: Signal, samples: &[f64]) -> Result<(), SignalsError> {
     let Some(index) = samples.iter().position(|sample| !is_valid(*sample)) else {
         return Ok(());
     };
-    Err(IdentifyError::Signals(format!(
-        "{column} is {} at sample {index}: every sample must be finite and below {MAX_SAMPLE:e} in magnitude; cut the record before it, or repair the sample",
-        samples[index]
-    )))
+    Err(SignalsError::Sample {
+        signal,
+        index,
+        value: samples[index],
+        max: MAX_SAMPLE,
+    })
 }
 
 /// Whether a sample is within the limit; NaN is not, as a comparison with it is false.
@@ -171,4 +166,61 @@ fn centre(samples: &[f64], range: Range<usize>) -> (f64, f64) {
 fn line_through((k0, y0): (f64, f64), (k1, y1): (f64, f64)) -> (f64, f64) {
     let slope = (y1 - y0) / (k1 - k0);
     (y0 - slope * k0, slope)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn valid() -> Signals {
+        let input: Vec<f64> = (0..100).map(|k| f64::from(k % 7)).collect();
+        Signals {
+            rate_hz: 1000.0,
+            output: input.clone(),
+            input,
+        }
+    }
+
+    #[test]
+    fn error_of_a_sample_holds_signal_index_and_value() {
+        let mut signals = valid();
+        signals.output[37] = f64::INFINITY;
+        let error = IdentifyError::from(SignalsError::Sample {
+            signal: Signal::Output,
+            index: 37,
+            value: f64::INFINITY,
+            max: 1e100,
+        });
+        assert_eq!(signals.check(), Err(error));
+    }
+
+    #[test]
+    fn error_of_lengths_holds_both() {
+        let mut signals = valid();
+        signals.output.truncate(99);
+        let (input, output) = (100, 99);
+        let error = SignalsError::Lengths { input, output };
+        assert_eq!(signals.check(), Err(error.into()));
+    }
+
+    #[test]
+    fn error_of_the_rate_holds_the_rate() {
+        let signals = Signals {
+            rate_hz: -1.0,
+            ..valid()
+        };
+        let error = SignalsError::Rate { rate_hz: -1.0 };
+        assert_eq!(signals.check(), Err(error.into()));
+    }
+
+    #[test]
+    fn error_of_a_constant_signal_holds_value_and_number() {
+        let mut signals = valid();
+        signals.input.fill(0.5);
+        let error = SignalsError::ConstantInput {
+            value: 0.5,
+            samples: 100,
+        };
+        assert_eq!(signals.check(), Err(error.into()));
+    }
 }

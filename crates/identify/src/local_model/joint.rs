@@ -37,8 +37,7 @@ use super::record_spectra::RecordSpectra;
 use super::spectra::Spectra;
 use super::window::{LocalFit, Window};
 use crate::fft::RealFft;
-use crate::signals::check_lengths;
-use crate::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, band};
+use crate::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, SignalsError, band};
 
 /// Reference, command and position of a closed loop: one sample per tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +76,7 @@ pub fn estimate(
     let signals = &loop_signals.signals;
     settings.check()?;
     signals.check()?;
-    check_lengths(loop_signals.reference_m.len(), signals.len())?;
+    check_reference(loop_signals.reference_m.len(), signals.len())?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
     estimate_bins(
         &ReferenceResponses::new(loop_signals),
@@ -85,6 +84,15 @@ pub fn estimate(
         band_hz,
         settings,
     )
+}
+
+/// Checks that the reference has as many samples as the signals.
+fn check_reference(reference: usize, signals: usize) -> Result<(), SignalsError> {
+    if reference == signals {
+        Ok(())
+    } else {
+        Err(SignalsError::ReferenceLength { reference, signals })
+    }
 }
 
 fn estimate_bins(

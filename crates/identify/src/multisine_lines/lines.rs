@@ -54,10 +54,11 @@ pub(super) fn averaged_periods(
     if count >= MIN_PERIODS {
         return Ok(count);
     }
-    Err(IdentifyError::Periods(format!(
-        "too few periods remain after omitting {skip} of {periods} whole ones, at least {} are needed (the last is used for the drift only); record more periods, omit fewer, or check the length of the period",
-        MIN_PERIODS + 1
-    )))
+    Err(IdentifyError::Periods {
+        skipped: skip,
+        periods,
+        min: MIN_PERIODS + 1,
+    })
 }
 
 /// The spectra of the averaged periods, without drift.
