@@ -40,11 +40,145 @@ pub enum ExternalCsvError {
     #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
     File(PathBuf, std::io::Error),
     /// The selected columns are missing, ambiguous or identical.
-    #[error("{0}")]
-    Columns(String),
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
     /// The file is not a table of numbers with regular times.
-    #[error("{0}")]
-    Data(String),
+    #[error(transparent)]
+    Data(#[from] DataError),
+}
+
+/// Why columns cannot be selected.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ColumnsError {
+    /// The same column for two purposes.
+    #[error("`{name}` is selected twice; give different columns for input, output and time")]
+    SelectedTwice {
+        /// Name of the column.
+        name: String,
+    },
+    /// Several columns have this name.
+    #[error(
+        "{path} has more than one column `{name}`; give each a name of its own",
+        path = .path.display()
+    )]
+    Ambiguous {
+        /// The file.
+        path: PathBuf,
+        /// Name of the columns.
+        name: String,
+    },
+    /// No column has this name.
+    #[error(
+        "{path} has no column `{name}`; choose one of {}",
+        .available.join(", "),
+        path = .path.display()
+    )]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The given name.
+        name: String,
+        /// Names of the columns of the file.
+        available: Vec<String>,
+    },
+}
+
+/// Why a file is not a table of numbers with regular times. Lines are those of the file, from 1.
+#[derive(Debug, Error)]
+pub enum DataError {
+    /// The text is not a table.
+    #[error(
+        "{path} is not a table with one sample per line: {source}; repair the file",
+        path = .path.display()
+    )]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// Why, with the line.
+        source: csv::Error,
+    },
+    /// Commas between the columns, and also in the numbers.
+    #[error(
+        "{path}, line {line}: has twice the columns of the header, \
+         so the numbers seem to have a comma in place of the decimal point; write them as in 0.5",
+        path = .path.display()
+    )]
+    DecimalCommas {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+    },
+    /// A cell is not a finite number.
+    #[error(
+        "{path}, line {line}: {text:?} in column `{column}` {}",
+        number_remedy(.text),
+        path = .path.display()
+    )]
+    Cell {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// Text of the cell.
+        text: String,
+    },
+    /// Too few times for a rate.
+    #[error(
+        "{path} has {lines} lines of samples, a rate needs at least 2 and an estimate 64; record for longer",
+        path = .path.display()
+    )]
+    TooFewLines {
+        /// The file.
+        path: PathBuf,
+        /// Lines after the header.
+        lines: usize,
+    },
+    /// A time is not after the one before.
+    #[error(
+        "{path}, line {line}: the time {time_s} s in column `{column}` is not after \
+         the previous time of {previous_s} s; sort the lines, or cut the file there",
+        path = .path.display()
+    )]
+    NotRising {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Name of the column of times.
+        column: String,
+        /// The time.
+        time_s: f64,
+        /// The time of the line before.
+        previous_s: f64,
+    },
+    /// A time step differs from the others.
+    #[error(
+        "{path}, line {line}: {step_s:.9} s after the line before, where the median step is {median_s:.9} s; \
+         fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
+        path = .path.display()
+    )]
+    Irregular {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Time since the line before.
+        step_s: f64,
+        /// Median of all such times.
+        median_s: f64,
+    },
+}
+
+/// What is wrong with a cell that is not a finite number.
+fn number_remedy(text: &str) -> &'static str {
+    if text.contains(',') {
+        "has a comma in place of the decimal point; write the numbers as in 0.5"
+    } else {
+        "is not a finite number; repair the cell, or cut the file there"
+    }
 }
 
 /// Reads two columns as a record.
@@ -139,27 +273,17 @@ impl Table<'_> {
             .from_reader(&self.text)
     }
 
-    fn header(
-        &self,
-        reader: &mut csv::Reader<&[u8]>,
-    ) -> Result<csv::StringRecord, ExternalCsvError> {
-        reader
-            .headers()
-            .cloned()
-            .map_err(|error| self.not_a_table(&error))
+    fn header(&self, reader: &mut csv::Reader<&[u8]>) -> Result<csv::StringRecord, DataError> {
+        let header = reader.headers().cloned();
+        header.map_err(|error| self.not_a_table(error))
     }
 
-    fn not_a_table(&self, error: &csv::Error) -> ExternalCsvError {
-        let path = self.path.display();
-        if let Some(line) = self.line_of_decimal_commas(error) {
-            return self.invalid_line(
-                line,
-                "has twice the columns of the header, so the numbers seem to have a comma in place of the decimal point; write them as in 0.5",
-            );
+    fn not_a_table(&self, source: csv::Error) -> DataError {
+        let path = self.path.to_owned();
+        match self.line_of_decimal_commas(&source) {
+            Some(line) => DataError::DecimalCommas { path, line },
+            None => DataError::Table { path, source },
         }
-        ExternalCsvError::Data(format!(
-            "{path} is not a table with one sample per line: {error}; repair the file"
-        ))
     }
 
     /// The line with an error, if it has two columns, between commas, for each of the header.
@@ -176,11 +300,6 @@ impl Table<'_> {
         is_doubled.then(|| pos.as_ref().map_or(0, csv::Position::line))
     }
 
-    /// An error at a line of the file.
-    fn invalid_line(&self, line: u64, what: &str) -> ExternalCsvError {
-        ExternalCsvError::Data(format!("{}, line {line}: {what}", self.path.display()))
-    }
-
     fn numbers(&self, names: &[&str]) -> Result<Numbers, ExternalCsvError> {
         let mut reader = self.reader();
         let header = self.header(&mut reader)?;
@@ -191,7 +310,7 @@ impl Table<'_> {
             values: vec![Vec::new(); names.len()],
         };
         for record in reader.records() {
-            let record = record.map_err(|error| self.not_a_table(&error))?;
+            let record = record.map_err(|error| self.not_a_table(error))?;
             self.push_row(&record, &selection, &mut numbers)?;
         }
         Ok(numbers)
@@ -203,7 +322,7 @@ impl Table<'_> {
         record: &csv::StringRecord,
         selection: &Selection<'_>,
         numbers: &mut Numbers,
-    ) -> Result<(), ExternalCsvError> {
+    ) -> Result<(), DataError> {
         let line = record.position().map_or(0, csv::Position::line);
         numbers.lines.push(line);
         let columns = selection.indices.iter().zip(selection.names);
@@ -218,12 +337,12 @@ impl Table<'_> {
         &self,
         header: &csv::StringRecord,
         names: &[&str],
-    ) -> Result<Vec<usize>, ExternalCsvError> {
+    ) -> Result<Vec<usize>, ColumnsError> {
         let duplicate = (1..names.len()).find(|k| names[..*k].contains(&names[*k]));
         if let Some(name) = duplicate.map(|k| names[k]) {
-            return Err(ExternalCsvError::Columns(format!(
-                "`{name}` is selected twice; give different columns for input, output and time"
-            )));
+            return Err(ColumnsError::SelectedTwice {
+                name: (*name).into(),
+            });
         }
         names
             .iter()
@@ -231,51 +350,37 @@ impl Table<'_> {
             .collect()
     }
 
-    fn column_index(
-        &self,
-        header: &csv::StringRecord,
-        name: &str,
-    ) -> Result<usize, ExternalCsvError> {
-        let path = self.path.display();
+    fn column_index(&self, header: &csv::StringRecord, name: &str) -> Result<usize, ColumnsError> {
+        let (path, given) = (self.path.to_owned(), name.to_owned());
         let mut matches = (0..header.len()).filter(|index| &header[*index] == name);
-        let why = match (matches.next(), matches.next()) {
-            (Some(index), None) => return Ok(index),
-            (Some(_), Some(_)) => {
-                format!("{path} has more than one column `{name}`; give each a name of its own")
-            }
-            (None, _) => {
-                let available = header.iter().collect::<Vec<_>>().join(", ");
-                format!("{path} has no column `{name}`; choose one of {available}")
-            }
-        };
-        Err(ExternalCsvError::Columns(why))
+        match (matches.next(), matches.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(_), Some(_)) => Err(ColumnsError::Ambiguous { path, name: given }),
+            (None, _) => Err(ColumnsError::Missing {
+                path,
+                name: given,
+                available: header.iter().map(String::from).collect(),
+            }),
+        }
     }
 
-    fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, ExternalCsvError> {
+    fn number(&self, text: &str, line: u64, column: &str) -> Result<f64, DataError> {
         let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-        number.ok_or_else(|| {
-            let what = if text.contains(',') {
-                "has a comma in place of the decimal point; write the numbers as in 0.5"
-            } else {
-                "is not a finite number; repair the cell, or cut the file there"
-            };
-            self.invalid_line(line, &format!("{text:?} in column `{column}` {what}"))
+        number.ok_or_else(|| DataError::Cell {
+            path: self.path.to_owned(),
+            line,
+            column: column.into(),
+            text: text.into(),
         })
     }
 
     /// Samples per second, from the first to the last.
-    fn rate_hz(
-        &self,
-        column: &str,
-        time_s: &[f64],
-        lines: &[u64],
-    ) -> Result<f64, ExternalCsvError> {
+    fn rate_hz(&self, column: &str, time_s: &[f64], lines: &[u64]) -> Result<f64, DataError> {
         let [first_s, .., last_s] = time_s else {
-            return Err(ExternalCsvError::Data(format!(
-                "{} has {} lines of samples, a rate needs at least 2 and an estimate 64; record for longer",
-                self.path.display(),
-                time_s.len()
-            )));
+            return Err(DataError::TooFewLines {
+                path: self.path.to_owned(),
+                lines: time_s.len(),
+            });
         };
         self.check_rising(column, time_s, lines)?;
         let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -283,36 +388,33 @@ impl Table<'_> {
         Ok(steps_s.len() as f64 / (last_s - first_s))
     }
 
-    fn check_rising(
-        &self,
-        column: &str,
-        time_s: &[f64],
-        lines: &[u64],
-    ) -> Result<(), ExternalCsvError> {
+    fn check_rising(&self, column: &str, time_s: &[f64], lines: &[u64]) -> Result<(), DataError> {
         let mut steps = time_s.windows(2);
         let Some(k) = steps.position(|pair| pair[1] - pair[0] <= 0.0) else {
             return Ok(());
         };
-        let what = format!(
-            "the time {} s in column `{column}` is not after the previous time of {} s; sort the lines, or cut the file there",
-            time_s[k + 1],
-            time_s[k]
-        );
-        Err(self.invalid_line(lines[k + 1], &what))
+        Err(DataError::NotRising {
+            path: self.path.to_owned(),
+            line: lines[k + 1],
+            column: column.into(),
+            time_s: time_s[k + 1],
+            previous_s: time_s[k],
+        })
     }
 
-    fn check_regular(&self, steps_s: &[f64], lines: &[u64]) -> Result<(), ExternalCsvError> {
+    fn check_regular(&self, steps_s: &[f64], lines: &[u64]) -> Result<(), DataError> {
         let median_s = median(steps_s);
         let limit_s = MAX_IRREGULARITY * median_s;
         let mut deviations_s = steps_s.iter().map(|step_s| (step_s - median_s).abs());
         let Some(k) = deviations_s.position(|deviation_s| deviation_s > limit_s) else {
             return Ok(());
         };
-        let what = format!(
-            "{:.9} s after the line before, where the median step is {median_s:.9} s; fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
-            steps_s[k]
-        );
-        Err(self.invalid_line(lines[k + 1], &what))
+        Err(DataError::Irregular {
+            path: self.path.to_owned(),
+            line: lines[k + 1],
+            step_s: steps_s[k],
+            median_s,
+        })
     }
 }
 
@@ -321,4 +423,88 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[sorted.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The error of a table with the columns t, u and y.
+    fn error_of(rows: &str) -> ExternalCsvError {
+        let table = Table {
+            path: Path::new("data.csv"),
+            text: format!("t,u,y\n{rows}").into_bytes(),
+        };
+        let rate_hz = |Numbers { lines, values }: Numbers| table.rate_hz("t", &values[2], &lines);
+        let numbers = table.numbers(&["u", "y", "t"]);
+        let rate_hz = numbers.and_then(|numbers| Ok(rate_hz(numbers)?));
+        rate_hz.expect_err("an invalid table")
+    }
+
+    #[test]
+    fn error_of_a_cell_holds_line_column_and_text() {
+        let error = error_of("0,1,2\n1,1,off\n");
+        let ExternalCsvError::Data(DataError::Cell {
+            path,
+            line,
+            column,
+            text,
+        }) = &error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((path.as_path(), *line), (Path::new("data.csv"), 3));
+        assert_eq!((column.as_str(), text.as_str()), ("y", "off"));
+        assert_eq!(
+            error.to_string(),
+            "data.csv, line 3: \"off\" in column `y` is not a finite number; repair the cell, or cut the file there"
+        );
+    }
+
+    #[test]
+    fn error_of_an_irregular_time_holds_line_and_steps() {
+        let error = error_of("0,1,2\n1,1,2\n2,1,2\n4.5,1,2\n");
+        let ExternalCsvError::Data(DataError::Irregular {
+            line,
+            step_s,
+            median_s,
+            ..
+        }) = error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((line, step_s, median_s), (5, 2.5, 1.0));
+    }
+
+    #[test]
+    fn error_of_a_time_that_does_not_rise_holds_both_times() {
+        let error = error_of("0,1,2\n1,1,2\n0.5,1,2\n");
+        let ExternalCsvError::Data(DataError::NotRising {
+            line,
+            time_s,
+            previous_s,
+            ..
+        }) = error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((line, time_s, previous_s), (4, 0.5, 1.0));
+    }
+
+    #[test]
+    fn error_of_an_unknown_column_holds_the_available_ones() {
+        let table = Table {
+            path: Path::new("data.csv"),
+            text: b"t,u,y\n0,1,2\n".to_vec(),
+        };
+        let error = table.numbers(&["u", "v"]).err().expect("no column v");
+        assert_eq!(
+            error.to_string(),
+            "data.csv has no column `v`; choose one of t, u, y"
+        );
+        let ExternalCsvError::Columns(ColumnsError::Missing { available, .. }) = error else {
+            panic!("{error:?}");
+        };
+        assert_eq!(available, ["t", "u", "y"]);
+    }
 }

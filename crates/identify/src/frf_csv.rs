@@ -33,9 +33,34 @@ pub enum FrfCsvError {
     /// The file cannot be read.
     #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
     File(PathBuf, io::Error),
-    /// The text is not an FRF.
-    #[error("{0}")]
-    Format(String),
+    /// The first line is not [`HEADER`].
+    #[error("the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`")]
+    Header {
+        /// The first line.
+        found: String,
+    },
+    /// A response in another unit: only the name of the magnitude column differs from [`HEADER`].
+    #[error(
+        "the magnitude column is `{name}`, not `{METRES_PER_AMPERE}`; \
+         give a response from current (A) to displacement (m), such as ..._frf.csv of `bench chirp`"
+    )]
+    Unit {
+        /// Name of the magnitude column.
+        name: String,
+    },
+    /// A row is not a number for each column, or its frequency is not above the one before.
+    #[error(
+        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before; {REPAIR}"
+    )]
+    Row {
+        /// Line in the file, from 1.
+        line: u64,
+        /// The row.
+        text: String,
+    },
+    /// The text is not a table.
+    #[error("{0}; {REPAIR}")]
+    Table(#[source] csv::Error),
 }
 
 /// Name of the magnitude column of an external record, with the names of its columns in place of units.
@@ -113,7 +138,7 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
         .from_reader(text.as_bytes());
     let mut frf = Frf::default();
     for record in reader.records() {
-        let record = record.map_err(|error| FrfCsvError::Format(format!("{error}; {REPAIR}")))?;
+        let record = record.map_err(FrfCsvError::Table)?;
         finite_numbers(&record)
             .and_then(|numbers| push_row(numbers, &mut frf))
             .ok_or_else(|| invalid_row(&record))?;
@@ -124,22 +149,19 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
 /// The columns are those of another file, or of a response in another unit.
 fn wrong_header(found: &str) -> FrfCsvError {
     let name = found.split(',').nth(1).unwrap_or_default();
-    let text = if found.replacen(name, METRES_PER_AMPERE, 1) == HEADER {
-        format!(
-            "the magnitude column is `{name}`, not `{METRES_PER_AMPERE}`; give a response from current (A) to displacement (m), such as ..._frf.csv of `bench chirp`"
-        )
+    if found.replacen(name, METRES_PER_AMPERE, 1) == HEADER {
+        FrfCsvError::Unit { name: name.into() }
     } else {
-        format!("the first line is {found:?}, not {HEADER:?}; give an FRF file of `bench identify`")
-    };
-    FrfCsvError::Format(text)
+        FrfCsvError::Header {
+            found: found.into(),
+        }
+    }
 }
 
 fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {
     let line = record.position().map_or(0, csv::Position::line);
     let text = record.iter().collect::<Vec<_>>().join(",");
-    FrfCsvError::Format(format!(
-        "line {line}: {text:?} is not {COLUMNS} finite numbers with a frequency above the one before; {REPAIR}"
-    ))
+    FrfCsvError::Row { line, text }
 }
 
 /// The numbers of a row, if there is one for each column and all are finite.
@@ -169,4 +191,29 @@ fn push_row(numbers: [f64; COLUMNS], frf: &mut Frf) -> Option<()> {
     frf.phase_sigma_rad.push(phase_sigma_deg.to_radians());
     frf.resolution_hz.push(resolution);
     Some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn error_of_another_unit_holds_the_name_of_the_column() {
+        let text = HEADER.replace(METRES_PER_AMPERE, "magnitude_a_per_m");
+        let error = from_str(&text).expect_err("another unit");
+        assert!(
+            matches!(&error, FrfCsvError::Unit { name } if name == "magnitude_a_per_m"),
+            "{error:?}"
+        );
+    }
+
+    #[test]
+    fn error_of_a_row_holds_its_line_and_text() {
+        let text = format!("{HEADER}\n0.5,1e-4,0,1,0,0,0.1\n1,2,3\n");
+        let error = from_str(&text).expect_err("a row of three numbers");
+        assert!(
+            matches!(&error, FrfCsvError::Row { line: 3, text } if text == "1,2,3"),
+            "{error:?}"
+        );
+    }
 }
