@@ -7,6 +7,7 @@ use bench_settings::ConfigError;
 
 /// A controller that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ControllerError {
     /// The file is missing or not TOML, or its keys, types and ranges are wrong.
     #[error(transparent)]

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 /// Why the bytes of a file cannot be read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FormatError {
     /// The end of the file, or of a part of it, comes too early, or a size is impossible.
     #[error("it is damaged or incomplete at byte {at} ({what}); save it again")]
@@ -40,6 +41,7 @@ pub enum FormatError {
 
 /// A file that cannot be imported.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ImportError {
     /// The operating system refused it.
     #[error("cannot read {}: {why}; check that it is a file and that you may read it", .path.display())]

@@ -19,6 +19,7 @@ pub struct Section {
 
 /// The reason why a section is invalid.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SectionError {
     /// More zeros than poles: infinite gain at high frequency.
     #[error(

@@ -82,6 +82,7 @@ pub enum SectionSettings {
 
 /// Sections that no loop can run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SectionsError {
     /// An invalid section.
     #[error("section {number} {why}")]

@@ -9,6 +9,7 @@ use bench_base::numeric::is_within;
 
 /// An excitation that the interlocks would trip, or whose record could not be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExcitationError {
     /// The model gives no number.
     #[error(

@@ -53,6 +53,7 @@ pub enum IdentifyError {
 
 /// Why signals allow no estimate.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum SignalsError {
     /// Input and output differ in length.
     #[error(
@@ -149,6 +150,7 @@ impl fmt::Display for Signal {
 
 /// Why nothing can be estimated in a band.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum BandError {
     /// Limits that are not finite, negative, or in the wrong order.
     #[error(

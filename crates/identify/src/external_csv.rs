@@ -35,6 +35,7 @@ pub enum Sampling {
 
 /// Why a file cannot be read as a record. Messages state file, line, value and remedy.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ExternalCsvError {
     /// The file cannot be read.
     #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
@@ -49,6 +50,7 @@ pub enum ExternalCsvError {
 
 /// Why columns cannot be selected.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ColumnsError {
     /// The same column for two purposes.
     #[error("`{name}` is selected twice; give different columns for input, output and time")]
@@ -85,6 +87,7 @@ pub enum ColumnsError {
 
 /// Why a file is not a table of numbers with regular times. Lines are those of the file, from 1.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum DataError {
     /// The text is not a table.
     #[error(

@@ -29,6 +29,7 @@ const REPAIR: &str = "repair the line, or write the file again with `bench ident
 
 /// Why an FRF cannot be read.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum FrfCsvError {
     /// The file cannot be read.
     #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]

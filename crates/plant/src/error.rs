@@ -1,5 +1,6 @@
 /// The reason why a model cannot be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlantError {
     /// The mass matrix is not positive definite.
     #[error(

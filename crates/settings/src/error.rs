@@ -7,6 +7,7 @@ pub const MAX_ERRORS: usize = 50;
 
 /// A configuration that is refused, before any motion.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The name is neither that of a profile or controller nor that of a file.
     #[error("no {what} and no file has the name `{name}`; \

@@ -6,6 +6,7 @@ use crate::DeviceError;
 
 /// Why a probe could not be opened. Each message ends with the remedy.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SerialError {
     /// A setting is invalid.
     #[error("setting {name} = {value} is invalid; give {expected}")]

@@ -2,6 +2,7 @@
 
 /// A measured response that gives no margins. Frequencies are in hertz, as in the settings of the excitation.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MeasuredLoopError {
     /// Too few points.
     #[error(

@@ -20,6 +20,7 @@ pub struct MinimumTime {
 
 /// A step that cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MinimumTimeError {
     /// No reference settles within the time of all blocks.
     #[error(

@@ -9,6 +9,7 @@ use crate::unstable::{MAX_INTEGRATORS, ONLY_STABLE, WHY_TWO};
 
 /// A transfer function that is refused. The text follows the name of its file.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TransferError {
     /// All numbers of a key are 0.
     #[error("`{key}` has no number other than 0; give the coefficients by falling powers")]

@@ -6,6 +6,7 @@ use super::binding::Binding;
 
 /// A design that failed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TuneError {
     /// No controller that was found fulfils the limits.
     #[error("{0}")]

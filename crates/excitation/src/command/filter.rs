@@ -15,6 +15,7 @@ pub struct CommandFilter {
 
 /// A filter that cannot run.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CommandFilterError {
     /// A weight is infinite or not a number.
     #[error(

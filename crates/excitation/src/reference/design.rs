@@ -130,6 +130,7 @@ pub(super) fn check_frequency(frequency_hz: f64, rate_hz: f64) -> Option<Finding
 
 /// A reference file that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReferenceError {
     /// The file cannot be read.
     #[error(

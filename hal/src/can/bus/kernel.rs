@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// Raw CAN sockets cannot be opened.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum KernelError {
     /// The kernel has no CAN.
     #[error(

@@ -41,6 +41,7 @@ pub enum BusEvent {
 
 /// Error of a bus. Small and static, because it is created in the tick.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BusError {
     /// The transmit queue is full: no other node acknowledges the frames, or there are too many.
     #[error(

@@ -23,6 +23,7 @@ pub struct SocketPort {
 
 /// An interface that cannot be used in its present state.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum PortError {
     /// It does not exist, or its state cannot be read.
     #[error(transparent)]

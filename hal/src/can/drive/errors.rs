@@ -8,6 +8,7 @@ use super::super::sdo::{Address, SdoError};
 
 /// Why a drive could not be opened. The messages contain value, limit and remedy.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum OpenError {
     /// An invalid setting.
     #[error("{name} = {value} is invalid; set it to {limit}")]

@@ -10,6 +10,7 @@ use super::{AbortCode, Address, Client, Failure, Progress, answer_id, request_id
 
 /// A transfer that failed.
 #[derive(Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SdoError {
     /// The node aborted the transfer.
     #[error(
