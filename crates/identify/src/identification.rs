@@ -173,24 +173,28 @@ impl Identification {
     }
 
     /// Analyses only this band. The verdict covers modes and zeros in it.
+    #[must_use]
     pub fn band_hz(mut self, low_hz: f64, high_hz: f64) -> Identification {
         self.band_hz = Some((low_hz, high_hz));
         self
     }
 
     /// The signals are periodic, and periods are averaged: the record need not begin and end at rest.
+    #[must_use]
     pub fn periods(mut self, repetition: Repetition) -> Identification {
         self.repetition = Some(repetition);
         self
     }
 
     /// Each sample of the input is held for this time before the next, as by an output of a computer; usually a period.
+    #[must_use]
     pub fn held_s(mut self, hold_s: f64) -> Identification {
         self.input_path.hold_s = hold_s;
         self
     }
 
     /// A first-order lag lies between the input and the force, for example a current loop.
+    #[must_use]
     pub fn lag_s(mut self, lag_s: f64) -> Identification {
         self.input_path.lag_s = lag_s;
         self

@@ -51,6 +51,7 @@ impl SignalPath {
     }
 
     /// The same path with the mean delay alone: without the roll-off of a free-running probe.
+    #[must_use]
     pub fn with_mean_age(&self) -> SignalPath {
         SignalPath {
             delays_s: vec![self.mean_delay_s()],
@@ -59,6 +60,7 @@ impl SignalPath {
     }
 
     /// The same path with each delay increased, or decreased to 0 at least.
+    #[must_use]
     pub fn with_added_delay(&self, delay_s: f64) -> SignalPath {
         let delays = self.delays_s.iter();
         SignalPath {

@@ -75,6 +75,7 @@ impl Cascade {
     }
 
     /// The same cascade with (1 + s/z)/(1 + s/p) as another factor.
+    #[must_use]
     pub fn with_zero_pole(mut self, zero_rad_s: f64, pole_rad_s: f64) -> Cascade {
         self.factors.push(Factor::ZeroPole);
         let logs = [zero_rad_s, pole_rad_s].map(libm::log);
@@ -83,6 +84,7 @@ impl Cascade {
     }
 
     /// The same cascade with another biquad; frequency in rad/s and damping ratio of its zeros and poles.
+    #[must_use]
     pub fn with_biquad(mut self, zeros: (f64, f64), poles: (f64, f64)) -> Cascade {
         self.factors.push(Factor::Biquad);
         let logs = [zeros.0, zeros.1, poles.0, poles.1].map(libm::log);
@@ -91,6 +93,7 @@ impl Cascade {
     }
 
     /// The same cascade with other values of its parameters.
+    #[must_use]
     pub fn with_parameters(&self, parameters: Vec<f64>) -> Cascade {
         Cascade::new(self.factors.clone(), parameters)
     }

@@ -106,6 +106,7 @@ impl DesignTask {
 
 impl DesignTask {
     /// The same task with a measured disturbance in place of the lines of the floor.
+    #[must_use]
     pub fn with_disturbance(mut self, measured: DisturbanceSpectrum) -> DesignTask {
         self.disturbance.position = PositionDisturbance::Measured(measured);
         self

@@ -106,6 +106,7 @@ impl Verdict {
     }
 
     /// The verdict with a caution added to its reasons.
+    #[must_use]
     pub fn with(mut self, caution: Option<String>) -> Verdict {
         if let Some(caution) = caution {
             self.why = format!("{}; {caution}", self.why);

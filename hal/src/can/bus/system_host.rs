@@ -33,6 +33,7 @@ impl<P: Port> SystemHost<P> {
     }
 
     /// `prepare` runs first in each thread that is started, to give it a priority or a processor.
+    #[must_use]
     pub fn prepared(self, prepare: impl Fn() + Send + Sync + 'static) -> SystemHost<P> {
         SystemHost {
             prepare: Arc::new(prepare),
