@@ -108,7 +108,7 @@ pub enum SignalsError {
     },
     /// The input does not change.
     #[error(
-        "the input is {value} A at every one of {samples} samples: nothing was excited; \
+        "the input is {value} at every one of {samples} samples: nothing was excited; \
          check that the amplifier was enabled and that the excitation is not zero"
     )]
     ConstantInput {
@@ -119,7 +119,7 @@ pub enum SignalsError {
     },
     /// The output does not change.
     #[error(
-        "the output is {value} m at every one of {samples} samples: the probe does not measure the stage; \
+        "the output is {value} at every one of {samples} samples: the probe does not measure the stage; \
          check its range, its cable and its validity flag"
     )]
     ConstantOutput {
