@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::error::ExperimentError;
+use super::errors::ExperimentError;
 use super::prediction::extremes;
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;

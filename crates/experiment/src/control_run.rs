@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use super::closed_signals::ClosedSignals;
 use super::ending::Ending;
-use super::error::ExperimentError;
 use super::error_spectrum::{ErrorSpectrum, SpectrumModel, error_spectrum};
+use super::errors::ExperimentError;
 use super::loop_check::closed_loop_of;
 use super::overview::{Overview, overview};
 use super::plan::Plan;

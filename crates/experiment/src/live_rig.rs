@@ -8,11 +8,11 @@ use std::sync::mpsc::Sender;
 use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
+use super::errors::RunError;
 use super::motion_model::residuals;
 use super::plan::{Plan, RAMP_TICKS};
 use super::plan_error::PlanError;
 use super::run::{Run, RunFile, StopCause};
-use super::run_error::RunError;
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;

@@ -2,8 +2,7 @@
 
 use serde::Serialize;
 
-use super::error::ExperimentError;
-use super::motor_error::MotorError;
+use super::errors::{ExperimentError, MotorError};
 use super::motor_start::MotorStart;
 use super::plan::Plan;
 use bench_plant::LoopPlant;

@@ -2,7 +2,7 @@
 
 use std::time::SystemTime;
 
-use super::error::ExperimentError;
+use super::errors::ExperimentError;
 use super::loop_check::Stage;
 use super::plan_error::PlanError;
 use bench_config::Config;

@@ -3,7 +3,7 @@
 use bench_hal::blocking;
 use bench_hal::serial::StatisticsHandle;
 
-use super::error::ExperimentError;
+use super::errors::ExperimentError;
 use super::live_rig::LiveRig;
 use super::loop_check::Stage;
 use super::run_hooks::RunHooks;

@@ -5,14 +5,12 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::error::ExperimentError;
+use super::errors::{ExperimentError, MotorError, RunError};
 use super::live_rig::TAIL_S;
-use super::motor_error::MotorError;
 use super::motor_forecast::{MotorForecast, RESERVE, duration_text, predict};
 use super::motor_start::MotorStart;
 use super::plan::Plan;
 use super::run::Run;
-use super::run_error::RunError;
 use super::signals::stop_on_signal;
 use bench_base::progress::Progress;
 use bench_rig::motor::{Moment, MotorMemory};

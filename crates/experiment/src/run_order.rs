@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
 use super::description::Description;
-use super::error::ExperimentError;
+use super::errors::ExperimentError;
 use super::motor_start::MotorStart;
 use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;

@@ -5,8 +5,8 @@ use std::sync::atomic::Ordering;
 use std::task::Poll;
 use std::time::Duration;
 
+use super::errors::RunError;
 use super::run::StopCause;
-use super::run_error::RunError;
 use super::run_hooks::RunHooks;
 use super::signals::SignalFlags;
 use bench_config::OnRecordingFailure;

@@ -1,6 +1,6 @@
 //! The response of a closed loop to a step of its reference: predicted by the model, and measured in a recording.
 
-use super::error::ExperimentError;
+use super::errors::ExperimentError;
 use super::loop_check::closed_loop_of;
 use super::plan::Plan;
 use super::tracking::{TrackingMetrics, tracking_metrics};

@@ -4,7 +4,7 @@ use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
 use crate::analysis::{Analysis, analyse};
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::plan::Plan;
 use crate::prediction::{extremes, predicted_extremes};
 use crate::run_summary::RunSummary;

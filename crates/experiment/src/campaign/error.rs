@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use bench_base::checkpoint::{FileAction, FileError};
 use bench_plant::PlantError;
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{CampaignError, file_error};
 use super::point::{PointResult, analyse_point, sequence_result};
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::plan::Plan;
 use crate::prediction::predicted_extremes;
 use crate::run::Run;

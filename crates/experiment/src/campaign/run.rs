@@ -16,7 +16,7 @@ use super::store::{OpenedStore, Store};
 use super::visit_order::visit_order;
 use crate::description::Description;
 use crate::ending::Ending;
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::plan::Plan;
 use crate::run::Run;
 use crate::runner::{Runner, Setup, close};

@@ -10,7 +10,7 @@ use super::check::{Connected, Today, conditions};
 use super::condition::{Checked, Condition, Subject};
 use super::error::{CertificateDefects, CertificateError};
 use super::file::LoadedCertificate;
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::loop_check::{Stage, closed_loop_of};
 use crate::measured_frf::FrfError;
 use crate::open_bench::DeviceNames;

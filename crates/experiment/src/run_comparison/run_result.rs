@@ -7,7 +7,7 @@ use crate::analysis_error::AnalysisError;
 use crate::control_run::{ControlRun, control_run};
 use crate::description::Description;
 use crate::ending::Ending;
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::plan::{Plan, RunKind};
 use bench_config::Config;
 use bench_identify::modal::{FittedMode, ModalFit};

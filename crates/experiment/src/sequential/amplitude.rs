@@ -3,7 +3,7 @@
 
 use super::shot::Shot;
 use crate::amplitude_plan::{limit_travel, shape_travel_m};
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::prediction::extremes;
 use bench_base::units::hz;
 use bench_config::Config;

@@ -9,7 +9,7 @@ use super::next_shot::{NextShot, next_shot};
 use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::analysis::{Analysis, scope_of_model};
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::run::Run;
 use crate::run_summary::RunSummary;
 use bench_config::Config;

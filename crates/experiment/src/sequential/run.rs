@@ -6,7 +6,7 @@ use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::analysis::Analysis;
 use crate::ending::Ending;
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::plan::Plan;
 use crate::prediction::predicted_extremes;
 use crate::run::Run;

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use bench_base::units::hz;
 use bench_config::Config;
 use bench_excitation::{AmplitudePoint, ExcitationKind, Sweep};

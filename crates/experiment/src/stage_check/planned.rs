@@ -4,7 +4,7 @@ use super::comparison::StageCheck;
 use super::error::StageCheckError;
 use super::shot::Shot;
 use crate::analysis::run_signals;
-use crate::error::ExperimentError;
+use crate::errors::ExperimentError;
 use crate::loop_check::closed_loop_of;
 use crate::plan::Plan;
 use crate::plan_error::PlanError;

@@ -9,8 +9,8 @@
 
 use crate::closed_signals::ClosedSignals;
 use crate::ending::Ending;
-use crate::error::ExperimentError;
 use crate::error_spectrum::error_spectrum;
+use crate::errors::ExperimentError;
 use crate::loop_check::closed_loop_of;
 use crate::plan::Plan;
 use crate::plan_error::PlanError;

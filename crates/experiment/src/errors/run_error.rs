@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use super::plan_error::PlanError;
+use crate::plan_error::PlanError;
 use bench_recording::{MIN_FREE_BYTES, RecordingError};
 
 /// A run that was refused, or that failed.
@@ -72,7 +72,7 @@ fn megabytes(bytes: u64) -> f64 {
 
 impl RunError {
     /// Turns an error of the operating system into a [`RunError::System`].
-    pub(super) fn system(what: &'static str) -> impl Fn(std::io::Error) -> RunError {
+    pub(crate) fn system(what: &'static str) -> impl Fn(std::io::Error) -> RunError {
         move |error| RunError::System {
             what,
             why: error.to_string(),

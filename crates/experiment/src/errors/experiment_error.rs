@@ -1,14 +1,14 @@
 //! Why an experiment was refused or failed.
 
-use super::analysis_error::AnalysisError;
-use super::certificate::CertificateDefects;
 use super::error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
-use super::loop_check::MarginError;
-use super::measured_frf::FrfError;
 use super::motor_error::MotorError;
-use super::plan_error::PlanError;
 use super::run_error::RunError;
-use super::stage_check::StageCheckError;
+use crate::analysis_error::AnalysisError;
+use crate::certificate::CertificateDefects;
+use crate::loop_check::MarginError;
+use crate::measured_frf::FrfError;
+use crate::plan_error::PlanError;
+use crate::stage_check::StageCheckError;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_excitation::ExcitationError;
