@@ -3,9 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::analysis_error::{AnalysisError, ClosedLoopError};
-use super::loop_check::closed_loop_of;
-use super::plan::Plan;
-use super::plan_error::PlanError;
+use super::plan::{Plan, PlanError, closed_loop_of};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::response_points::margins_of_loop;
 use bench_config::{Config, ReferenceSettings};

@@ -19,10 +19,8 @@ pub mod campaign;
 pub mod certificate;
 mod closed_loop;
 mod closed_signals;
-mod command_plan;
 mod connections;
 mod control_run;
-mod description;
 mod ending;
 mod error_spectrum;
 mod errors;
@@ -30,23 +28,18 @@ mod excitation_plan;
 mod file_name;
 pub mod linearity;
 mod live_rig;
-mod loop_check;
 mod measured_frf;
 mod measured_margins;
 mod mode_pairs;
 mod model_response;
-mod motion_model;
 mod motor_forecast;
-mod motor_start;
 mod named_files;
 mod open_bench;
 mod overview;
 mod plan;
-mod plan_error;
 mod prediction;
 mod read_run;
 mod recorded_rig;
-mod reference_check;
 mod remembered_motor;
 mod replay;
 mod response_estimate;
@@ -66,11 +59,8 @@ mod signal_builder;
 mod signals;
 mod sine_response;
 pub mod stage_check;
-mod step_plan;
 mod step_response;
-mod swept_reference;
 mod tracking;
-mod tune_check;
 pub mod tuning;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
@@ -79,11 +69,7 @@ pub use analysis::{
 };
 pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use basic_results::BasicResults;
-pub use command_plan::{CommandSummary, ShapedMode};
 pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
-pub use description::{
-    Description, DescriptionError, Invocation, operator_name, run_name, run_note,
-};
 pub use ending::Ending;
 pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use errors::{
@@ -91,18 +77,18 @@ pub use errors::{
 };
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
 pub use live_rig::{LiveRig, run};
-pub use loop_check::{MarginError, RatedController, Stage, closed_loop, require_margins};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
 pub use model_response::ModelResponse;
-pub use motion_model::residuals;
 pub use motor_forecast::{MotorForecast, MotorSummary};
-pub use motor_start::MotorStart;
 pub use named_files::{check_calibration, check_named_files};
 pub use open_bench::{DeviceNames, OpenBench, Opening};
 pub use overview::{Extent, Overview, overview};
-pub use plan::{Plan, RunKind};
-pub use plan_error::PlanError;
+pub use plan::{
+    CommandSummary, Description, DescriptionError, Invocation, MarginError, MotorStart, Plan,
+    PlanError, RatedController, RunKind, ShapedMode, Stage, TuneRefusal, check_tune, closed_loop,
+    operator_name, require_margins, residuals, run_name, run_note,
+};
 pub use prediction::{extremes, predicted_extremes, rig_model};
 pub use read_run::{ReadSignals, open_with_signals};
 pub use remembered_motor::MotorHandling;
@@ -118,4 +104,3 @@ pub use signals::{StopSignals, abandon_on_signal, stop_on_signal, survive_file_s
 pub use sine_response::SineResponse;
 pub use step_response::{PredictedStep, StepResponse, predicted_step, step_response};
 pub use tracking::{TrackingMetrics, tracking_metrics};
-pub use tune_check::{TuneRefusal, check_tune};

@@ -9,9 +9,7 @@ use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
 use super::errors::RunError;
-use super::motion_model::residuals;
-use super::plan::{Plan, RAMP_TICKS};
-use super::plan_error::PlanError;
+use super::plan::{Plan, PlanError, RAMP_TICKS, residuals};
 use super::run::{Run, RunFile, StopCause};
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};

@@ -9,8 +9,7 @@ use std::path::Path;
 
 use super::analysis::{cautions, measured_data};
 use super::analysis_error::AnalysisError;
-use super::plan::{Plan, RunKind};
-use super::plan_error::PlanError;
+use super::plan::{Plan, PlanError, RunKind};
 use super::read_run::{ReadSignals, open_with_signals};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;

@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use super::errors::{ExperimentError, MotorError};
-use super::motor_start::MotorStart;
-use super::plan::Plan;
+use super::plan::{MotorStart, Plan};
 use bench_plant::LoopPlant;
 use bench_rig::motor::{
     HeatPrediction, Moment, MotorMemory, MotorOrigin, MotorState, ThermalModel,

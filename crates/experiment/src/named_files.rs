@@ -3,8 +3,7 @@
 use std::time::SystemTime;
 
 use super::errors::ExperimentError;
-use super::loop_check::Stage;
-use super::plan_error::PlanError;
+use super::plan::{PlanError, Stage};
 use bench_config::Config;
 use bench_control::ControllerText;
 use bench_excitation::ReferenceContext;

@@ -5,7 +5,7 @@ use bench_hal::serial::StatisticsHandle;
 
 use super::errors::ExperimentError;
 use super::live_rig::LiveRig;
-use super::loop_check::Stage;
+use super::plan::Stage;
 use super::run_hooks::RunHooks;
 use bench_config::Config;
 use bench_rig::devices::{self, Reservation};

@@ -12,8 +12,7 @@ use serde::Serialize;
 
 use super::connections::{OutsideEnds, connect};
 use super::live_rig::servo_run;
-use super::plan::{Plan, RAMP_TICKS};
-use super::plan_error::PlanError;
+use super::plan::{Plan, PlanError, RAMP_TICKS};
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 use bench_recording::{Recording, RecordingError};
 use bench_rt::arming::{State, Trip};

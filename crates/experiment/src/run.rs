@@ -4,8 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::description::Description;
-use super::motor_start::MotorStart;
+use super::plan::{Description, MotorStart};
 use bench_recording::{Recorder, RecordingError, Shortage, Totals};
 use bench_rt::record::Origin;
 use bench_rt::servo_run::RunOutcome;

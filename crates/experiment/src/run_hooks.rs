@@ -171,7 +171,7 @@ impl RunHooks {
     }
 
     /// Changes the reference or the loop gain of the run in progress. Whoever sends a change must have checked it with
-    /// [`check_tune`](super::check_tune). What is sent between runs is discarded.
+    /// [`check_tune`](crate::check_tune). What is sent between runs is discarded.
     pub fn tuner(&self) -> Sender<Tune> {
         self.tunes.clone()
     }

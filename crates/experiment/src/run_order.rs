@@ -6,11 +6,8 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
-use super::description::Description;
 use super::errors::ExperimentError;
-use super::motor_start::MotorStart;
-use super::plan::{Plan, RunKind};
-use super::plan_error::PlanError;
+use super::plan::{Description, MotorStart, Plan, PlanError, RunKind};
 use super::remembered_motor::MotorHandling;
 use super::run::{RemoteRecording, Run, RunFile, StopCause};
 use bench_base::progress::Progress;

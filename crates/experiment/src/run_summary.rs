@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::description::Description;
 use super::ending::Ending;
+use super::plan::Description;
 use super::run::{Run, StopCause};
 use bench_recording::{Quantiles, RecordingError};
 use bench_rt::arming::Trip;

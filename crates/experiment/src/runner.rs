@@ -8,13 +8,11 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use super::certificate::{OpenRig, require_evidence, require_evidence_or_warn};
-use super::description::Description;
 use super::ending::Ending;
 use super::errors::{ExperimentError, MotorError, RunError};
 use super::live_rig::LiveRig;
-use super::loop_check::{Stage, closed_loop_of, require_margins};
 use super::open_bench::{DeviceNames, OpenBench, Opening};
-use super::plan::Plan;
+use super::plan::{Description, Plan, Stage, closed_loop_of, require_margins};
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
 use super::run::Run;
 use super::run_hooks::RunHooks;

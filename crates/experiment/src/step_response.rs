@@ -1,8 +1,7 @@
 //! The response of a closed loop to a step of its reference: predicted by the model, and measured in a recording.
 
 use super::errors::ExperimentError;
-use super::loop_check::closed_loop_of;
-use super::plan::Plan;
+use super::plan::{Plan, closed_loop_of};
 use super::tracking::{TrackingMetrics, tracking_metrics};
 use bench_control::{ClosedLoop, StepMetrics, step_metrics};
 use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand};

@@ -6,7 +6,7 @@ use super::condition::{Checked, Subject};
 use super::error::CertificateError;
 use super::file::{Certificate, CertifiedLoad, Digests, sha256};
 use super::signs::{SignAgreement, SignCheck};
-use crate::plan_error::PlanError;
+use crate::plan::PlanError;
 use bench_base::decimal::Decimal;
 use bench_config::Config;
 use bench_control::ControllerText;

@@ -8,8 +8,7 @@ use super::file::{
 };
 use crate::analysis::Analysis;
 use crate::ending::Ending;
-use crate::plan::{CALIBRATION, KIND, RunKind};
-use crate::plan_error::PlanError;
+use crate::plan::{CALIBRATION, KIND, PlanError, RunKind};
 use bench_config::Config;
 use bench_control::ControllerText;
 use bench_identify::Frf;

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::plan_error::PlanError;
+use crate::plan::PlanError;
 use bench_recording::{MIN_FREE_BYTES, RecordingError};
 
 /// A run that was refused, or that failed.

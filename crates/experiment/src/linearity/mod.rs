@@ -2,11 +2,11 @@
 
 mod mode_shifts;
 
-use super::plan::Plan;
 use super::prediction::predicted_extremes;
 use super::run::Run;
 use super::runner::Runner;
 use crate::errors::ExperimentError;
+use crate::plan::Plan;
 use bench_config::{Config, validate};
 use bench_excitation::Extremes;
 use bench_identify::modal::FittedMode;

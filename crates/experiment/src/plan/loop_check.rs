@@ -94,7 +94,7 @@ pub fn closed_loop(config: &Config) -> Result<ClosedLoop, PlanError> {
 }
 
 /// The loop of a controller around the model of the configured plant.
-pub(super) fn closed_loop_of(
+pub(crate) fn closed_loop_of(
     controller: &ControllerText,
     config: &Config,
 ) -> Result<ClosedLoop, PlanError> {

@@ -1,6 +1,6 @@
 //! Why a run cannot be planned.
 
-use super::certificate::CertificateError;
+use crate::certificate::CertificateError;
 use bench_config::ConfigError;
 use bench_control::{ControllerError, MinimumTimeError};
 use bench_excitation::command::CommandFilterError;

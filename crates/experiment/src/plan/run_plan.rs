@@ -6,15 +6,15 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{CertificateText, OverrideReason};
 use super::command_plan::{self, CommandPlan, CommandSummary};
 use super::description::Description;
 use super::loop_check::closed_loop_of;
 use super::motor_start::MotorStart;
 use super::plan_error::PlanError;
 use super::reference_check::{self, PlannedReference};
-use super::stage_check::RestAfterCheck;
 use super::swept_reference;
+use crate::certificate::{CertificateText, OverrideReason};
+use crate::stage_check::RestAfterCheck;
 use bench_config::{CampaignSettings, Config, PlantSettings, whole};
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;
@@ -27,7 +27,7 @@ use bench_rt::program::{Control, Excite, Program};
 /// Name of the attachment with the controller.
 const CONTROLLER: &str = "controller.toml";
 /// Name of the attachment with the calibration in use.
-pub(super) const CALIBRATION: &str = "calibration.toml";
+pub(crate) const CALIBRATION: &str = "calibration.toml";
 /// Name of the attachment with the points of the reference.
 const REFERENCE: &str = "reference.csv";
 /// Name of the attachment with the filters of the command.
@@ -39,17 +39,17 @@ const CERTIFICATE_FRF: &str = "certificate_frf.csv";
 /// Name of the attachment with the settings of a stage check.
 const STAGE_CHECK: &str = "stage_check.toml";
 /// Metadata key of [`Plan::override_reason`].
-pub(super) const OVERRIDE: &str = "override";
+pub(crate) const OVERRIDE: &str = "override";
 /// Metadata key of the kind of run.
-pub(super) const KIND: &str = "run";
+pub(crate) const KIND: &str = "run";
 /// Metadata key of [`Plan::ramp_ticks`]. Recordings of older versions do not have it: the current ended in one step.
-pub(super) const RAMP_TICKS: &str = "ramp_ticks";
+pub(crate) const RAMP_TICKS: &str = "ramp_ticks";
 /// The longest ramp to zero current that is chosen from the model, in seconds.
 const LONGEST_RAMP_S: f64 = 2.0;
 /// Metadata key of the thermal state of the motor at the start, in A^2.
-pub(super) const MOTOR_THERMAL: &str = "motor_thermal_a2";
+pub(crate) const MOTOR_THERMAL: &str = "motor_thermal_a2";
 /// Metadata key of how that state was known.
-pub(super) const MOTOR_KNOWN_FROM: &str = "motor_known_from";
+pub(crate) const MOTOR_KNOWN_FROM: &str = "motor_known_from";
 
 /// The kind of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -189,7 +189,7 @@ impl Plan {
     }
 
     /// The check of the stage before this plan, with the same rig, calibration and evidence.
-    pub(super) fn stage_check(&self, settings: StageCheckSettings) -> Plan {
+    pub(crate) fn stage_check(&self, settings: StageCheckSettings) -> Plan {
         Plan {
             description: self.description.clone(),
             calibration: self.calibration.clone(),
@@ -238,7 +238,7 @@ impl Plan {
     }
 
     /// A plan of another process, with the texts of its files.
-    pub(super) fn with_texts(
+    pub(crate) fn with_texts(
         kind: RunKind,
         config: Config,
         controller: Option<ControllerText>,
@@ -286,7 +286,7 @@ impl Plan {
     }
 
     /// Text of the file of the reference, if it has one.
-    pub(super) fn reference_file(&self) -> Option<&str> {
+    pub(crate) fn reference_file(&self) -> Option<&str> {
         self.reference.as_deref()
     }
 

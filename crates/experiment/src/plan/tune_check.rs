@@ -2,9 +2,9 @@
 //! model. It is checked before the request is sent to the loop.
 
 use super::loop_check::{MarginError, Stage, closed_loop_of, require_margins};
-use super::plan::Plan;
 use super::plan_error::PlanError;
 use super::reference_check;
+use super::run_plan::Plan;
 use super::swept_reference::closed_loop;
 use bench_control::{ClosedLoop, ControllerText, TunedDesign};
 use bench_rt::tuning::Factors;

@@ -169,7 +169,7 @@ impl Description {
     }
 
     /// The entries that exist, for the metadata of a recording.
-    pub(super) fn metadata(&self) -> BTreeMap<String, String> {
+    pub(crate) fn metadata(&self) -> BTreeMap<String, String> {
         let invocation = self.invocation.as_ref();
         let pairs = [
             (NAME, self.name.as_ref()),

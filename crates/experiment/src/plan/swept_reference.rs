@@ -10,7 +10,7 @@ use bench_rig::simulated;
 /// The configuration with the amplitudes of a swept reference, and the predicted extremes of the run, both by the model of the
 /// whole rig. Another reference has no extremes, and its configuration is returned unchanged. Refuses a run that would trip
 /// an interlock.
-pub(super) fn planned(
+pub(crate) fn planned(
     mut config: Config,
     controller: &ControllerText,
 ) -> Result<(Config, Option<Extremes>), PlanError> {
@@ -30,7 +30,7 @@ pub(super) fn planned(
 }
 
 /// The loop with the model of the whole rig.
-pub(super) fn closed_loop(
+pub(crate) fn closed_loop(
     config: &Config,
     controller: &ControllerText,
 ) -> Result<ClosedLoop, PlanError> {

@@ -1,8 +1,8 @@
 //! The residual monitor of a plan: the models of plant and closed loop that the interlocks compare with the measured motion.
 
 use super::loop_check::closed_loop_of;
-use super::plan::{Plan, RunKind};
 use super::plan_error::PlanError;
+use super::run_plan::{Plan, RunKind};
 use bench_control::ControllerText;
 use bench_plant::{LoopPlant, ModalModel};
 use bench_rt::residual::{LoopPrediction, ResidualBound, Residuals};
