@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use super::analysis::Ending;
 use super::closed_signals::ClosedSignals;
-use super::ending::Ending;
 use super::error_spectrum::{ErrorSpectrum, SpectrumModel, error_spectrum};
 use super::errors::ExperimentError;
 use super::overview::{Overview, overview};

@@ -12,38 +12,30 @@
 
 mod amplitude_plan;
 mod analysis;
-mod analysis_error;
 mod basic_results;
 pub mod calibration;
 pub mod campaign;
 pub mod certificate;
-mod closed_loop;
 mod closed_signals;
 mod connections;
 mod control_run;
-mod ending;
 mod error_spectrum;
 mod errors;
 mod excitation_plan;
 mod file_name;
 pub mod linearity;
 mod live_rig;
-mod measured_frf;
 mod measured_margins;
 mod mode_pairs;
-mod model_response;
 mod motor_forecast;
 mod named_files;
 mod open_bench;
 mod overview;
 mod plan;
 mod prediction;
-mod read_run;
 mod recorded_rig;
 mod remembered_motor;
 mod replay;
-mod response_estimate;
-mod response_points;
 mod run;
 pub mod run_comparison;
 mod run_figures;
@@ -53,9 +45,7 @@ mod run_recording;
 mod run_summary;
 mod run_supervisor;
 mod runner;
-mod segments;
 pub mod sequential;
-mod signal_builder;
 mod signals;
 mod sine_response;
 pub mod stage_check;
@@ -65,21 +55,19 @@ pub mod tuning;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 pub use analysis::{
-    Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_opened, analyse_with_progress,
+    Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError, ClosedResponses,
+    Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
+    analyse_with_progress, open_with_signals, recorded_frf,
 };
-pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use basic_results::BasicResults;
 pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
-pub use ending::Ending;
 pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,
 };
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
 pub use live_rig::{LiveRig, run};
-pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
-pub use model_response::ModelResponse;
 pub use motor_forecast::{MotorForecast, MotorSummary};
 pub use named_files::{check_calibration, check_named_files};
 pub use open_bench::{DeviceNames, OpenBench, Opening};
@@ -90,10 +78,8 @@ pub use plan::{
     operator_name, require_margins, residuals, run_name, run_note,
 };
 pub use prediction::{extremes, predicted_extremes, rig_model};
-pub use read_run::{ReadSignals, open_with_signals};
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
-pub use response_estimate::ClosedResponses;
 pub use run::{RemoteRecording, Run, StopCause};
 pub use run_figures::{RunFigures, run_figures};
 pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks, TripCount};

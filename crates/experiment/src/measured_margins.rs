@@ -5,8 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::measured_frf::{FrfError, MeasuredFrf, check_frf};
-use super::response_points::{points, roll_off, variance};
+use super::analysis::{FrfError, MeasuredFrf, check_frf, points, roll_off, variance};
 use bench_base::units::rad_s;
 use bench_config::Config;
 use bench_control::ClosedLoop;

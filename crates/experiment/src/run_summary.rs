@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::ending::Ending;
+use super::analysis::Ending;
 use super::plan::Description;
 use super::run::{Run, StopCause};
 use bench_recording::{Quantiles, RecordingError};

@@ -7,8 +7,8 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
+use super::analysis::Ending;
 use super::certificate::{OpenRig, require_evidence, require_evidence_or_warn};
-use super::ending::Ending;
 use super::errors::{ExperimentError, MotorError, RunError};
 use super::live_rig::LiveRig;
 use super::open_bench::{DeviceNames, OpenBench, Opening};

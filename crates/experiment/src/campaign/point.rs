@@ -3,8 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::load_check::LoadCheck;
-use crate::analysis::{Analysis, analyse};
-use crate::analysis_error::AnalysisError;
+use crate::analysis::{Analysis, AnalysisError, analyse};
 use crate::run::Run;
 use crate::sequential::Sequence;
 use bench_config::Config;

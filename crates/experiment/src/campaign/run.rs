@@ -14,7 +14,7 @@ use super::recommend::Tolerances;
 use super::rest_position::RestPosition;
 use super::store::{OpenedStore, Store};
 use super::visit_order::visit_order;
-use crate::ending::Ending;
+use crate::analysis::Ending;
 use crate::errors::ExperimentError;
 use crate::plan::{Description, Plan};
 use crate::run::Run;

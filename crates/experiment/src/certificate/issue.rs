@@ -6,8 +6,7 @@ use super::file::{
     Certificate, CertifiedDevices, CertifiedLoad, CertifiedLoop, CertifiedMode, CertifiedResponse,
     CertifiedVerdict, Digests, FORMAT, sha256,
 };
-use crate::analysis::Analysis;
-use crate::ending::Ending;
+use crate::analysis::{Analysis, Ending};
 use crate::plan::{CALIBRATION, KIND, PlanError, RunKind};
 use bench_config::Config;
 use bench_control::ControllerText;

@@ -3,9 +3,8 @@
 use super::error_kind::{ErrorKind, ErrorObject, RemoteError, option_in};
 use super::motor_error::MotorError;
 use super::run_error::RunError;
-use crate::analysis_error::AnalysisError;
+use crate::analysis::{AnalysisError, FrfError};
 use crate::certificate::CertificateDefects;
-use crate::measured_frf::FrfError;
 use crate::plan::{MarginError, PlanError};
 use crate::stage_check::StageCheckError;
 use bench_config::ConfigError;

@@ -2,10 +2,10 @@
 
 use serde::Serialize;
 
-use crate::analysis::{Analysis, AnalysisProgress, analyse_with_progress, cautions};
-use crate::analysis_error::AnalysisError;
+use crate::analysis::{
+    Analysis, AnalysisError, AnalysisProgress, Ending, analyse_with_progress, cautions,
+};
 use crate::control_run::{ControlRun, control_run};
-use crate::ending::Ending;
 use crate::errors::ExperimentError;
 use crate::plan::{Description, Plan, RunKind};
 use bench_config::Config;

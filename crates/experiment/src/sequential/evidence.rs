@@ -3,10 +3,10 @@
 use core::ops::ControlFlow;
 use std::path::Path;
 
-use crate::analysis::{Analysis, AnalysisPhase, ModalStep, cautions, estimated, run_signals_of};
-use crate::analysis_error::AnalysisError;
-use crate::read_run::open_with_signals;
-use crate::response_estimate::ResponseEstimate;
+use crate::analysis::{
+    Analysis, AnalysisError, AnalysisPhase, ModalStep, ResponseEstimate, cautions, estimated,
+    open_with_signals, run_signals_of,
+};
 use bench_config::Config;
 use bench_identify::verdict::Certainty;
 use bench_identify::{Frf, FrfDatum, best_of};

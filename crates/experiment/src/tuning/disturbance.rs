@@ -7,8 +7,8 @@
 //! S_ee is the spectrum of the recorded error (reference minus reading), L the loop by the model of the recording, S_nn that of the
 //! probe's noise. Where the noise is larger than the disturbance, S_dd is 0.
 
+use crate::analysis::Ending;
 use crate::closed_signals::ClosedSignals;
-use crate::ending::Ending;
 use crate::error_spectrum::error_spectrum;
 use crate::errors::ExperimentError;
 use crate::plan::{Plan, PlanError, closed_loop_of};

@@ -1,7 +1,7 @@
 //! Why measured responses cannot be used for a design.
 
 use super::disturbance::DisturbanceError;
-use crate::measured_frf::FrfError;
+use crate::analysis::FrfError;
 use bench_control::ControllerError;
 use bench_identify::modal::FitError;
 use bench_plant::PlantError;

@@ -4,9 +4,8 @@ use serde::Serialize;
 
 use super::error::TuneSourceError;
 use super::identified::{IdentifiedFrf, ModeRole};
-use crate::measured_frf::FrfError;
+use crate::analysis::{FrfError, points};
 use crate::measured_margins::{MeasuredLoopMargins, margins_around};
-use crate::response_points::points;
 use bench_base::units::hz;
 use bench_config::Config;
 use bench_control::measured::{MeasuredLoop, OutsideBand, Stability};

@@ -5,8 +5,7 @@ use std::path::Path;
 use sha2::{Digest, Sha256};
 
 use super::error::TuneSourceError;
-use crate::measured_frf::MeasuredFrf;
-use crate::response_points::variance;
+use crate::analysis::{MeasuredFrf, variance};
 use bench_base::numeric::to_four_decimals;
 use bench_config::{Config, PlantSettings};
 use bench_identify::{Frf, FrfDatum};

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::analysis_error::{AnalysisError, ClosedLoopError};
-use super::plan::{Plan, PlanError, closed_loop_of};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::response_points::margins_of_loop;
+use crate::plan::{Plan, PlanError, closed_loop_of};
 use bench_config::{Config, ReferenceSettings};
 use bench_control::ClosedLoop;
 use bench_identify::joint::{self, JointEstimate, LoopSignals};

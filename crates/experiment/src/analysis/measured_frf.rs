@@ -7,10 +7,10 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use super::analysis::{cautions, measured_data};
 use super::analysis_error::AnalysisError;
-use super::plan::{Plan, PlanError, RunKind};
 use super::read_run::{ReadSignals, open_with_signals};
+use super::recorded_excitation::{cautions, measured_data};
+use crate::plan::{Plan, PlanError, RunKind};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_control::ClosedLoop;
@@ -151,7 +151,7 @@ impl MeasuredFrf {
     }
 
     /// As [`MeasuredFrf::read`], and of a recording the data for a fit.
-    pub(super) fn read_with_data(
+    pub(crate) fn read_with_data(
         path: &Path,
     ) -> Result<(MeasuredFrf, Option<Vec<FrfDatum>>), FrfError> {
         if path.extension() == Some(OsStr::new("mcap")) {
@@ -202,7 +202,7 @@ impl MeasuredFrf {
     }
 }
 
-/// The response of a recorded run with this plan, from command (A) to reading (m): that of [`analyse`](super::analyse), without the
+/// The response of a recorded run with this plan, from command (A) to reading (m): that of [`analyse`](crate::analyse), without the
 /// fit of the modes.
 ///
 /// # Errors
@@ -229,7 +229,7 @@ fn recorded_data(
 }
 
 /// Refuses an FRF that was not measured through the signal path of `config`.
-pub(super) fn check_frf(
+pub(crate) fn check_frf(
     measured: &MeasuredFrf,
     model: &ClosedLoop,
     config: &Config,
@@ -244,7 +244,7 @@ pub(super) fn check_frf(
 }
 
 /// Refuses an FRF beyond half the loop rate, and a recording with another signal path than that of `config`.
-pub(super) fn check_rate(measured: &MeasuredFrf, config: &Config) -> Result<(), FrfError> {
+pub(crate) fn check_rate(measured: &MeasuredFrf, config: &Config) -> Result<(), FrfError> {
     let (_, last_hz) = measured.band_hz();
     let rate_hz = config.servo.rate_hz;
     let recorded = measured.recorded.as_deref();
@@ -312,7 +312,7 @@ fn check_delay(frf: &Frf, model: &ClosedLoop, plant: &LoopPlant) -> Result<(), F
 }
 
 /// An excess delay that is minus the delay of the model shows that the delay was removed from the phases.
-pub(super) fn judge_excess(excess: Estimate, plant: &LoopPlant) -> Result<(), FrfError> {
+pub(crate) fn judge_excess(excess: Estimate, plant: &LoopPlant) -> Result<(), FrfError> {
     let (delay_s, period_s) = (plant.delay_s(), plant.period_s());
     let within = |limit_s: f64, difference_s: f64| {
         difference_s.abs() <= limit_s + CERTAIN_SIGMAS * excess.sigma

@@ -25,9 +25,9 @@ pub struct ClosedResponses {
 }
 
 /// A response: for display, and as data for the fit.
-pub(super) struct ResponseEstimate {
-    pub(super) frf: Frf,
-    pub(super) frf_data: Vec<FrfDatum>,
-    pub(super) closed: Option<ClosedResponses>,
-    pub(super) linearity: Option<Linearity>,
+pub(crate) struct ResponseEstimate {
+    pub(crate) frf: Frf,
+    pub(crate) frf_data: Vec<FrfDatum>,
+    pub(crate) closed: Option<ClosedResponses>,
+    pub(crate) linearity: Option<Linearity>,
 }

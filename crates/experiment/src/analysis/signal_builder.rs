@@ -19,11 +19,11 @@ const SAME_TIME_RATIO: f64 = 1e-3;
 const MAX_AGE_S: f64 = 10.0;
 
 /// The signals of a run at regular times.
-pub(super) struct RunSignals {
+pub(crate) struct RunSignals {
     /// Reference, command and position.
     pub(super) loop_signals: LoopSignals,
     /// Number of interpolated ticks.
-    pub(super) filled_ticks: u64,
+    pub(crate) filled_ticks: u64,
 }
 
 /// Ticks that are missing between two records.

@@ -19,7 +19,7 @@ pub(super) fn margins_of_loop(loop_gain: &Frf) -> Result<MeasuredMargins, Measur
 
 /// The points of a measured plant as the loop sees it. The FRF refers to readings of the mean age; the loop uses the newest reading
 /// of a probe with its own clock, whose age varies.
-pub(super) fn points(frf: &Frf, path: &SignalPath) -> Vec<ResponsePoint> {
+pub(crate) fn points(frf: &Frf, path: &SignalPath) -> Vec<ResponsePoint> {
     let points = (0..frf.len()).map(|k| point(frf, k));
     points
         .map(|point| {
@@ -34,7 +34,7 @@ pub(super) fn points(frf: &Frf, path: &SignalPath) -> Vec<ResponsePoint> {
 }
 
 /// The mean of exp(-j w delay) over the delays of a path, over that of the mean delay.
-pub(super) fn roll_off(path: &SignalPath, omega_rad_s: f64) -> Complex<f64> {
+pub(crate) fn roll_off(path: &SignalPath, omega_rad_s: f64) -> Complex<f64> {
     let count = path.delays_s.len() as f64;
     let mean_s = path.delays_s.iter().sum::<f64>() / count;
     let delays = path.delays_s.iter();
@@ -54,6 +54,6 @@ fn point(frf: &Frf, k: usize) -> ResponsePoint {
 }
 
 /// E|error|^2: twice the variance of the magnitude.
-pub(super) fn variance(frf: &Frf, k: usize) -> f64 {
+pub(crate) fn variance(frf: &Frf, k: usize) -> f64 {
     2.0 * frf.magnitude_sigma[k] * frf.magnitude_sigma[k]
 }

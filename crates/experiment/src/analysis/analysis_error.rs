@@ -1,6 +1,6 @@
 //! Why a recording cannot be analysed.
 
-use super::plan::PlanError;
+use crate::plan::PlanError;
 use bench_control::ControllerError;
 use bench_control::measured::MeasuredLoopError;
 use bench_identify::{IdentificationError, IdentifyError};

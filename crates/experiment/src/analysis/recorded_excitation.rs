@@ -6,14 +6,14 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::analysis_error::AnalysisError;
-use super::certificate::SignCheck;
-use super::closed_loop;
+use super::closed_responses;
 use super::ending::Ending;
 use super::model_response::ModelResponse;
 use super::read_run::{ReadSignals, is_closed_loop, is_of_run};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
 use super::segments::{Segments, segments};
 use super::signal_builder::{RunSignals, SignalBuilder};
+use crate::certificate::SignCheck;
 use bench_config::Config;
 use bench_identify::delay::excess_delay;
 use bench_identify::linearity::Linearity;
@@ -107,7 +107,7 @@ pub fn analyse_with_progress(
     analyse_signals(recording, signals, config, progress)
 }
 
-/// As [`analyse_with_progress`], with the signals of [`open_with_signals`](super::open_with_signals).
+/// As [`analyse_with_progress`], with the signals of [`open_with_signals`](crate::open_with_signals).
 ///
 /// # Errors
 /// Those of [`analyse_with_progress`].
@@ -122,7 +122,7 @@ pub fn analyse_opened(
 }
 
 /// The signals as read with the recording, or else by reading it again.
-pub(super) fn run_signals_of(
+pub(crate) fn run_signals_of(
     recording: &Recording,
     signals: ReadSignals,
     config: &Config,
@@ -172,13 +172,13 @@ pub(super) fn measured_data(
 }
 
 /// Defects of a run that affect its results.
-pub(super) fn cautions(recording: &Recording) -> Vec<String> {
+pub(crate) fn cautions(recording: &Recording) -> Vec<String> {
     let cautions = [Ending::of(recording).caution(), loss_caution(recording)];
     cautions.into_iter().flatten().collect()
 }
 
 /// The responses of a recording.
-pub(super) fn estimated(
+pub(crate) fn estimated(
     recording: &Recording,
     signals: RunSignals,
     config: &Config,
@@ -188,7 +188,7 @@ pub(super) fn estimated(
     report(progress, AnalysisPhase::Response, 0.0)?;
     let band_hz = config.chirp.band_hz();
     if is_closed_loop(recording.metadata()) {
-        closed_loop::estimate_loop(&loop_signals, band_hz, recording, config)
+        closed_responses::estimate_loop(&loop_signals, band_hz, recording, config)
     } else {
         open_loop(loop_signals.signals, band_hz, config)
     }
@@ -234,16 +234,16 @@ fn open_loop(
 }
 
 /// The step of an analysis after the response: modes, comparison with the model, verdict.
-pub(super) struct ModalStep<'a> {
+pub(crate) struct ModalStep<'a> {
     /// The configuration of the run.
-    pub(super) config: &'a Config,
+    pub(crate) config: &'a Config,
     /// How certain signs and sides must be.
-    pub(super) certainty: Certainty,
+    pub(crate) certainty: Certainty,
 }
 
 impl ModalStep<'_> {
     /// Fits the modes of a response and compares it with the model.
-    pub(super) fn of(
+    pub(crate) fn of(
         &self,
         estimate: ResponseEstimate,
         filled_ticks: u64,
@@ -303,7 +303,7 @@ impl Analysis {
 }
 
 /// The scope of a verdict above the highest mode of a model, whose visible modes must all be found.
-pub(super) fn scope_of_model(modal: &ModalModel, certainty: Certainty) -> VerdictScope {
+pub(crate) fn scope_of_model(modal: &ModalModel, certainty: Certainty) -> VerdictScope {
     let up_to_rad_s = LAST_MODE * highest_mode_rad_s(modal);
     VerdictScope {
         up_to_rad_s,
@@ -324,7 +324,7 @@ fn visible_modes(modal: &ModalModel, up_to_rad_s: f64) -> usize {
 ///
 /// # Errors
 /// When the recording cannot be read, or lacks too many ticks.
-pub(super) fn run_signals(recording: &Recording, rate_hz: f64) -> Result<Signals, AnalysisError> {
+pub(crate) fn run_signals(recording: &Recording, rate_hz: f64) -> Result<Signals, AnalysisError> {
     let mut no_progress = |_, _| ControlFlow::Continue(());
     let read = read_signals(recording, rate_hz, false, &mut no_progress)?;
     Ok(read.loop_signals.signals)

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::analysis_error::AnalysisError;
-use super::plan::{KIND, RunKind};
 use super::signal_builder::{RunSignals, SignalBuilder};
+use crate::plan::{KIND, RunKind};
 use bench_config::whole;
 use bench_recording::{Preceding, Recording, RecordingError};
 use bench_rt::arming::State;

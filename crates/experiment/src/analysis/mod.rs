@@ -1,0 +1,33 @@
+//! What a recording shows of the stage: its frequency response, modes and verdict.
+//!
+//! A recording is read into signals (`read_run`, `signal_builder`), cut into parts (`segments`), and its responses are estimated
+//! (`response_estimate`, `closed_responses`); `recorded_excitation` does all of this and fits the modes. `measured_frf` reads a
+//! response from a file, for a loop around a measured plant (`response_points`).
+
+mod analysis_error;
+mod closed_responses;
+mod ending;
+mod measured_frf;
+mod model_response;
+mod read_run;
+mod recorded_excitation;
+mod response_estimate;
+mod response_points;
+mod segments;
+mod signal_builder;
+
+pub use analysis_error::{AnalysisError, ClosedLoopError};
+pub use ending::Ending;
+pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
+pub(crate) use measured_frf::{check_frf, check_rate, judge_excess};
+pub use model_response::ModelResponse;
+pub use read_run::{ReadSignals, open_with_signals};
+pub use recorded_excitation::{
+    Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_opened, analyse_with_progress,
+};
+pub(crate) use recorded_excitation::{
+    ModalStep, cautions, estimated, run_signals, run_signals_of, scope_of_model,
+};
+pub use response_estimate::ClosedResponses;
+pub(crate) use response_estimate::ResponseEstimate;
+pub(crate) use response_points::{points, roll_off, variance};
