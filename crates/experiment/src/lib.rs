@@ -10,7 +10,6 @@
 
 #![deny(unsafe_code)]
 
-mod amplitude_plan;
 mod analysis;
 mod basic_results;
 pub mod calibration;
@@ -21,18 +20,16 @@ mod connections;
 mod control_run;
 mod error_spectrum;
 mod errors;
-mod excitation_plan;
 mod file_name;
+mod forecast;
 pub mod linearity;
 mod live_rig;
 mod measured_margins;
 mod mode_pairs;
-mod motor_forecast;
 mod named_files;
 mod open_bench;
 mod overview;
 mod plan;
-mod prediction;
 mod recorded_rig;
 mod remembered_motor;
 mod replay;
@@ -53,7 +50,6 @@ mod step_response;
 mod tracking;
 pub mod tuning;
 
-pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
 pub use analysis::{
     Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError, ClosedResponses,
     Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
@@ -65,10 +61,12 @@ pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,
 };
-pub use excitation_plan::{ExcitationPlan, PlanLimits};
+pub use forecast::{
+    AmplitudePlanError, ExcitationPlan, MotorForecast, MotorSummary, PlanLimits, ResponseSource,
+    default_amplitude, extremes, predicted_extremes, rig_model, shape_amplitude,
+};
 pub use live_rig::{LiveRig, run};
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
-pub use motor_forecast::{MotorForecast, MotorSummary};
 pub use named_files::{check_calibration, check_named_files};
 pub use open_bench::{DeviceNames, OpenBench, Opening};
 pub use overview::{Extent, Overview, overview};
@@ -77,7 +75,6 @@ pub use plan::{
     PlanError, RatedController, RunKind, ShapedMode, Stage, TuneRefusal, check_tune, closed_loop,
     operator_name, require_margins, residuals, run_name, run_note,
 };
-pub use prediction::{extremes, predicted_extremes, rig_model};
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use run::{RemoteRecording, Run, StopCause};

@@ -6,8 +6,8 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use super::errors::{ExperimentError, MotorError, RunError};
+use super::forecast::{MotorForecast, RESERVE, duration_text, predict};
 use super::live_rig::TAIL_S;
-use super::motor_forecast::{MotorForecast, RESERVE, duration_text, predict};
 use super::plan::{MotorStart, Plan};
 use super::run::Run;
 use super::signals::stop_on_signal;

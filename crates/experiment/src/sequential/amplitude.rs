@@ -2,9 +2,8 @@
 //! (`shape.current_ratio`).
 
 use super::shot::Shot;
-use crate::amplitude_plan::{limit_travel, shape_travel_m};
 use crate::errors::ExperimentError;
-use crate::prediction::extremes;
+use crate::forecast::{extremes, limit_travel, shape_travel_m};
 use bench_base::units::hz;
 use bench_config::Config;
 use bench_excitation::{AmplitudePoint, CurrentLimit, shaped_amplitude};

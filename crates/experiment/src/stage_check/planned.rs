@@ -5,8 +5,8 @@ use super::error::StageCheckError;
 use super::shot::Shot;
 use crate::analysis::run_signals;
 use crate::errors::ExperimentError;
+use crate::forecast::extremes;
 use crate::plan::{Plan, PlanError, closed_loop_of};
-use crate::prediction::extremes;
 use bench_excitation::StageCheckSignal;
 use bench_recording::Recording;
 

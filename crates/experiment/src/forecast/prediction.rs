@@ -1,6 +1,6 @@
 //! The extremes of an excitation by the model of the whole rig.
 
-use super::errors::ExperimentError;
+use crate::errors::ExperimentError;
 use bench_config::Config;
 use bench_excitation::{Excitation, Extremes};
 use bench_plant::DiscretePlant;

@@ -5,8 +5,8 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::errors::ExperimentError;
 use super::prediction::extremes;
+use crate::errors::ExperimentError;
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_excitation::{CurrentLimit, shaped_amplitude};
@@ -117,13 +117,13 @@ pub fn shape_amplitude(
 }
 
 /// The permitted travel of a shaped excitation in metres: `shape.travel_m`, or a third of the soft limit.
-pub(super) fn shape_travel_m(config: &Config) -> f64 {
+pub(crate) fn shape_travel_m(config: &Config) -> f64 {
     let default_m = config.interlock.soft_limit_m / 3.0;
     config.shape.travel_m.unwrap_or(default_m)
 }
 
 /// Lowers all amplitudes of an excitation until it moves the stage by at most `travel_m`, by the model.
-pub(super) fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), ExperimentError> {
+pub(crate) fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), ExperimentError> {
     let excitation = config.chosen_excitation().build();
     let ratio = (travel_m / extremes(&excitation, config)?.travel_m).min(1.0);
     for point in &mut config.chirp.amplitude {

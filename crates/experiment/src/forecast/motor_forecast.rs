@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::errors::{ExperimentError, MotorError};
-use super::plan::{MotorStart, Plan};
+use crate::errors::{ExperimentError, MotorError};
+use crate::plan::{MotorStart, Plan};
 use bench_plant::LoopPlant;
 use bench_rig::motor::{
     HeatPrediction, Moment, MotorMemory, MotorOrigin, MotorState, ThermalModel,
@@ -14,7 +14,7 @@ use bench_rt::tuning::Factors;
 
 /// A waiting run starts when the state is this ratio of the largest allowed one: the currents of a run differ slightly from the
 /// predicted ones.
-pub(super) const RESERVE: f64 = 0.98;
+pub(crate) const RESERVE: f64 = 0.98;
 /// Thermal state of a motor that counts as cold, as a ratio of the limit.
 const COLD: f64 = 0.01;
 
@@ -132,7 +132,7 @@ impl MotorForecast {
     }
 
     /// The state with which the run starts now.
-    pub(super) fn start(&self) -> MotorStart {
+    pub(crate) fn start(&self) -> MotorStart {
         MotorStart {
             thermal_a2: self.state.thermal_a2,
             known_from: known_from(&self.state),
@@ -166,7 +166,7 @@ fn known_from(state: &MotorState) -> String {
 }
 
 /// `46 s`, `2 min 10 s`, `1 h 5 min`: rounded up.
-pub(super) fn duration_text(duration_s: f64) -> String {
+pub(crate) fn duration_text(duration_s: f64) -> String {
     let seconds = duration_s.ceil() as u64;
     match seconds {
         0..120 => format!("{seconds} s"),
@@ -177,7 +177,7 @@ pub(super) fn duration_text(duration_s: f64) -> String {
 
 /// Predicts the heat of a run by its program and the model of the whole rig. With a calibration the larger of current and
 /// set-point counts, as in the interlocks.
-pub(super) fn predict(plan: &Plan, start_a2: f64) -> Result<HeatPrediction, ExperimentError> {
+pub(crate) fn predict(plan: &Plan, start_a2: f64) -> Result<HeatPrediction, ExperimentError> {
     let config = &plan.config;
     let modes = simulated::modes(&config.plant, &config.sim)?;
     let plant = LoopPlant::new(config, &modes);

@@ -1,0 +1,16 @@
+//! What a run will demand of rig and motor, by the model, before it starts.
+//!
+//! First the extremes of an excitation (`prediction`) and the amplitudes that they allow (`amplitude_plan`), then the heat of the motor
+//! (`motor_forecast`) and the summary for the operator (`excitation_plan`).
+
+mod amplitude_plan;
+mod excitation_plan;
+mod motor_forecast;
+mod prediction;
+
+pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
+pub(crate) use amplitude_plan::{limit_travel, shape_travel_m};
+pub use excitation_plan::{ExcitationPlan, PlanLimits};
+pub use motor_forecast::{MotorForecast, MotorSummary};
+pub(crate) use motor_forecast::{RESERVE, duration_text, predict};
+pub use prediction::{extremes, predicted_extremes, rig_model};
