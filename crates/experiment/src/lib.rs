@@ -16,34 +16,26 @@ pub mod calibration;
 pub mod campaign;
 pub mod certificate;
 mod closed_signals;
-mod connections;
 mod control_run;
 mod error_spectrum;
 mod errors;
-mod file_name;
 mod forecast;
 pub mod linearity;
-mod live_rig;
+mod live;
 mod measured_margins;
 mod mode_pairs;
 mod named_files;
-mod open_bench;
 mod overview;
 mod plan;
 mod recorded_rig;
 mod remembered_motor;
 mod replay;
-mod run;
 pub mod run_comparison;
 mod run_figures;
-mod run_hooks;
 mod run_order;
-mod run_recording;
 mod run_summary;
-mod run_supervisor;
 mod runner;
 pub mod sequential;
-mod signals;
 mod sine_response;
 pub mod stage_check;
 mod step_response;
@@ -65,10 +57,13 @@ pub use forecast::{
     AmplitudePlanError, ExcitationPlan, MotorForecast, MotorSummary, PlanLimits, ResponseSource,
     default_amplitude, extremes, predicted_extremes, rig_model, shape_amplitude,
 };
-pub use live_rig::{LiveRig, run};
+pub use live::{
+    DeviceNames, Feed, FeedSender, FeedSource, LiveRig, OpenBench, Opening, RecordingDefect,
+    RemoteRecording, Run, RunHooks, StopCause, StopSignals, TripCount, abandon_on_signal, run,
+    stop_on_signal, survive_file_size_limit,
+};
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
 pub use named_files::{check_calibration, check_named_files};
-pub use open_bench::{DeviceNames, OpenBench, Opening};
 pub use overview::{Extent, Overview, overview};
 pub use plan::{
     CommandSummary, Description, DescriptionError, Invocation, MarginError, MotorStart, Plan,
@@ -77,13 +72,10 @@ pub use plan::{
 };
 pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
-pub use run::{RemoteRecording, Run, StopCause};
 pub use run_figures::{RunFigures, run_figures};
-pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks, TripCount};
 pub use run_order::{RigOwner, RunOrder, RunReport};
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};
 pub use runner::{Runner, Setup, close};
-pub use signals::{StopSignals, abandon_on_signal, stop_on_signal, survive_file_size_limit};
 pub use sine_response::SineResponse;
 pub use step_response::{PredictedStep, StepResponse, predicted_step, step_response};
 pub use tracking::{TrackingMetrics, tracking_metrics};

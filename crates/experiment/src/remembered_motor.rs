@@ -7,10 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::errors::{ExperimentError, MotorError, RunError};
 use super::forecast::{MotorForecast, RESERVE, duration_text, predict};
-use super::live_rig::TAIL_S;
+use super::live::{Run, TAIL_S, stop_on_signal};
 use super::plan::{MotorStart, Plan};
-use super::run::Run;
-use super::signals::stop_on_signal;
 use bench_base::progress::Progress;
 use bench_rig::motor::{Moment, MotorMemory};
 use bench_rt::supervision::StopFlags;

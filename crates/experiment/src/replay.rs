@@ -10,8 +10,7 @@ use bench_hal::Tick;
 use rtrb::Producer;
 use serde::Serialize;
 
-use super::connections::{OutsideEnds, connect};
-use super::live_rig::servo_run;
+use super::live::{OutsideEnds, connect, servo_run};
 use super::plan::{Plan, PlanError, RAMP_TICKS};
 use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 use bench_recording::{Recording, RecordingError};

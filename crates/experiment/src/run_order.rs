@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{CertificateText, OverrideReason};
 use super::errors::ExperimentError;
+use super::live::{RemoteRecording, Run, RunFile, StopCause};
 use super::plan::{Description, MotorStart, Plan, PlanError, RunKind};
 use super::remembered_motor::MotorHandling;
-use super::run::{RemoteRecording, Run, RunFile, StopCause};
 use bench_base::progress::Progress;
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::analysis::Ending;
+use super::live::{Run, StopCause};
 use super::plan::Description;
-use super::run::{Run, StopCause};
 use bench_recording::{Quantiles, RecordingError};
 use bench_rt::arming::Trip;
 use bench_rt::thread::{Pace, Scheduling};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::load_check::LoadCheck;
 use crate::analysis::{Analysis, AnalysisError, analyse};
-use crate::run::Run;
+use crate::live::Run;
 use crate::sequential::Sequence;
 use bench_config::Config;
 use bench_identify::modal::FittedMode;

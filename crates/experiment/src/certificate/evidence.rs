@@ -12,7 +12,7 @@ use super::error::{CertificateDefects, CertificateError};
 use super::file::LoadedCertificate;
 use crate::analysis::{FrfError, points};
 use crate::errors::ExperimentError;
-use crate::open_bench::DeviceNames;
+use crate::live::DeviceNames;
 use crate::plan::{Plan, PlanError, Stage, closed_loop_of};
 use crate::stage_check::RestAfterCheck;
 use bench_base::decimal::Decimal;

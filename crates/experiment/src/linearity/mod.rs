@@ -2,10 +2,10 @@
 
 mod mode_shifts;
 
-use super::run::Run;
 use super::runner::Runner;
 use crate::errors::ExperimentError;
 use crate::forecast::predicted_extremes;
+use crate::live::Run;
 use crate::plan::Plan;
 use bench_config::{Config, validate};
 use bench_excitation::Extremes;

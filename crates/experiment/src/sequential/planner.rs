@@ -10,7 +10,7 @@ use super::shot::Shot;
 use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::analysis::{Analysis, scope_of_model};
 use crate::errors::ExperimentError;
-use crate::run::Run;
+use crate::live::Run;
 use crate::run_summary::RunSummary;
 use bench_config::Config;
 use bench_excitation::AmplitudeCurve;

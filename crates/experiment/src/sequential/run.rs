@@ -7,8 +7,8 @@ use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::analysis::{Analysis, Ending};
 use crate::errors::ExperimentError;
 use crate::forecast::predicted_extremes;
+use crate::live::Run;
 use crate::plan::Plan;
-use crate::run::Run;
 use crate::runner::close;
 use bench_config::{Config, validate};
 

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::SystemTime;
 
-use super::errors::RunError;
 use super::file_name;
-use super::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, OVERRIDE, Plan};
+use crate::errors::RunError;
+use crate::plan::{KIND, MOTOR_KNOWN_FROM, MOTOR_THERMAL, OVERRIDE, Plan};
 use bench_base::timestamp;
 use bench_recording::{
     Header, MIN_FREE_BYTES, Recorder, RecordingError, lacks_space, predicted_bytes,

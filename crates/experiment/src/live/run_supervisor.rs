@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 use std::task::Poll;
 use std::time::Duration;
 
-use super::errors::RunError;
 use super::run::StopCause;
 use super::run_hooks::RunHooks;
-use super::signals::SignalFlags;
+use super::stop_signals::SignalFlags;
+use crate::errors::RunError;
 use bench_config::OnRecordingFailure;
 use bench_recording::Health;
 use bench_rt::live_loop::{LiveLoop, LoopPanicked};

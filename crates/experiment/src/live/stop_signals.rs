@@ -12,7 +12,7 @@ use tokio::runtime::Runtime;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::oneshot::error::RecvError;
 
-use super::errors::RunError;
+use crate::errors::RunError;
 use bench_base::thread_priority::lower;
 use bench_rt::supervision::StopFlags;
 

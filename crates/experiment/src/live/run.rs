@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::plan::{Description, MotorStart};
+use crate::plan::{Description, MotorStart};
 use bench_recording::{Recorder, RecordingError, Shortage, Totals};
 use bench_rt::record::Origin;
 use bench_rt::servo_run::RunOutcome;
@@ -28,11 +28,11 @@ pub struct Run {
     pub unrecorded: Option<StopCause>,
     /// The thermal state of the motor at its start.
     pub motor: MotorStart,
-    pub(super) file: RunFile,
+    pub(crate) file: RunFile,
 }
 
 /// The open recording of a run.
-pub(super) enum RunFile {
+pub(crate) enum RunFile {
     /// Of this process.
     Own(Box<Recorder>),
     /// Of the process that owns the rig.
@@ -127,7 +127,7 @@ impl StopCause {
     }
 
     /// Why the loop ended a run at the request of `origin`. The supervisor knows the reasons of its own requests.
-    pub(super) fn by(origin: Origin) -> Option<StopCause> {
+    pub(crate) fn by(origin: Origin) -> Option<StopCause> {
         match origin {
             Origin::Supervisor => None,
             Origin::Signal => Some(StopCause::Signal),

@@ -3,10 +3,10 @@
 use bench_hal::blocking;
 use bench_hal::serial::StatisticsHandle;
 
-use super::errors::ExperimentError;
 use super::live_rig::LiveRig;
-use super::plan::Stage;
 use super::run_hooks::RunHooks;
+use crate::errors::ExperimentError;
+use crate::plan::Stage;
 use bench_config::Config;
 use bench_rig::devices::{self, Reservation};
 use bench_rt::device_defect::DeviceDefect;
@@ -34,8 +34,8 @@ pub struct DeviceNames {
 
 /// A rig with its loop. Dropping it closes the rig.
 pub struct OpenBench {
-    pub(super) rig: LiveRig,
-    pub(super) names: DeviceNames,
+    pub(crate) rig: LiveRig,
+    pub(crate) names: DeviceNames,
     serial: Option<StatisticsHandle>,
     config: Config,
     opening: Opening,
@@ -80,7 +80,7 @@ impl OpenBench {
 
     /// The simulated stage in place of the devices of a configuration, for tests of what happens on devices.
     #[cfg(test)]
-    pub(super) fn emulated(config: &Config, opening: Opening) -> OpenBench {
+    pub(crate) fn emulated(config: &Config, opening: Opening) -> OpenBench {
         let opened = devices::simulate(config).expect("a simulated stage");
         let hooks = RunHooks::default();
         OpenBench {
@@ -98,7 +98,7 @@ impl OpenBench {
 
     /// Whether it is the rig of `config`, opened in the same way. Excitation, controller, calibration and analysis do not belong to
     /// the rig, and the model of the plant belongs to a simulated one only.
-    pub(super) fn is_of(&self, config: &Config, opening: &Opening) -> bool {
+    pub(crate) fn is_of(&self, config: &Config, opening: &Opening) -> bool {
         let open = &self.config;
         let is_simulated = opening.stage == Stage::Simulated;
         opening.stage == self.opening.stage

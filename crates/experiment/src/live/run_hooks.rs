@@ -55,7 +55,7 @@ impl FeedSender {
     }
 
     /// Sends a feed. Without a receiver nobody watches.
-    pub(super) fn send(&self, source: FeedSource, period_s: f64, messages: Consumer<LoopMessage>) {
+    pub(crate) fn send(&self, source: FeedSource, period_s: f64, messages: Consumer<LoopMessage>) {
         let feed = Feed {
             source,
             period_s,
@@ -83,7 +83,7 @@ impl RecordingDefect {
     }
 
     /// Sets the first cause of a run. Returns whether it is the first one.
-    pub(super) fn set(&self, cause: StopCause) -> bool {
+    pub(crate) fn set(&self, cause: StopCause) -> bool {
         let mut present = self.lock();
         let is_first = present.is_none();
         present.get_or_insert(cause);
@@ -91,7 +91,7 @@ impl RecordingDefect {
     }
 
     /// A run begins.
-    pub(super) fn clear(&self) {
+    pub(crate) fn clear(&self) {
         *self.lock() = None;
     }
 
@@ -111,7 +111,7 @@ impl TripCount {
     }
 
     /// Counts a trip.
-    pub(super) fn add(&self, reason: &'static str) {
+    pub(crate) fn add(&self, reason: &'static str) {
         let mut count = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         *count = (count.0.saturating_add(1), reason);
     }

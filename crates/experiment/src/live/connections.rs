@@ -11,19 +11,19 @@ use bench_rt::request::RequestSender;
 use bench_rt::servo_run::{Connections, Progress};
 
 /// The ends of a loop's [`Connections`] that stay outside the loop.
-pub(super) struct OutsideEnds {
+pub(crate) struct OutsideEnds {
     /// Requests to the loop.
-    pub(super) requests: RequestSender,
+    pub(crate) requests: RequestSender,
     /// The messages of the loop.
-    pub(super) records: Consumer<LoopMessage>,
+    pub(crate) records: Consumer<LoopMessage>,
     /// Programs that ended, to be freed.
-    pub(super) retired: Consumer<Box<dyn Program>>,
+    pub(crate) retired: Consumer<Box<dyn Program>>,
     /// Progress of the run.
-    pub(super) progress: Arc<Progress>,
+    pub(crate) progress: Arc<Progress>,
 }
 
 /// Both ends of new connections, with room for `record_slots` published records.
-pub(super) fn connect(record_slots: usize) -> (Connections, OutsideEnds) {
+pub(crate) fn connect(record_slots: usize) -> (Connections, OutsideEnds) {
     let (published, records) = RingBuffer::new(record_slots + EVENT_SLOTS);
     let (requests, taken) = RequestSender::ring(REQUESTS_PER_TICK);
     let (ended, retired) = RingBuffer::new(REQUESTS_PER_TICK);

@@ -8,12 +8,12 @@ use std::sync::mpsc::Sender;
 use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
-use super::errors::RunError;
-use super::plan::{Plan, PlanError, RAMP_TICKS, residuals};
 use super::run::{Run, RunFile, StopCause};
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
+use crate::errors::RunError;
+use crate::plan::{Plan, PlanError, RAMP_TICKS, residuals};
 use bench_config::{Config, LoopSettings, OnRecordingFailure};
 use bench_recording::{DiskWatch, Recorder, free_bytes};
 use bench_rt::device_defect::DeviceDefect;
@@ -29,7 +29,7 @@ use bench_rt::tuning::Tune;
 /// Slots of the ring to the recorder: 13 s at 5 kHz, in case the disk stalls.
 const RING_SLOTS: usize = 1 << 16;
 /// Seconds that are recorded after the motor was switched off.
-pub(super) const TAIL_S: f64 = 0.1;
+pub(crate) const TAIL_S: f64 = 0.1;
 /// Longest time in seconds during which a run goes on although its ticks are not recorded.
 const MAX_UNRECORDED_S: f64 = 1.0;
 /// Time for which the readings are judged before a device is enabled, unless `loop.healthy_s` is set.
@@ -265,7 +265,7 @@ fn queue_start(requests: &mut RequestSender, program: Box<dyn Program>) {
 }
 
 /// A run of a plan, with its interlocks and the heat of the motor.
-pub(super) fn servo_run(plan: &Plan, connections: Connections) -> Result<ServoRun, PlanError> {
+pub(crate) fn servo_run(plan: &Plan, connections: Connections) -> Result<ServoRun, PlanError> {
     let interlocks = interlocks(&plan.config)
         .with_thermal_state(plan.motor.thermal_a2)
         .with_residuals(residuals(plan)?);
