@@ -14,7 +14,7 @@ use super::run_options::{close, exit};
 use bench_config::{Purpose, warnings};
 use bench_control::{ClosedLoop, Margins, listed_poles};
 use bench_excitation::Extremes;
-use bench_experiment::certificate::{Evidence, require_evidence};
+use bench_experiment::evidence::{Evidence, require_evidence};
 use bench_experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,

@@ -16,7 +16,7 @@ use bench_base::decimal::Decimal;
 use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
-use bench_experiment::certificate::{Agreement, Condition, Evidence};
+use bench_experiment::evidence::{Agreement, Condition, Evidence};
 use bench_experiment::stage_check::RestAfterCheck;
 use bench_experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,

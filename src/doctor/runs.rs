@@ -4,7 +4,7 @@ use super::finding::{Finding, Subject};
 use bench_config::Config;
 use bench_control::Margins;
 use bench_excitation::Excitation;
-use bench_experiment::certificate::require_evidence;
+use bench_experiment::evidence::require_evidence;
 use bench_experiment::{
     ExperimentError, Plan, Stage, closed_loop, predicted_extremes, require_margins,
 };

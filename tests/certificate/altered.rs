@@ -2,9 +2,8 @@
 
 use std::time::{Duration, SystemTime};
 
-use bench_experiment::certificate::{
-    CertificateError, Evidence, OpenRig, require_evidence, sha256,
-};
+use bench_experiment::certificate::{CertificateError, sha256};
+use bench_experiment::evidence::{Evidence, OpenRig, require_evidence};
 use bench_experiment::{DeviceNames, ExperimentError, Plan, Stage};
 use serde_json::{Value, json};
 

@@ -1,7 +1,8 @@
 //! What a completed chirp leaves.
 use std::process::Command;
 
-use bench_experiment::certificate::{ResponseFile, SignAgreement, SignCheck, certify};
+use bench_experiment::certificate::{SignAgreement, SignCheck};
+use bench_experiment::evidence::{ResponseFile, certify};
 use bench_experiment::{Plan, analyse};
 use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, SIGMAS_95};

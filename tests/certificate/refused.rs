@@ -1,8 +1,7 @@
 //! Each defect of a certificate is refused on devices, with its remedy.
 
-use bench_experiment::certificate::{
-    Agreement, CertificateError, OpenRig, Subject, require_evidence, sha256,
-};
+use bench_experiment::certificate::{CertificateError, sha256};
+use bench_experiment::evidence::{Agreement, OpenRig, Subject, require_evidence};
 use bench_experiment::{DeviceNames, ExperimentError, Plan, PlanError, Stage, closed_loop};
 use bench_rig::calibration::Calibration;
 use serde_json::json;

@@ -1,7 +1,8 @@
 //! Loops that the measured response of a certificate does not allow are refused on devices.
 
 use bench_experiment::Plan;
-use bench_experiment::certificate::{CertificateError, Evidence};
+use bench_experiment::certificate::CertificateError;
+use bench_experiment::evidence::Evidence;
 use serde_json::json;
 
 use crate::certificate::altered::{

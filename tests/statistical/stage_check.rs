@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use bench_config::{Config, Purpose, Source, load};
-use bench_experiment::certificate::{CertificateText, ResponseFile, certify};
+use bench_experiment::certificate::CertificateText;
+use bench_experiment::evidence::{ResponseFile, certify};
 use bench_experiment::stage_check::{PlannedStageCheck, StageCheck};
 use bench_experiment::{Plan, Run, analyse};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};

@@ -19,6 +19,7 @@ mod closed_signals;
 mod control_run;
 mod error_spectrum;
 mod errors;
+pub mod evidence;
 mod forecast;
 pub mod linearity;
 mod live;

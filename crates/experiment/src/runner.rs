@@ -8,8 +8,8 @@ use std::time::SystemTime;
 use serde::Serialize;
 
 use super::analysis::Ending;
-use super::certificate::{OpenRig, require_evidence, require_evidence_or_warn};
 use super::errors::{ExperimentError, MotorError, RunError};
+use super::evidence::{OpenRig, require_evidence, require_evidence_or_warn};
 use super::live::{DeviceNames, LiveRig, OpenBench, Opening, Run, RunHooks};
 use super::plan::{Description, Plan, Stage, closed_loop_of, require_margins};
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};

@@ -168,7 +168,7 @@ impl std::error::Error for CertificateDefects {}
 
 impl CertificateDefects {
     /// These defects; `None` if there are none.
-    pub(super) fn of(defects: Vec<CertificateError>) -> Option<CertificateDefects> {
+    pub(crate) fn of(defects: Vec<CertificateError>) -> Option<CertificateDefects> {
         (!defects.is_empty()).then_some(CertificateDefects(defects))
     }
 

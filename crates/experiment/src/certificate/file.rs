@@ -13,7 +13,7 @@ use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, Frf, frf_csv};
 
 /// Version of the format.
-pub(super) const FORMAT: u32 = 1;
+pub(crate) const FORMAT: u32 = 1;
 
 /// What a chirp showed about a rig. The names in JSON must not change.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -257,7 +257,7 @@ impl From<&CertifiedMode> for FittedMode {
 
 impl CertifiedMode {
     /// Whether JSON can hold all numbers.
-    pub(super) fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         let values = [self.frequency_hz, self.damping_ratio, self.residue];
         let sigmas = [
             self.frequency_hz_sigma,

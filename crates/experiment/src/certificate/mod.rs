@@ -1,36 +1,18 @@
-//! Certificates: what a chirp showed about a rig, as the evidence with which a loop closes.
+//! Certificates: what a chirp showed about a rig, as the text that a plan contains.
 //!
-//! ```text
-//!  bench chirp: recording, analysis --certify--> STEM_certificate.json, STEM_frf.csv
-//!                                                        |  CertificateText: both texts
-//!                                                        v
-//!  bench control: Plan --------------------> require_evidence: age, rate, settings, devices, calibration, load, signs,
-//!                                                        |     band, lower 95 % modulus margin by the measured response
-//!                                                        v
-//!                                            a loop on devices closes, or is refused (CertificateError)
-//! ```
-//!
-//! On the simulated stage a defect is a warning. An operator may override a refusal with a typed reason, which is recorded. A loop
-//! that is unstable by the model is never run on devices (see `loop_check`).
+//! A `file` has the load, the digests of the settings and the `signs` of the residues; its defects are an `error`, which an operator
+//! may override with a typed reason (`override_reason`). Certificates are issued and judged in [`evidence`](crate::evidence).
 
-mod band;
-mod check;
-mod condition;
 mod error;
-mod evidence;
 mod file;
-mod issue;
 mod override_reason;
 mod signs;
 
-pub use condition::{Agreement, Condition, Subject};
 pub use error::{CertificateDefects, CertificateError};
-pub(super) use evidence::require_evidence_or_warn;
-pub use evidence::{Evidence, OpenRig, require_evidence};
+pub(crate) use file::FORMAT;
 pub use file::{
     Certificate, CertificateText, CertifiedDevices, CertifiedLoad, CertifiedLoop, CertifiedMode,
     CertifiedResponse, CertifiedVerdict, Digests, LoadedCertificate, sha256,
 };
-pub use issue::{ResponseFile, certify};
 pub use override_reason::{OverrideReason, ReasonError};
 pub use signs::{SIGNS_DIFFER, SignAgreement, SignCheck};

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::file::{
+use crate::analysis::{Analysis, Ending};
+use crate::certificate::{
     Certificate, CertifiedDevices, CertifiedLoad, CertifiedLoop, CertifiedMode, CertifiedResponse,
     CertifiedVerdict, Digests, FORMAT, sha256,
 };
-use crate::analysis::{Analysis, Ending};
 use crate::plan::{CALIBRATION, KIND, PlanError, RunKind};
 use bench_config::Config;
 use bench_control::ControllerText;

@@ -3,9 +3,9 @@
 use std::time::{Duration, SystemTime};
 
 use super::condition::{Checked, Subject};
-use super::error::CertificateError;
-use super::file::{Certificate, CertifiedLoad, Digests, sha256};
-use super::signs::{SignAgreement, SignCheck};
+use crate::certificate::{
+    Certificate, CertificateError, CertifiedLoad, Digests, SignAgreement, SignCheck, sha256,
+};
 use crate::plan::PlanError;
 use bench_base::decimal::Decimal;
 use bench_config::Config;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::error::CertificateError;
+use crate::certificate::CertificateError;
 use bench_control::{ClosedLoop, Margins};
 
 /// The response must reach from this fraction of the lowest crossing of |L| = 1 ...

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::error::CertificateError;
+use crate::certificate::CertificateError;
 
 /// What is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
