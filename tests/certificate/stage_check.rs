@@ -2,9 +2,9 @@
 use bench_config::Config;
 use bench_experiment::certificate::sha256;
 use bench_experiment::stage_check::{
-    PhaseComparison, PlannedStageCheck, StageCheck, StageCheckError, StaticComparison,
+    PhaseComparison, StageCheck, StageCheckError, StaticComparison,
 };
-use bench_experiment::{ExperimentError, Plan};
+use bench_experiment::{ExperimentError, Plan, PlannedStageCheck};
 use bench_hal::Rig;
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;

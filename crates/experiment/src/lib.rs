@@ -25,17 +25,13 @@ pub mod linearity;
 mod live;
 mod measured_margins;
 mod mode_pairs;
-mod named_files;
 mod overview;
 mod plan;
 mod recorded_rig;
-mod remembered_motor;
 mod replay;
+mod run;
 pub mod run_comparison;
 mod run_figures;
-mod run_order;
-mod run_summary;
-mod runner;
 pub mod sequential;
 mod sine_response;
 pub mod stage_check;
@@ -64,19 +60,18 @@ pub use live::{
     stop_on_signal, survive_file_size_limit,
 };
 pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
-pub use named_files::{check_calibration, check_named_files};
 pub use overview::{Extent, Overview, overview};
 pub use plan::{
     CommandSummary, Description, DescriptionError, Invocation, MarginError, MotorStart, Plan,
     PlanError, RatedController, RunKind, ShapedMode, Stage, TuneRefusal, check_tune, closed_loop,
     operator_name, require_margins, residuals, run_name, run_note,
 };
-pub use remembered_motor::MotorHandling;
 pub use replay::{Difference, ReplayError, Replayed, replay};
+pub use run::{
+    MotorHandling, PlannedStageCheck, RigOwner, RunOrder, RunReport, RunSummary, Runner, Setup,
+    TimingSummary, TripSummary, check_calibration, check_named_files, close,
+};
 pub use run_figures::{RunFigures, run_figures};
-pub use run_order::{RigOwner, RunOrder, RunReport};
-pub use run_summary::{RunSummary, TimingSummary, TripSummary};
-pub use runner::{Runner, Setup, close};
 pub use sine_response::SineResponse;
 pub use step_response::{PredictedStep, StepResponse, predicted_step, step_response};
 pub use tracking::{TrackingMetrics, tracking_metrics};

@@ -11,7 +11,7 @@ use crate::errors::ExperimentError;
 use crate::forecast::predicted_extremes;
 use crate::live::Run;
 use crate::plan::Plan;
-use crate::runner::close;
+use crate::run::close;
 use crate::sequential::{SequenceEnd, SequenceLimits, default_max_motion_s, until_decided};
 use bench_base::checkpoint::FileAction;
 use bench_config::Config;

@@ -18,7 +18,7 @@ use crate::analysis::Ending;
 use crate::errors::ExperimentError;
 use crate::live::Run;
 use crate::plan::{Description, Plan};
-use crate::runner::{Runner, Setup, close};
+use crate::run::{Runner, Setup, close};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_recording::Recording;

@@ -2,11 +2,11 @@
 
 mod mode_shifts;
 
-use super::runner::Runner;
 use crate::errors::ExperimentError;
 use crate::forecast::predicted_extremes;
 use crate::live::Run;
 use crate::plan::Plan;
+use crate::run::Runner;
 use bench_config::{Config, validate};
 use bench_excitation::Extremes;
 use bench_identify::modal::FittedMode;

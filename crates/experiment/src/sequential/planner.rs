@@ -11,7 +11,7 @@ use super::summary::{SequenceEnd, SequenceLimits, ShotSummary, motion_s};
 use crate::analysis::{Analysis, scope_of_model};
 use crate::errors::ExperimentError;
 use crate::live::Run;
-use crate::run_summary::RunSummary;
+use crate::run::RunSummary;
 use bench_config::Config;
 use bench_excitation::AmplitudeCurve;
 use bench_identify::modal::MeasurementChain;

@@ -9,7 +9,7 @@ use crate::errors::ExperimentError;
 use crate::forecast::predicted_extremes;
 use crate::live::Run;
 use crate::plan::Plan;
-use crate::runner::close;
+use crate::run::close;
 use bench_config::{Config, validate};
 
 /// The default limit of the motion, in lengths of the first shot.

@@ -13,12 +13,11 @@ mod comparison;
 mod error;
 mod estimate;
 mod figures;
-mod planned;
 mod rest;
 mod shot;
 
 pub use comparison::StageCheck;
 pub use error::StageCheckError;
 pub use figures::{PhaseComparison, StaticComparison};
-pub use planned::PlannedStageCheck;
 pub use rest::RestAfterCheck;
+pub(crate) use shot::Shot;

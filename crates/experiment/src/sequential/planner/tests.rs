@@ -2,7 +2,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::*;
 use crate::plan::Plan;
-use crate::runner::{Runner, Setup};
+use crate::run::{Runner, Setup};
 use bench_config::{Purpose, Source, load};
 use bench_identify::verdict::{DecisiveQuantity, UncertainZero, zeros};
 

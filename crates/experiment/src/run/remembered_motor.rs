@@ -5,10 +5,10 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::errors::{ExperimentError, MotorError, RunError};
-use super::forecast::{MotorForecast, RESERVE, duration_text, predict};
-use super::live::{Run, TAIL_S, stop_on_signal};
-use super::plan::{MotorStart, Plan};
+use crate::errors::{ExperimentError, MotorError, RunError};
+use crate::forecast::{MotorForecast, RESERVE, duration_text, predict};
+use crate::live::{Run, TAIL_S, stop_on_signal};
+use crate::plan::{MotorStart, Plan};
 use bench_base::progress::Progress;
 use bench_rig::motor::{Moment, MotorMemory};
 use bench_rt::supervision::StopFlags;

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{CertificateText, OverrideReason};
-use super::errors::ExperimentError;
-use super::live::{RemoteRecording, Run, RunFile, StopCause};
-use super::plan::{Description, MotorStart, Plan, PlanError, RunKind};
 use super::remembered_motor::MotorHandling;
+use crate::certificate::{CertificateText, OverrideReason};
+use crate::errors::ExperimentError;
+use crate::live::{RemoteRecording, Run, RunFile, StopCause};
+use crate::plan::{Description, MotorStart, Plan, PlanError, RunKind};
 use bench_base::progress::Progress;
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;

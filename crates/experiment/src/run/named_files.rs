@@ -2,8 +2,8 @@
 
 use std::time::SystemTime;
 
-use super::errors::ExperimentError;
-use super::plan::{PlanError, Stage};
+use crate::errors::ExperimentError;
+use crate::plan::{PlanError, Stage};
 use bench_config::Config;
 use bench_control::ControllerText;
 use bench_excitation::ReferenceContext;

@@ -7,14 +7,15 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
-use super::analysis::Ending;
-use super::errors::{ExperimentError, MotorError, RunError};
-use super::evidence::{OpenRig, require_evidence, require_evidence_or_warn};
-use super::live::{DeviceNames, LiveRig, OpenBench, Opening, Run, RunHooks};
-use super::plan::{Description, Plan, Stage, closed_loop_of, require_margins};
+use super::planned_stage_check::PlannedStageCheck;
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
 use super::run_order::{RigOwner, RunConditions, run_elsewhere};
-use super::stage_check::{PlannedStageCheck, StageCheck};
+use crate::analysis::Ending;
+use crate::errors::{ExperimentError, MotorError, RunError};
+use crate::evidence::{OpenRig, require_evidence, require_evidence_or_warn};
+use crate::live::{DeviceNames, LiveRig, OpenBench, Opening, Run, RunHooks};
+use crate::plan::{Description, Plan, Stage, closed_loop_of, require_margins};
+use crate::stage_check::StageCheck;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_recording::Recording;

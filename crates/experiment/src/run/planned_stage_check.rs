@@ -1,12 +1,10 @@
 //! A stage check as a plan of its own, and its result.
 
-use super::comparison::StageCheck;
-use super::error::StageCheckError;
-use super::shot::Shot;
 use crate::analysis::run_signals;
 use crate::errors::ExperimentError;
 use crate::forecast::extremes;
 use crate::plan::{Plan, PlanError, closed_loop_of};
+use crate::stage_check::{Shot, StageCheck, StageCheckError};
 use bench_excitation::StageCheckSignal;
 use bench_recording::Recording;
 

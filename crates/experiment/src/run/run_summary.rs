@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::analysis::Ending;
-use super::live::{Run, StopCause};
-use super::plan::Description;
+use crate::analysis::Ending;
+use crate::live::{Run, StopCause};
+use crate::plan::Description;
 use bench_recording::{Quantiles, RecordingError};
 use bench_rt::arming::Trip;
 use bench_rt::thread::{Pace, Scheduling};
