@@ -27,7 +27,6 @@ mod measured_margins;
 mod mode_pairs;
 mod overview;
 mod plan;
-mod recorded_rig;
 mod replay;
 mod run;
 pub mod run_comparison;

@@ -1,8 +1,10 @@
 //! Replays the recorded probe readings through the same loop.
 //!
-//! Rig and clock are those of the recording: they return every reading, every time and every request at its tick. The
+//! Rig and clock are those of the recording (`recorded_rig`): they return every reading, every time and every request at its tick. The
 //! decisions of the loop must then be equal, bit for bit. The behaviour of the amplifier follows from the recorded
 //! trips.
+
+mod recorded_rig;
 
 use std::iter::Peekable;
 
@@ -10,9 +12,8 @@ use bench_hal::Tick;
 use rtrb::Producer;
 use serde::Serialize;
 
-use super::live::{OutsideEnds, connect, servo_run};
-use super::plan::{Plan, PlanError, RAMP_TICKS};
-use super::recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
+use crate::live::{OutsideEnds, connect, servo_run};
+use crate::plan::{Plan, PlanError, RAMP_TICKS};
 use bench_recording::{Recording, RecordingError};
 use bench_rt::arming::{State, Trip};
 use bench_rt::clock::TickTiming;
@@ -21,6 +22,7 @@ use bench_rt::publisher::SLOTS_PER_TICK;
 use bench_rt::record::{Event, EventKind, LoopMessage, Origin, RequestKind, TickRecord};
 use bench_rt::servo::{Request, Servo};
 use bench_rt::supervision::StopFlags;
+use recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 
 /// A recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]
