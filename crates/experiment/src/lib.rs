@@ -11,31 +11,22 @@
 #![deny(unsafe_code)]
 
 mod analysis;
-mod basic_results;
 pub mod calibration;
 pub mod campaign;
 pub mod certificate;
-mod closed_signals;
-mod control_run;
-mod error_spectrum;
 mod errors;
 pub mod evidence;
 mod forecast;
 pub mod linearity;
 mod live;
-mod measured_margins;
 mod mode_pairs;
-mod overview;
 mod plan;
 mod replay;
+mod results;
 mod run;
 pub mod run_comparison;
-mod run_figures;
 pub mod sequential;
-mod sine_response;
 pub mod stage_check;
-mod step_response;
-mod tracking;
 pub mod tuning;
 
 pub use analysis::{
@@ -43,9 +34,6 @@ pub use analysis::{
     Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
     analyse_with_progress, open_with_signals, recorded_frf,
 };
-pub use basic_results::BasicResults;
-pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
-pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,
 };
@@ -58,19 +46,19 @@ pub use live::{
     RemoteRecording, Run, RunHooks, StopCause, StopSignals, TripCount, abandon_on_signal, run,
     stop_on_signal, survive_file_size_limit,
 };
-pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
-pub use overview::{Extent, Overview, overview};
 pub use plan::{
     CommandSummary, Description, DescriptionError, Invocation, MarginError, MotorStart, Plan,
     PlanError, RatedController, RunKind, ShapedMode, Stage, TuneRefusal, check_tune, closed_loop,
     operator_name, require_margins, residuals, run_name, run_note,
 };
 pub use replay::{Difference, ReplayError, Replayed, replay};
+pub use results::{
+    BasicResults, ControlRun, ErrorSpectrum, Extent, LoopCurves, LoopModel, MeasuredLoopMargins,
+    Overview, PredictedSine, PredictedSpectrum, PredictedStep, RunFigures, SineResponse,
+    StepResponse, TrackingMetrics, control_run, measured_margins, overview, predicted_step,
+    run_figures, step_response, tracking_metrics,
+};
 pub use run::{
     MotorHandling, PlannedStageCheck, RigOwner, RunOrder, RunReport, RunSummary, Runner, Setup,
     TimingSummary, TripSummary, check_calibration, check_named_files, close,
 };
-pub use run_figures::{RunFigures, run_figures};
-pub use sine_response::SineResponse;
-pub use step_response::{PredictedStep, StepResponse, predicted_step, step_response};
-pub use tracking::{TrackingMetrics, tracking_metrics};

@@ -5,9 +5,9 @@ use serde::Serialize;
 use crate::analysis::{
     Analysis, AnalysisError, AnalysisProgress, Ending, analyse_with_progress, cautions,
 };
-use crate::control_run::{ControlRun, control_run};
 use crate::errors::ExperimentError;
 use crate::plan::{Description, Plan, RunKind};
+use crate::results::{ControlRun, control_run};
 use bench_config::Config;
 use bench_identify::modal::{FittedMode, ModalFit};
 use bench_identify::verdict::Cnmp;

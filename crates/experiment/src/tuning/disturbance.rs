@@ -8,11 +8,9 @@
 //! probe's noise. Where the noise is larger than the disturbance, S_dd is 0.
 
 use crate::analysis::Ending;
-use crate::closed_signals::ClosedSignals;
-use crate::error_spectrum::error_spectrum;
 use crate::errors::ExperimentError;
 use crate::plan::{Plan, PlanError, closed_loop_of};
-use crate::tracking::steady_tick;
+use crate::results::{ClosedSignals, error_spectrum, steady_tick};
 use bench_base::units::rad_s;
 use bench_control::ControllerText;
 use bench_control::tuning::DisturbanceSpectrum;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::error::TuneSourceError;
 use super::identified::{IdentifiedFrf, ModeRole};
 use crate::analysis::{FrfError, points};
-use crate::measured_margins::{MeasuredLoopMargins, margins_around};
+use crate::results::{MeasuredLoopMargins, margins_around};
 use bench_base::units::hz;
 use bench_config::Config;
 use bench_control::measured::{MeasuredLoop, OutsideBand, Stability};

@@ -28,7 +28,7 @@ pub struct TrackingMetrics {
 }
 
 /// The tick, counted since the loop closed, at which the steady state begins.
-pub(super) fn steady_tick(control: &ControlSettings, rate_hz: f64) -> u64 {
+pub(crate) fn steady_tick(control: &ControlSettings, rate_hz: f64) -> u64 {
     let last_change_s = control.reference.design().last_change_s();
     ticks(last_change_s, rate_hz).saturating_add(ticks(control.steady_after_s, rate_hz))
 }

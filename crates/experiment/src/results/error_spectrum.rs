@@ -70,7 +70,7 @@ pub struct PredictedSpectrum {
 }
 
 /// The simulated rig, for a prediction.
-pub(super) struct SpectrumModel<'a> {
+pub(crate) struct SpectrumModel<'a> {
     /// The loop of the whole rig, which is stable.
     pub(super) closed_loop: &'a ClosedLoop,
     /// Floor and probe.
@@ -78,7 +78,7 @@ pub(super) struct SpectrumModel<'a> {
 }
 
 /// The spectrum of the steady state, which begins at the tick `steady`; `None` if it is too short.
-pub(super) fn error_spectrum(
+pub(crate) fn error_spectrum(
     signals: &ClosedSignals,
     steady: usize,
     rate_hz: f64,

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 use serde::Serialize;
 
-use super::analysis::{FrfError, MeasuredFrf, check_frf, points, roll_off, variance};
+use crate::analysis::{FrfError, MeasuredFrf, check_frf, points, roll_off, variance};
 use bench_base::units::rad_s;
 use bench_config::Config;
 use bench_control::ClosedLoop;
@@ -74,7 +74,7 @@ pub fn measured_margins(
 ///
 /// # Errors
 /// When the response does not contain the crossover or the peak of |S|.
-pub(super) fn margins_around(
+pub(crate) fn margins_around(
     measured: &MeasuredFrf,
     model: &ClosedLoop,
     config: &Config,

@@ -1,6 +1,6 @@
 //! A whole run as minima and maxima of short intervals: what a plot can show, with constant memory.
 
-use super::errors::ExperimentError;
+use crate::errors::ExperimentError;
 use bench_recording::Recording;
 use bench_rt::record::TickRecord;
 

@@ -2,17 +2,17 @@
 
 use serde::Serialize;
 
-use super::analysis::Ending;
 use super::closed_signals::ClosedSignals;
 use super::error_spectrum::{ErrorSpectrum, SpectrumModel, error_spectrum};
-use super::errors::ExperimentError;
 use super::overview::{Overview, overview};
-use super::plan::{Plan, PlanError, closed_loop_of, swept_reference};
-use super::run::TripSummary;
 use super::run_figures::{RunFigures, run_figures};
 use super::sine_response::SineResponse;
 use super::step_response::{StepResponse, step_response};
 use super::tracking::{TrackingMetrics, steady_tick, tracking_metrics};
+use crate::analysis::Ending;
+use crate::errors::ExperimentError;
+use crate::plan::{Plan, PlanError, closed_loop_of, swept_reference};
+use crate::run::TripSummary;
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_control::{ClosedLoop, ControllerText, Margins};

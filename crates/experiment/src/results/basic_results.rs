@@ -1,9 +1,9 @@
 //! The results of a recorded run without a frequency response: static steps, a rest position, a stage check.
 
-use super::calibration::{StaircaseResult, staircase};
-use super::campaign::RestPosition;
-use super::plan::RunKind;
-use super::stage_check::StageCheck;
+use crate::calibration::{StaircaseResult, staircase};
+use crate::campaign::RestPosition;
+use crate::plan::RunKind;
+use crate::stage_check::StageCheck;
 use bench_config::Config;
 use bench_recording::Recording;
 

@@ -8,11 +8,11 @@ const MAX_TICKS: usize = 2_000_000;
 
 /// The signals from the tick on in which the loop closed. A missing tick has the values of the one before.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct ClosedSignals {
+pub(crate) struct ClosedSignals {
     /// Reference in metres, relative to the rest position.
-    pub(super) reference_m: Vec<f64>,
+    pub(crate) reference_m: Vec<f64>,
     /// Reference minus position in metres.
-    pub(super) error_m: Vec<f64>,
+    pub(crate) error_m: Vec<f64>,
 }
 
 impl ClosedSignals {
@@ -20,7 +20,7 @@ impl ClosedSignals {
     ///
     /// # Errors
     /// When the recording cannot be read.
-    pub(super) fn of(recording: &Recording) -> Result<ClosedSignals, RecordingError> {
+    pub(crate) fn of(recording: &Recording) -> Result<ClosedSignals, RecordingError> {
         let mut collector = Collector::default();
         for record in recording.ticks()? {
             collector.push(&record?);

@@ -1,8 +1,8 @@
 //! The response of a closed loop to a step of its reference: predicted by the model, and measured in a recording.
 
-use super::errors::ExperimentError;
-use super::plan::{Plan, closed_loop_of};
 use super::tracking::{TrackingMetrics, tracking_metrics};
+use crate::errors::ExperimentError;
+use crate::plan::{Plan, closed_loop_of};
 use bench_control::{ClosedLoop, StepMetrics, step_metrics};
 use bench_excitation::command::{CommandFilter, CommandSource, FilteredCommand};
 use bench_excitation::{Reference, StepOfReference};
