@@ -19,7 +19,6 @@ pub mod evidence;
 mod forecast;
 pub mod linearity;
 mod live;
-mod mode_pairs;
 mod plan;
 mod replay;
 mod results;

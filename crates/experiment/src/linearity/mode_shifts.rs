@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::mode_pairs::{probability_of_difference, same_mode};
+use crate::run_comparison::{probability_of_difference, same_mode};
 use bench_identify::modal::{Estimate, FittedMode};
 
 /// Probability that noise alone makes any of the compared parameters shift.

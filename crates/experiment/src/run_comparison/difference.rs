@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::mode_pairs::probability_of_difference;
+use super::mode_pairs::probability_of_difference;
 use bench_identify::Estimate;
 
 /// Probability that noise alone makes any of the tested differences significant.

@@ -8,6 +8,7 @@
 
 mod difference;
 mod figures;
+mod mode_pairs;
 mod modes;
 mod run_result;
 
@@ -17,6 +18,7 @@ use bench_config::{SettingDifference, differences};
 
 pub use difference::{Difference, FAMILY_FALSE_ALARM};
 pub use figures::{Figure, FigureDifference};
+pub(crate) use mode_pairs::{probability_of_difference, same_mode};
 pub use modes::{ModeDifference, ModeDifferences};
 pub use run_result::{RunHead, RunResult, distinguish};
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::difference::Difference;
-use crate::mode_pairs::same_mode;
+use super::mode_pairs::same_mode;
 use bench_identify::modal::{FittedMode, ModalFit};
 
 /// A mode that both runs show.

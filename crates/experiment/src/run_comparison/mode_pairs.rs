@@ -7,7 +7,7 @@ use bench_identify::modal::{Estimate, FittedMode};
 const SAME_MODE_RATIO: f64 = 0.05;
 
 /// The index in `modes`, of another run, of the mode that is mode `k` of the first run; `None` if it is not there.
-pub(super) fn same_mode(first: &[FittedMode], k: usize, modes: &[FittedMode]) -> Option<usize> {
+pub(crate) fn same_mode(first: &[FittedMode], k: usize, modes: &[FittedMode]) -> Option<usize> {
     let here = first.get(k)?.omega_rad_s.value;
     let distance = |mode: &FittedMode| (mode.omega_rad_s.value - here).abs();
     let distances = first.iter().map(distance).filter(|away| *away > 0.0);
@@ -23,7 +23,7 @@ pub(super) fn same_mode(first: &[FittedMode], k: usize, modes: &[FittedMode]) ->
 
 /// The probability that two independent, normally distributed estimates of the same value differ at least as much as these:
 /// erfc(|z|/sqrt 2) with z = (x_1 - x_2)/sqrt(sigma_1^2 + sigma_2^2).
-pub(super) fn probability_of_difference(a: Estimate, b: Estimate) -> f64 {
+pub(crate) fn probability_of_difference(a: Estimate, b: Estimate) -> f64 {
     let z = (a.value - b.value).abs() / libm::hypot(a.sigma, b.sigma);
     // 0/0: both without error, and equal.
     if z.is_nan() {
