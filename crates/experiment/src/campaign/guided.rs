@@ -12,10 +12,8 @@
 
 use super::error::CampaignError;
 use super::grid::{Grid, GridPoint};
-use super::load::{Load, StageModel};
-use super::load_check::{Finding, LoadCheck};
+use super::load::{Finding, Load, LoadCheck, RestPosition, StageModel};
 use super::point::PointResult;
-use super::rest_position::RestPosition;
 use bench_base::decimal::Decimal;
 use bench_config::{Config, Sr4dofSettings};
 

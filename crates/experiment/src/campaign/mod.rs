@@ -16,32 +16,25 @@ mod evaluation;
 mod grid;
 mod guided;
 mod load;
-mod load_check;
 mod measure;
-mod offset;
 mod parallel;
 mod point;
-mod recommend;
 mod recorded;
-mod region;
-mod rest_position;
 mod run;
 mod store;
 mod visit_order;
 
 pub use error::CampaignError;
-pub use evaluation::{ComparedPoint, Evaluation, ends};
+pub use evaluation::{
+    CHI2_95, ComparedPoint, Evaluation, Judgement, LikelihoodStep, Offset, Recommendation, Region,
+    Tolerances, disagreeing, ends, estimate_offset, recommend,
+};
 pub use grid::{Grid, GridPoint};
 pub use guided::{GuidedCampaign, LoadedRig, Operator, Question, Reply};
-pub use load::{Load, StageModel};
-pub use load_check::{Finding, LengthCheck, LoadCheck, ModeCheck};
+pub use load::{Finding, LengthCheck, Load, LoadCheck, ModeCheck, RestPosition, StageModel};
 pub use measure::Method;
-pub use offset::{CHI2_95, Judgement, LikelihoodStep, Offset, disagreeing, estimate_offset};
 pub use point::{PointResult, analyse_point};
-pub use recommend::{Recommendation, Tolerances, recommend};
 pub use recorded::{RecordedPoint, recorded_points};
-pub use region::Region;
-pub use rest_position::RestPosition;
 pub use run::{Campaign, CampaignOptions, RunPlan};
 pub use store::{OpenedStore, Store};
 pub use visit_order::visit_order;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::load_check::LoadCheck;
+use super::load::LoadCheck;
 use crate::analysis::{Analysis, AnalysisError, analyse};
 use crate::live::Run;
 use crate::sequential::Sequence;

@@ -4,14 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 use super::error::CampaignError;
-use super::evaluation::Evaluation;
+use super::evaluation::{Evaluation, Tolerances};
 use super::grid::{Grid, GridPoint};
 use super::guided::{GuidedCampaign, LoadedRig, Operator};
+use super::load::RestPosition;
 use super::measure::{Method, PointMeasurement};
 use super::parallel::measure_in_parallel;
 use super::point::PointResult;
-use super::recommend::Tolerances;
-use super::rest_position::RestPosition;
 use super::store::{OpenedStore, Store};
 use super::visit_order::visit_order;
 use crate::analysis::Ending;

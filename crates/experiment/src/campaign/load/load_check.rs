@@ -6,9 +6,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::CampaignError;
-use super::load::{Load, StageModel};
+use super::planned_load::{Load, StageModel};
 use super::rest_position::RestPosition;
+use crate::campaign::error::CampaignError;
 use bench_base::decimal::Decimal;
 use bench_config::{PlantSettings, Sr4dofSettings};
 use bench_plant::{ModalModel, Mode, Sign};

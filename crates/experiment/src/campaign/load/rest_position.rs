@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::CampaignError;
+use crate::campaign::error::CampaignError;
 use bench_base::running_stats::RunningStats;
 use bench_hal::Validity;
 use bench_recording::{Recording, RecordingError};

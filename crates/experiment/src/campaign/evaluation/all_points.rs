@@ -2,12 +2,12 @@
 
 use serde::Serialize;
 
-use super::error::CampaignError;
-use super::grid::{Grid, GridPoint, stage_settings};
 use super::offset::{Judgement, Offset, disagreeing, estimate_offset};
-use super::point::PointResult;
 use super::recommend::{Recommendation, Tolerances, recommend};
 use super::region::Region;
+use crate::campaign::error::CampaignError;
+use crate::campaign::grid::{Grid, GridPoint, stage_settings};
+use crate::campaign::point::PointResult;
 use bench_config::{Config, Sr4dofSettings};
 use bench_identify::verdict::Cnmp;
 use bench_plant::PlantError;

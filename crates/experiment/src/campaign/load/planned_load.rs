@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::error::CampaignError;
-use super::grid::{MASS_STEP_KG, stage_settings};
+use crate::campaign::error::CampaignError;
+use crate::campaign::grid::{MASS_STEP_KG, stage_settings};
 use bench_config::{CampaignSettings, Config, PlantSettings, Sr4dofSettings};
 
 /// Standard gravity in m/s^2.
