@@ -7,6 +7,28 @@
 //!
 //! The supervisor cannot delay the loop: it watches counters and the state of the recorder, and sends requests to the loop through a
 //! ring. Signals reach the loop directly. The rig stays open for several runs.
+//!
+//! Each room (folder) imports only from rooms above it:
+//!
+//! | room | for |
+//! |---|---|
+//! | `certificate` | what a chirp showed about a rig, as the text that a plan contains |
+//! | `stage_check` | the short run in open loop that compares a stage with its certificate |
+//! | `plan` | what a run will do: settings, program, reference, and whether the loop is stable by the model |
+//! | `analysis` | what a recording shows of the stage: signals, frequency response, modes, verdict |
+//! | `errors` | why an experiment was refused or failed |
+//! | `forecast` | what a run will demand of rig and motor: travel, current, amplitudes, heat |
+//! | `live` | the open rig with its loop, recorder, supervisor and stop signals |
+//! | `replay` | the recorded readings through the same loop again |
+//! | `evidence` | certificates are issued, and compared with the rig of today before a loop closes |
+//! | `run` | the runner of plans, on an own rig or on that of another process, and the summary of a run |
+//! | `calibration` | calibration by static steps and a short chirp |
+//! | `sequential` | short chirps until the verdict is certain |
+//! | `campaign` | chirps over a grid of operating points and asymmetries, and their evaluation |
+//! | `results` | the figures of recorded runs for reports: closed loops, steps, rest positions |
+//! | `run_comparison` | differences between recordings and their significance |
+//! | `tuning` | plants of a controller design from measured responses |
+//! | `linearity` | the same multisine at several amplitudes |
 
 #![deny(unsafe_code)]
 

@@ -1,4 +1,5 @@
-//! Runs of the same multisine at several amplitudes: distortion, noise, and whether modes shift with amplitude.
+//! Runs of the same multisine at several amplitudes: distortion, noise, and whether modes shift with amplitude. The runs are planned and
+//! made here; then `mode_shifts` compares their modes.
 
 mod mode_shifts;
 

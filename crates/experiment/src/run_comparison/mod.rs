@@ -5,6 +5,9 @@
 //!                                              > Comparison: differences from the first run, Holm's test over all of them
 //! Recording -> RunResult --------------------'
 //! ```
+//!
+//! A recording is analysed (`run_result`); its modes are paired with those of the reference (`mode_pairs`, `modes`), its figures are
+//! compared (`figures`), and all of them are tested together (`difference`).
 
 mod difference;
 mod figures;
