@@ -48,7 +48,11 @@ fn rejects_constant_output() {
     };
     assert_contains(
         &rejection(&signals, (10.0, 400.0)),
-        &["output is 0.00125 at every", "200 samples", "check its range"],
+        &[
+            "output is 0.00125 at every",
+            "200 samples",
+            "check its range",
+        ],
     );
 }
 
@@ -60,7 +64,11 @@ fn rejects_constant_input() {
     };
     assert_contains(
         &rejection(&signals, (10.0, 400.0)),
-        &["input is 0 at every", "200 samples", "amplifier was enabled"],
+        &[
+            "input is 0 at every",
+            "200 samples",
+            "amplifier was enabled",
+        ],
     );
 }
 
