@@ -145,18 +145,36 @@ pub fn facts(pairs: &[(String, String)]) -> String {
     format!("<dl>\n{pairs}</dl>\n")
 }
 
-/// Text with the special characters of HTML escaped.
+/// Text with the special characters of HTML and XML escaped. A control character, which XML does not allow, becomes U+FFFD.
 pub fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-        .replace('\'', "&#39;")
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\'' => escaped += "&#39;",
+            '\t' | '\n' | '\r' => escaped.push(character),
+            '\0'..='\x1f' | '\u{fffe}' | '\u{ffff}' => escaped.push('\u{fffd}'),
+            _ => escaped.push(character),
+        }
+    }
+    escaped
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The characters are those of XML 1.0, section 2.2.
+    #[test]
+    fn replaces_characters_that_xml_does_not_allow() {
+        assert_eq!(
+            escaped("a\0b\x1bc\u{ffff}\td\u{85}µ😀"),
+            "a\u{fffd}b\u{fffd}c\u{fffd}\td\u{85}µ😀"
+        );
+    }
 
     #[test]
     fn escapes_the_special_characters_of_html() {
