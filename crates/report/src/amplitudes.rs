@@ -34,7 +34,7 @@ type Parameter = fn(&FittedMode) -> Estimate;
 /// The compliance of a mode is its residue over the square of its frequency, r/w^2 in m/N.
 ///
 /// # Errors
-/// When there are no amplitudes, or drawing fails.
+/// When there are no amplitudes.
 pub fn amplitudes_svg(
     overview: &AmplitudeOverview<'_>,
     title: &str,

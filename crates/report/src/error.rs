@@ -53,9 +53,4 @@ pub enum ReportError {
         "no trace has a magnitude above 0, which a logarithmic axis needs; check the data of the traces"
     )]
     NoMagnitude,
-    /// The drawing library failed.
-    #[error(
-        "the plot cannot be drawn: {0}; check that the data are finite numbers, or leave out the plot"
-    )]
-    Drawing(String),
 }

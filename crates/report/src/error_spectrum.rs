@@ -15,7 +15,7 @@ const DENSITY_MARGIN: f64 = 4.0;
 /// The error spectrum in nm/sqrt(Hz), and its RMS in nm up to each frequency, as an SVG document.
 ///
 /// # Errors
-/// When the spectrum is empty, or drawing fails.
+/// When the spectrum is empty.
 pub fn error_spectrum_svg(
     spectrum: &ErrorSpectrum,
     title: &str,

@@ -49,7 +49,7 @@ pub fn overlay_bode_svg(
 /// The step responses of several recordings in one plot.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn overlay_steps_svg(curves: &[StepCurve<'_>], title: &str) -> Result<String, ReportError> {
     if curves.is_empty() {
         return Err(ReportError::NoTrace);
@@ -76,7 +76,7 @@ pub struct StepPlot<'a> {
 /// A step with its band of 2 %, beside that of the model.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn step_svg(step: &StepPlot<'_>, title: &str) -> Result<String, ReportError> {
     let end_s = step.measured.last().ok_or(ReportError::NoTrace)?.0;
     let [low, high] = [1.0 - SETTLING_BAND, 1.0 + SETTLING_BAND].map(|k| k * MICRO * step.height_m);

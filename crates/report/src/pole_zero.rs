@@ -52,7 +52,7 @@ pub struct PoleZeroMap {
 /// The map as an SVG document.
 ///
 /// # Errors
-/// When drawing fails.
+/// When there is nothing to draw.
 pub fn pole_zero_svg(
     map: &PoleZeroMap,
     title: &str,

@@ -36,7 +36,7 @@ pub struct QuadrantPanel {
 /// probe makes the signs alternate is shaded.
 ///
 /// # Errors
-/// When there is no diagram, or the drawing library fails.
+/// When there is no diagram.
 pub fn quadrants_svg(
     panels: &[QuadrantPanel],
     title: &str,

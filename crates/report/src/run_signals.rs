@@ -43,7 +43,7 @@ pub struct SettlingBand {
 /// Reference, position, error and current of a whole run, below each other.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn signals_svg(
     plot: &SignalsPlot<'_>,
     title: &str,

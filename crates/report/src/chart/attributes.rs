@@ -2,7 +2,7 @@
 
 use super::Chart;
 use super::axis::Axis;
-use super::canvas::to_drawing_units;
+use super::canvas::to_units;
 use super::mark::{Mark, Pen};
 use super::plot_area::PlotArea;
 use super::scale::{Scale, ScaleKind};
@@ -12,7 +12,7 @@ use crate::html::escaped;
 /// Box and axes of a chart. The box (left, top, right, bottom) is in units of the view box: tenths of a pixel.
 pub(super) fn plot(chart: &Chart, area: &PlotArea) -> String {
     let frame = area.frame;
-    let sides = [frame.left, frame.top, frame.right, frame.bottom].map(to_drawing_units);
+    let sides = [frame.left, frame.top, frame.right, frame.bottom].map(to_units);
     let [left, top, right, bottom] = sides;
     let x = axis("x", &chart.x, &area.x);
     let y = axis("y", &chart.y, &area.y);
@@ -64,7 +64,7 @@ pub(super) fn mark(mark: &Mark, area: &PlotArea) -> Option<String> {
 
 fn curve(name: &str, pen: Pen) -> Option<String> {
     let dash = dash_pattern(pen.stroke).map(|(on, off)| {
-        let [on, off] = [on, off].map(to_drawing_units);
+        let [on, off] = [on, off].map(to_units);
         format!(" data-dash=\"{on} {off}\"")
     });
     let name = escaped(name);
@@ -73,7 +73,7 @@ fn curve(name: &str, pen: Pen) -> Option<String> {
 
 /// The place that a text moves with.
 fn text((x, y): (f64, f64)) -> Option<String> {
-    let (left, top) = (to_drawing_units(x), to_drawing_units(y));
+    let (left, top) = (to_units(x), to_units(y));
     (x.is_finite() && y.is_finite()).then(|| format!("data-at=\"{left},{top}\""))
 }
 

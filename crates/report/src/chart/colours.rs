@@ -1,8 +1,41 @@
 //! Colours. The named ones are those of Okabe and Ito (2008), which colour-blind readers can tell apart and which differ
 //! in lightness in print.
 
+use core::fmt;
+
 /// Red, green and blue, 0 to 255 each.
-pub use plotters::style::RGBColor as Colour;
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Colour(pub u8, pub u8, pub u8);
+
+/// A colour with an opacity, 0 to 1.
+#[derive(Clone, Copy)]
+pub(super) struct Paint {
+    pub colour: Colour,
+    pub opacity: f64,
+}
+
+impl Colour {
+    pub(super) fn with_opacity(self, opacity: f64) -> Paint {
+        Paint {
+            colour: self,
+            opacity,
+        }
+    }
+}
+
+impl From<Colour> for Paint {
+    fn from(colour: Colour) -> Paint {
+        colour.with_opacity(1.0)
+    }
+}
+
+/// The form of SVG, such as `#0072B2`.
+impl fmt::Display for Colour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Colour(red, green, blue) = self;
+        write!(f, "#{red:02X}{green:02X}{blue:02X}")
+    }
+}
 
 /// Blue.
 pub const BLUE: Colour = Colour(0, 114, 178);
@@ -67,10 +100,5 @@ pub(crate) fn dark_style() -> String {
 }
 
 fn dark_rule((light, dark): &(Colour, Colour)) -> String {
-    let (light, dark) = (hex(*light), hex(*dark));
     format!("svg [fill=\"{light}\"]{{fill:{dark}}}svg [stroke=\"{light}\"]{{stroke:{dark}}}")
-}
-
-fn hex(Colour(red, green, blue): Colour) -> String {
-    format!("#{red:02X}{green:02X}{blue:02X}")
 }

@@ -1,10 +1,8 @@
 //! Title and subtitle of a sheet, and text flow.
 
-use plotters::style::text_anchor::{HPos, VPos};
-
-use super::canvas::{Canvas, TextStyle};
+use super::canvas::Canvas;
 use super::colours::SECONDARY_INK;
-use crate::ReportError;
+use super::text_style::{Horizontal, TextStyle, Vertical};
 
 pub(super) const TEXT_SIZE: f64 = 12.5;
 /// Largest mean width of a character in any usual sans-serif font, as a ratio of the font size.
@@ -12,8 +10,9 @@ pub(super) const CHARACTER: f64 = 0.6;
 const BOLD_CHARACTER: f64 = 0.63;
 const LINE_HEIGHT: f64 = 1.4;
 
-const TITLE: TextStyle = TextStyle::new(17.0, HPos::Left, VPos::Top).bold();
-const SUBTITLE: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Left, VPos::Top).colour(SECONDARY_INK);
+const TITLE: TextStyle = TextStyle::new(17.0, Horizontal::Left, Vertical::Top).bold();
+const SUBTITLE: TextStyle =
+    TextStyle::new(TEXT_SIZE, Horizontal::Left, Vertical::Top).colour(SECONDARY_INK);
 
 /// Lines of text, laid out below each other.
 pub(super) struct TextBlock {
@@ -54,10 +53,10 @@ impl TextBlock {
         }
     }
 
-    pub fn draw(&self, canvas: &Canvas) -> Result<(), ReportError> {
-        self.lines
-            .iter()
-            .try_for_each(|(text, y, style)| canvas.text(text, (self.left, *y), *style))
+    pub fn draw(&self, canvas: &mut Canvas) {
+        for (text, y, style) in &self.lines {
+            canvas.text(text, (self.left, *y), *style);
+        }
     }
 }
 

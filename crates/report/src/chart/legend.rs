@@ -1,24 +1,21 @@
 //! The legend of a chart: one entry for each named mark.
 
-use plotters::style::text_anchor::{HPos, VPos};
-use plotters::style::{Color, RGBAColor};
-
 use super::Points;
-use super::canvas::{Canvas, TextStyle, rectangle};
-use super::colours::{Colour, INK};
+use super::canvas::{Canvas, rectangle};
+use super::colours::{Colour, INK, Paint};
 use super::header::{CHARACTER, TEXT_SIZE};
 use super::mark::{Mark, Pen, SeriesPoint, Symbol};
 use super::plot_area::BAND;
 use super::series::dashes;
 use super::symbols::{draw_arrow, draw_symbol};
-use crate::ReportError;
+use super::text_style::{Horizontal, TextStyle, Vertical};
 
 /// Width of the sample in front of a name.
 const SAMPLE_WIDTH: f64 = 26.0;
 const ROW_HEIGHT: f64 = 20.0;
 /// Pixels between an entry and the next.
 const SPACE: f64 = 18.0;
-const NAME: TextStyle = TextStyle::new(TEXT_SIZE, HPos::Left, VPos::Center);
+const NAME: TextStyle = TextStyle::new(TEXT_SIZE, Horizontal::Left, Vertical::Middle);
 
 /// Entries, side by side in as many rows as they need.
 pub(super) struct Legend {
@@ -53,10 +50,10 @@ impl Legend {
         }
     }
 
-    pub fn draw(&self, canvas: &Canvas) -> Result<(), ReportError> {
-        self.entries
-            .iter()
-            .try_for_each(|(entry, place)| entry.draw(canvas, *place))
+    pub fn draw(&self, canvas: &mut Canvas) {
+        for (entry, place) in &self.entries {
+            entry.draw(canvas, *place);
+        }
     }
 }
 
@@ -114,51 +111,46 @@ impl Entry {
         SAMPLE_WIDTH + 6.0 + text + SPACE
     }
 
-    fn draw(&self, canvas: &Canvas, (left, top): (f64, f64)) -> Result<(), ReportError> {
+    fn draw(&self, canvas: &mut Canvas, (left, top): (f64, f64)) {
         let (middle, right) = (top + 8.0, left + SAMPLE_WIDTH);
-        self.sample.draw(canvas, (left, right), middle)?;
-        canvas.text(&self.name, (right + 6.0, middle), NAME)
+        self.sample.draw(canvas, (left, right), middle);
+        canvas.text(&self.name, (right + 6.0, middle), NAME);
     }
 }
 
 impl Sample {
-    fn draw(
-        &self,
-        canvas: &Canvas,
-        (left, right): (f64, f64),
-        middle: f64,
-    ) -> Result<(), ReportError> {
+    fn draw(&self, canvas: &mut Canvas, (left, right): (f64, f64), middle: f64) {
         let ends = [(left, middle), (right, middle)];
         let (top, lower_right) = (middle - 6.0, (right, middle + 6.0));
         match *self {
             Sample::Line(pen) => draw_line(canvas, pen, &ends),
             Sample::Band(pen) => {
                 let band = rectangle((left, top), lower_right);
-                canvas.area(&band, pen.colour.mix(BAND))?;
-                draw_line(canvas, pen, &ends)
+                canvas.area(&band, pen.colour.with_opacity(BAND));
+                draw_line(canvas, pen, &ends);
             }
             Sample::Arrow(pen) => draw_arrow(canvas, pen, ends[0], ends[1]),
             Sample::Point(colour, symbol) => {
-                draw_symbol(canvas, colour, symbol, (right - 8.0, middle))
+                draw_symbol(canvas, colour, symbol, (right - 8.0, middle));
             }
             Sample::Area(colour, strength) => {
                 let outline = rectangle((left + 6.0, top), lower_right);
-                draw_box(canvas, outline, colour.mix(strength))
+                draw_box(canvas, outline, colour.with_opacity(strength));
             }
         }
     }
 }
 
 /// A filled box with a fine outline.
-fn draw_box(canvas: &Canvas, mut outline: Points, colour: RGBAColor) -> Result<(), ReportError> {
-    canvas.area(&outline, colour)?;
+fn draw_box(canvas: &mut Canvas, mut outline: Points, paint: Paint) {
+    canvas.area(&outline, paint);
     outline.push(outline[0]);
-    canvas.line(&outline, INK.into(), 0.5)
+    canvas.line(&outline, INK, 0.5);
 }
 
-fn draw_line(canvas: &Canvas, pen: Pen, ends: &[(f64, f64)]) -> Result<(), ReportError> {
+fn draw_line(canvas: &mut Canvas, pen: Pen, ends: &[(f64, f64)]) {
     let width = pen.width.max(1.2);
-    dashes(pen.stroke, ends)
-        .iter()
-        .try_for_each(|dash| canvas.line(dash, pen.colour.into(), width))
+    for dash in dashes(pen.stroke, ends) {
+        canvas.line(&dash, pen.colour, width);
+    }
 }

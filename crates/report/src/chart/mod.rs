@@ -4,6 +4,7 @@
 //! Chart (Scale, Mark) -> sheet (rows, header, legend) -> plot_area (axes, marks) -> canvas (SVG)
 //!                                                         attributes: scales and names for plot.js
 //!                                                         symbols: points and arrow heads
+//!                                                         text_style: size, anchor and direction of texts
 //!                                                         axis: value to pixel, ticks
 //!                                                         frame, series: clipped and thinned to what a screen shows
 //! ```
@@ -23,6 +24,7 @@ mod scale;
 mod series;
 mod sheet;
 mod symbols;
+mod text_style;
 
 pub use mark::{Anchor, Mark, Pen, SeriesPoint, Stroke, Symbol};
 pub use scale::{Scale, ScaleKind};

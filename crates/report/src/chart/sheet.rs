@@ -3,15 +3,15 @@
 use super::Chart;
 use super::attributes;
 use super::axis::Axis;
-use super::canvas::{Page, TextStyle};
+use super::canvas::Canvas;
 use super::frame::Frame;
 use super::header::TextBlock;
 use super::legend::Legend;
 use super::mark::Mark;
 use super::plot_area::PlotArea;
 use super::scale::{Scale, ScaleKind};
+use super::text_style::{Horizontal, TextStyle, Vertical};
 use crate::ReportError;
-use plotters::style::text_anchor::{HPos, VPos};
 
 /// Width of the sheet in pixels.
 const WIDTH: f64 = 1000.0;
@@ -24,8 +24,8 @@ const BELOW: f64 = 50.0;
 const BELOW_UNNUMBERED: f64 = 8.0;
 /// Part of an axis left free beside the marks.
 const MARGIN: f64 = 0.05;
-const HEADING: TextStyle = TextStyle::new(13.0, HPos::Left, VPos::Top).bold();
-const AXIS_LABEL: TextStyle = TextStyle::new(13.0, HPos::Center, VPos::Bottom);
+const HEADING: TextStyle = TextStyle::new(13.0, Horizontal::Left, Vertical::Top).bold();
+const AXIS_LABEL: TextStyle = TextStyle::new(13.0, Horizontal::Centre, Vertical::Bottom);
 
 /// A row of charts with frames of one height.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,7 @@ impl Row {
 /// Rows of charts below a title, as an SVG document.
 ///
 /// # Errors
-/// [`ReportError::NoTrace`] without a chart, [`ReportError::Drawing`] when the drawing library fails.
+/// [`ReportError::NoTrace`] without a chart.
 pub fn sheet_svg(title: &str, subtitle: &str, rows: &[Row]) -> Result<String, ReportError> {
     let rows: Vec<&Row> = rows.iter().filter(|row| !row.charts.is_empty()).collect();
     if rows.is_empty() {
@@ -80,10 +80,12 @@ pub fn sheet_svg(title: &str, subtitle: &str, rows: &[Row]) -> Result<String, Re
     for row in rows {
         cells.extend(cells_of(row, &mut bottom));
     }
-    let mut page = Page::new((WIDTH, bottom))?;
-    page.draw(|canvas| header.draw(canvas))?;
-    cells.iter().try_for_each(|cell| cell.draw(&mut page))?;
-    Ok(page.into_svg())
+    let mut canvas = Canvas::new((WIDTH, bottom));
+    header.draw(&mut canvas);
+    for cell in &cells {
+        cell.draw(&mut canvas);
+    }
+    Ok(canvas.into_svg())
 }
 
 /// The cells of a row from `top` on, which becomes its lower end.
@@ -138,51 +140,44 @@ impl<'a> Cell<'a> {
         Cell { chart, head, area }
     }
 
-    fn draw(&self, page: &mut Page) -> Result<(), ReportError> {
-        page.draw(|canvas| {
-            self.head.heading.draw(canvas)?;
-            self.head.legend.draw(canvas)
-        })?;
-        page.open(&attributes::plot(self.chart, &self.area));
-        self.draw_axes(page)?;
-        page.open("class=\"marks\"");
+    fn draw(&self, canvas: &mut Canvas) {
+        self.head.heading.draw(canvas);
+        self.head.legend.draw(canvas);
+        canvas.open(&attributes::plot(self.chart, &self.area));
+        self.draw_axes(canvas);
+        canvas.open("class=\"marks\"");
         // Areas first: they would cover the curves.
         let (areas, others): (Vec<_>, Vec<_>) =
             self.chart.marks.iter().partition(|mark| mark.is_area());
-        let mut marks = areas.into_iter().chain(others);
-        marks.try_for_each(|mark| self.draw_mark(page, mark))?;
-        page.close();
-        page.close();
-        Ok(())
+        for mark in areas.into_iter().chain(others) {
+            self.draw_mark(canvas, mark);
+        }
+        canvas.close();
+        canvas.close();
     }
 
-    fn draw_axes(&self, page: &mut Page) -> Result<(), ReportError> {
-        let (x, y) = (&self.chart.x, &self.chart.y);
-        page.open("class=\"ticks\"");
-        page.draw(|canvas| self.area.draw_ticks(canvas, x, y))?;
-        page.close();
-        page.draw(|canvas| {
-            self.area.draw_frame(canvas, y)?;
-            if !x.numbered {
-                return Ok(());
-            }
-            let frame = self.area.frame;
+    fn draw_axes(&self, canvas: &mut Canvas) {
+        let (x, y, frame) = (&self.chart.x, &self.chart.y, self.area.frame);
+        canvas.open("class=\"ticks\"");
+        self.area.draw_ticks(canvas, x, y);
+        canvas.close();
+        self.area.draw_frame(canvas, y);
+        if x.numbered {
             let middle = (frame.left + frame.right) / 2.0;
             let below = (middle, frame.bottom + BELOW - 8.0);
-            canvas.text(&x.label, below, AXIS_LABEL)
-        })
+            canvas.text(&x.label, below, AXIS_LABEL);
+        }
     }
 
-    fn draw_mark(&self, page: &mut Page, mark: &Mark) -> Result<(), ReportError> {
+    fn draw_mark(&self, canvas: &mut Canvas, mark: &Mark) {
         let attributes = attributes::mark(mark, &self.area);
         if let Some(attributes) = &attributes {
-            page.open(attributes);
+            canvas.open(attributes);
         }
-        page.draw(|canvas| self.area.draw_mark(canvas, mark))?;
+        self.area.draw_mark(canvas, mark);
         if attributes.is_some() {
-            page.close();
+            canvas.close();
         }
-        Ok(())
     }
 }
 

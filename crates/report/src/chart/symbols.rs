@@ -1,13 +1,10 @@
 //! Strokes, arrows and symbols.
 
-use plotters::style::Color;
-
 use super::Points;
 use super::canvas::Canvas;
 use super::colours::Colour;
 use super::mark::{Pen, Symbol};
 use super::series::dashes;
-use crate::ReportError;
 
 /// Radius of a symbol.
 const SYMBOL: f64 = 4.5;
@@ -16,30 +13,19 @@ const ARROW_SPACING: f64 = 170.0;
 const ARROW_LENGTH: f64 = 7.0;
 
 /// A line in the dashes of a pen.
-pub(super) fn draw_stroke(
-    canvas: &Canvas,
-    pen: Pen,
-    opacity: f64,
-    points: &[(f64, f64)],
-) -> Result<(), ReportError> {
-    let dashes = dashes(pen.stroke, points);
-    dashes
-        .iter()
-        .try_for_each(|dash| canvas.line(dash, pen.colour.mix(opacity), pen.width))
+pub(super) fn draw_stroke(canvas: &mut Canvas, pen: Pen, opacity: f64, points: &[(f64, f64)]) {
+    for dash in dashes(pen.stroke, points) {
+        canvas.line(&dash, pen.colour.with_opacity(opacity), pen.width);
+    }
 }
 
 /// A line with a head; a dot where it is shorter than its head.
-pub(super) fn draw_arrow(
-    canvas: &Canvas,
-    pen: Pen,
-    from: (f64, f64),
-    to: (f64, f64),
-) -> Result<(), ReportError> {
-    draw_stroke(canvas, pen, 1.0, &[from, to])?;
+pub(super) fn draw_arrow(canvas: &mut Canvas, pen: Pen, from: (f64, f64), to: (f64, f64)) {
+    draw_stroke(canvas, pen, 1.0, &[from, to]);
     let length = 5.0 + 1.5 * pen.width;
     match arrow_head(from, to, length, 0.4) {
-        Some(head) => canvas.area(&head, pen.colour.into()),
-        None => canvas.dot(to, pen.width, pen.colour.into()),
+        Some(head) => canvas.area(&head, pen.colour),
+        None => canvas.dot(to, pen.width, pen.colour),
     }
 }
 
@@ -79,19 +65,14 @@ fn middle_arrow_head(from: (f64, f64), to: (f64, f64), length: f64) -> Option<Po
     arrow_head(start, tip, ARROW_LENGTH, 0.5)
 }
 
-pub(super) fn draw_symbol(
-    canvas: &Canvas,
-    colour: Colour,
-    symbol: Symbol,
-    (x, y): (f64, f64),
-) -> Result<(), ReportError> {
+pub(super) fn draw_symbol(canvas: &mut Canvas, colour: Colour, symbol: Symbol, (x, y): (f64, f64)) {
     match symbol {
-        Symbol::Dot => canvas.dot((x, y), 3.2, colour.into()),
+        Symbol::Dot => canvas.dot((x, y), 3.2, colour),
         Symbol::Ring => canvas.ring((x, y), SYMBOL, colour, 1.6),
         Symbol::Cross => {
             let (left, right, top, bottom) = (x - SYMBOL, x + SYMBOL, y - SYMBOL, y + SYMBOL);
-            canvas.line(&[(left, top), (right, bottom)], colour.into(), 1.8)?;
-            canvas.line(&[(left, bottom), (right, top)], colour.into(), 1.8)
+            canvas.line(&[(left, top), (right, bottom)], colour, 1.8);
+            canvas.line(&[(left, bottom), (right, top)], colour, 1.8);
         }
     }
 }

@@ -45,7 +45,7 @@ impl DesignLimits {
 /// |L|, |S| and |K S| of the loop with each plant, with the limits.
 ///
 /// # Errors
-/// When there is no loop, or the drawing library fails.
+/// When there is no loop.
 pub fn design_loop_svg(
     curves: &[LoopCurve],
     limits: DesignLimits,
@@ -148,7 +148,7 @@ fn ends(curves: &[LoopCurve]) -> [f64; 2] {
 /// The Nyquist plot of the loop with each plant, with the disc around -1 whose radius is the modulus margin.
 ///
 /// # Errors
-/// When there is no loop, or the drawing library fails.
+/// When there is no loop.
 pub fn design_nyquist_svg(
     curves: &[LoopCurve],
     limits: DesignLimits,

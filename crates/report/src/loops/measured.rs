@@ -74,7 +74,7 @@ impl MeasuredLoopPlot<'_> {
 /// the levels |L| = 1 and arg L = -180 deg are lines.
 ///
 /// # Errors
-/// When a response is invalid, or drawing fails.
+/// When a response is invalid.
 pub fn measured_bode_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
     let mut gains = level(magnitude(SCALE, &lines)?, &lines, 1.0);
@@ -109,7 +109,7 @@ fn level(chart: Chart, lines: &[Line], value: f64) -> Chart {
 /// unit circle, and the circle about -1 whose radius is the modulus margin.
 ///
 /// # Errors
-/// When a response is invalid, or drawing fails.
+/// When a response is invalid.
 pub fn measured_nyquist_svg(plot: &MeasuredLoopPlot<'_>) -> Result<String, ReportError> {
     let lines = plot.lines()?;
     let mut chart = plane("", REAL_PART, IMAGINARY_PART);
@@ -188,7 +188,7 @@ pub struct MeasuredSensitivityPlot<'a> {
 /// limit.
 ///
 /// # Errors
-/// When a response is invalid, or drawing fails.
+/// When a response is invalid.
 pub fn measured_sensitivity_svg(plot: &MeasuredSensitivityPlot<'_>) -> Result<String, ReportError> {
     let frequency_hz = &plot.sensitivity.frequency_hz;
     let model_loop = plot.model_loop.iter();

@@ -254,7 +254,7 @@ fn value_at(points: &[(f64, f64)], x: f64) -> f64 {
 /// The Nyquist plot of L with -1, as an SVG document: around -1, and at a smaller scale.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn loop_nyquist_svg(
     plot: &LoopPlot<'_>,
     title: &str,
@@ -318,7 +318,7 @@ fn nyquist(plot: &LoopPlot<'_>, heading: &str, middle: f64, half: f64) -> Chart 
 /// |S| and |T| with the limit of |S|, as an SVG document.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn sensitivity_svg(
     plot: &LoopPlot<'_>,
     title: &str,

@@ -27,7 +27,7 @@ const NOWHERE: (f64, f64) = (f64::NAN, f64::NAN);
 /// imaginary parts over the setting, as an SVG document.
 ///
 /// # Errors
-/// When there are no zeros, or drawing fails.
+/// When there are no zeros.
 pub fn locus_svg(
     locus: &Locus,
     vary: &str,

@@ -24,7 +24,7 @@ pub struct CnmpMap<'a> {
 /// of a cell.
 ///
 /// # Errors
-/// When the grid is empty, or drawing fails.
+/// When the grid is empty.
 pub fn map_svg(map: &CnmpMap<'_>, title: &str, subtitle: &str) -> Result<String, ReportError> {
     if map.operating_points.is_empty() || map.asymmetries.is_empty() {
         return Err(ReportError::NoTrace);

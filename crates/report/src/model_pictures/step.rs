@@ -18,7 +18,7 @@ const TIMES: usize = 2000;
 /// parts of the modes, as an SVG document.
 ///
 /// # Errors
-/// When drawing fails.
+/// When there is nothing to draw.
 pub fn model_step_svg(
     response: &StepResponse<'_>,
     features: &StepFeatures,

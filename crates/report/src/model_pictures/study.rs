@@ -21,7 +21,7 @@ const BAR_HEIGHT: f64 = 38.0;
 /// SVG document.
 ///
 /// # Errors
-/// When drawing fails.
+/// When there is nothing to draw.
 pub fn study_svg(answer: &Answer, title: &str, subtitle: &str) -> Result<String, ReportError> {
     let mut counted = vec![("Without damping", &answer.cnmp_pairs)];
     counted.extend(

@@ -16,7 +16,7 @@ const MIN_GAP_HZ: f64 = 1e-3;
 /// SVG document.
 ///
 /// # Errors
-/// When there are no values, or drawing fails.
+/// When there are no values.
 pub fn veering_svg(
     report: &VeeringReport,
     vary: &str,

@@ -32,7 +32,7 @@ impl BasicReport<'_> {
     /// The page as an HTML document.
     ///
     /// # Errors
-    /// When drawing fails.
+    /// When there is nothing to draw.
     pub fn page(&self) -> Result<String, ReportError> {
         let title = &self.config.title;
         let signals = if self.overview.current_a.is_empty() {

@@ -93,7 +93,7 @@ impl<'a> BenchRun<'a> {
     /// The report of the run.
     ///
     /// # Errors
-    /// When a response is invalid, or drawing fails.
+    /// When a response is invalid.
     pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
         let analysis = self.analysis;
         Ok(RecordReport {

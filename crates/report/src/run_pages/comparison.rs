@@ -26,7 +26,7 @@ const FRF_CAPTION: &str = "Measured responses, each with a band of two sigma.";
 /// The page of recordings as an HTML document, with the tables of their differences if they were compared.
 ///
 /// # Errors
-/// When there is nothing to draw, or drawing fails.
+/// When there is nothing to draw.
 pub fn comparison_page(
     runs: &[RunResult],
     comparison: Option<&Comparison>,

@@ -48,7 +48,7 @@ impl ControlReport<'_> {
     /// All plots that the run has data for.
     ///
     /// # Errors
-    /// When there is nothing to draw, or drawing fails.
+    /// When there is nothing to draw.
     pub fn plots(&self) -> Result<Vec<Plot>, ReportError> {
         let mut plots = vec![self.signals()?];
         if let Some(step) = self.run.measured_step() {

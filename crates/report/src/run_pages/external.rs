@@ -32,7 +32,7 @@ impl<'a> ExternalRecord<'a> {
     /// The report of the record.
     ///
     /// # Errors
-    /// When drawing fails.
+    /// When there is nothing to draw.
     pub fn report(&self) -> Result<RecordReport<'a>, ReportError> {
         let (analysis, input, output) = (self.analysis, self.input, self.output);
         let fit = analysis.fit.as_ref().ok();

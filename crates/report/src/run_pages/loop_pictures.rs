@@ -36,7 +36,7 @@ impl MeasuredLoop<'_> {
     /// Bode plot and Nyquist plot of L, and |S| and |T|, as SVG documents.
     ///
     /// # Errors
-    /// When a response is invalid, or drawing fails.
+    /// When a response is invalid.
     pub fn pictures(&self) -> Result<[String; 3], ReportError> {
         let (title, subtitle) = (self.title, self.subtitle);
         let peak = self

@@ -152,7 +152,7 @@ impl Plot {
 /// All plots that a record has data for.
 ///
 /// # Errors
-/// When a response is invalid, or drawing fails.
+/// When a response is invalid.
 pub fn plots(report: &RecordReport<'_>) -> Result<Vec<Plot>, ReportError> {
     let map = report.fit.map(|fit| pole_zero_map(report, fit));
     let curves = Curves::of(report);
