@@ -240,7 +240,8 @@ mod tests {
             return None;
         }
         let mut child = std::process::Command::new(std::env::current_exe().unwrap());
-        child.args(["--exact", &format!("signals::tests::{name}")]);
+        let (_, module) = module_path!().split_once("::").unwrap();
+        child.args(["--exact", &format!("{module}::{name}")]);
         child.args(["--nocapture", "--test-threads=1"]);
         Some(child.env(CHILD, "1").output().unwrap())
     }
