@@ -1,4 +1,4 @@
-//! u[k] = Ki sum(e) T - Kv (y[k] - y[k-1])/T: an integrator, and damping by the velocity.
+//! An integrator, and damping by the velocity: `u[k] = Ki T sum(e) - Kv (y[k] - y[k-1])/T`.
 
 use bench_control::{
     ControlDesign, ControlLaw, ControlLawSettings, LawInput, LinearLaw, StateSpace,
