@@ -1,48 +1,49 @@
 //! `bench calibrate`: scale, sign and offset of amplifier and probe, and the delay from command to reading.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::error::CliError;
-use super::help::with_setting;
-use super::options::{BenchOptions, given};
 use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, exit, run_text};
+use super::run_options::{RunCommand, RunOptions, exit, run_text};
 use super::table::wrap;
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
-use bench_base::quantity::Current;
-use bench_config::{Config, OptionSetting, Purpose, warnings};
+use bench_config::{Config, warnings};
 use bench_excitation::Extremes;
 use bench_experiment::calibration::{self, CalibrationPlan};
 use bench_experiment::{PlanLimits, RunSummary, Runner};
+use bench_order::{CalibrateOrder, Order};
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
 };
 
-/// Arguments of the command.
+/// The order, and where its recordings go.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
-    bench: BenchOptions,
+    order: CalibrateOrder,
     #[command(flatten)]
     pub run: RunOptions,
-    /// Largest current, in both directions
-    #[arg(long, value_name = "CURRENT", allow_hyphen_values = true,
-        help = with_setting("Largest current, in both directions", "calibrate.amplitude_a"))]
-    amplitude: Option<Current>,
-    /// Calibration file to write [default: in the folder of the recording, with the same name]
-    #[arg(long, value_name = "FILE")]
-    write: Option<PathBuf>,
-    /// Do not measure the delay by a chirp
-    #[arg(long)]
-    no_delay: bool,
     /// Only print what the runs would do: travel, current, duration; no motion
     #[arg(long)]
     plan: bool,
+}
+
+impl Args {
+    /// The command with its order.
+    pub(super) fn command(&self) -> RunCommand<'_> {
+        RunCommand {
+            order: Order::Calibrate(self.order.clone()),
+            bench: &self.order.bench,
+            rig: &self.order.rig,
+            options: &self.run,
+            is_plan: self.plan,
+        }
+    }
 }
 
 /// The JSON object of `--plan`: the extremes of both runs.
@@ -97,30 +98,32 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = config(args)?;
+    let config = args.order.config()?;
     let plan = calibration::check(&config)?;
-    check_target(args.write.as_deref())?;
+    check_target(args.order.write.as_deref())?;
     if args.plan {
         warn(&warnings(&config));
-        let report = PlanReport::new(&plan, &config, !args.no_delay);
-        let text = plan_text(&plan, &config, !args.no_delay);
-        print_result(args.bench.json, &report, |_| text)?;
+        let report = PlanReport::new(&plan, &config, !args.order.no_delay);
+        let text = plan_text(&plan, &config, !args.order.no_delay);
+        print_result(args.order.bench.json, &report, |_| text)?;
         return Ok(Outcome::Done);
     }
-    let setup = args.run.setup(&args.bench, &config)?;
-    if !args.bench.json {
-        print_text(&plan_text(&plan, &config, !args.no_delay))?;
+    let setup = args.command().setup(&config)?;
+    if !args.order.bench.json {
+        print_text(&plan_text(&plan, &config, !args.order.no_delay))?;
     }
     let progress = Progress::new("static steps");
     let line = ProgressLine::show(&progress);
     let made = calibration::run(
         &Runner::with_progress(setup, progress),
         &config,
-        !args.no_delay,
+        !args.order.no_delay,
     )?;
     drop(line);
     let report = report(args, made)?;
-    print_result(args.bench.json, &report, |report| text(report, &config))?;
+    print_result(args.order.bench.json, &report, |report| {
+        text(report, &config)
+    })?;
     Ok(match report.calibration {
         Some(_) => exit(&report.run),
         None => Outcome::Failed,
@@ -170,17 +173,6 @@ fn plan_text(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> Strin
     wrap(&steps, 0) + &chirp
 }
 
-fn config(args: &Args) -> Result<Config, CliError> {
-    let amplitude = args.amplitude.as_ref();
-    let amplitude = given("calibrate.amplitude_a", "--amplitude", amplitude);
-    let settings: Vec<OptionSetting> = amplitude
-        .into_iter()
-        .chain(args.run.seed.setting())
-        .collect();
-    let config = args.bench.load(Purpose::Chirp, &settings)?;
-    Ok(calibration::settings(config))
-}
-
 /// The report; a calibration is written to its file.
 fn report(args: &Args, made: calibration::CalibrationRun) -> Result<Report, CliError> {
     let (calibration, why) = match made.calibration {
@@ -202,7 +194,13 @@ fn report(args: &Args, made: calibration::CalibrationRun) -> Result<Report, CliE
 
 fn write(args: &Args, calibration: &Calibration, recording: &str) -> Result<String, CliError> {
     let beside = Path::new(recording).with_extension("calibration.toml");
-    let path = args.write.as_ref().unwrap_or(&beside).display().to_string();
+    let path = args
+        .order
+        .write
+        .as_ref()
+        .unwrap_or(&beside)
+        .display()
+        .to_string();
     calibration.write_new(path.as_ref()).map_err(|e| {
         CliError::Failed(format!(
             "cannot write {path}: {e}; choose another file with --write"

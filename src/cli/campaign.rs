@@ -9,86 +9,34 @@ use super::campaign_output::Report;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::operator::TerminalOperator;
-use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
-use super::value_range::{ValueRange, asymmetries, operating_points};
 use bench_base::atomic_file::write_atomic;
 use bench_base::progress::Progress;
-use bench_base::quantity::{OfRatio, OperatingPoint, Ratio, si};
+use bench_base::quantity::Ratio;
 use bench_config::{Config, Purpose, profiles};
 use bench_experiment::campaign::{
-    Campaign, CampaignOptions, Evaluation, Grid, Method, StageModel, Tolerances,
+    Campaign, CampaignOptions, Evaluation, Grid, StageModel, Tolerances,
 };
 use bench_experiment::{ExperimentError, Plan, Run, Runner, Setup, stop_on_signal};
+use bench_order::{BenchOptions, CampaignOrder};
 use bench_report::campaign_picture;
 use bench_rig::devices;
 
 /// The stage of section 5.2.2 was identified at 1 kHz; the sweep must end below half of that.
 const RATE: [&str; 2] = ["loop.rate_hz=1000.0", "chirp.stop_hz=450.0"];
 
-/// Arguments of the command.
+/// The order, and the folder of the campaign.
 #[derive(Clone, Debug, clap::Args)]
-#[command(mut_arg("operating_point", |arg| arg.hide(true)))]
-#[command(mut_arg("asymmetry", |arg| arg.hide(true)))]
 pub(super) struct Args {
     #[command(flatten)]
-    bench: BenchOptions,
-    #[command(flatten)]
-    seed: SeedOption,
+    order: CampaignOrder,
     #[command(flatten)]
     pub description: DescriptionOptions,
-    /// Operating points, FROM and TO with a unit: in % of the beam length (0%:8%:15) or as lengths (0mm:3.8mm:15)
-    #[arg(
-        long,
-        value_name = "FROM:TO:COUNT",
-        default_value = "0%:8%:15",
-        allow_hyphen_values = true,
-        value_parser = operating_points
-    )]
-    operating_points: ValueRange<OperatingPoint>,
-    /// Nominal mass asymmetries m2/m3 - 1 (without the asymmetry offset of the stage): -10%:10%:10 or -0.1:0.1:10
-    #[arg(
-        long,
-        value_name = "FROM:TO:COUNT",
-        default_value = "-10%:10%:10",
-        allow_hyphen_values = true,
-        value_parser = asymmetries
-    )]
-    asymmetries: ValueRange<Ratio>,
     /// Folder of the campaign; the same command continues an interrupted campaign
     #[arg(long, value_name = "DIR", default_value = "campaign")]
     out: PathBuf,
-    /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
-    #[arg(long)]
-    simulate: bool,
-    /// Make one chirp at each point, as configured (chirp.duration_s, ...), in place of short chirps until the verdict is certain
-    #[arg(long)]
-    single_chirp: bool,
-    /// Keep the recording of each chirp as well, up to 9 MB each
-    #[arg(long)]
-    keep_recordings: bool,
-    /// Accuracy with which an asymmetry can be set, for the recommendation [default: 0.25 g
-    /// divided by m3, half of a mass step of 0.5 g]
-    #[arg(long, value_name = "RATIO", value_parser = si::<OfRatio>)]
-    asymmetry_tolerance: Option<f64>,
-    /// Accuracy with which an operating point can be set, with a unit: in % of the beam length, or a length (0.1mm)
-    #[arg(long, value_name = "LENGTH", default_value = "0.2%", value_parser = OperatingPoint::with_unit)]
-    operating_point_tolerance: OperatingPoint,
-    /// Number of points simulated in parallel [default: one for each processor]; the results do not depend on it
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
-}
-
-impl Args {
-    fn method(&self) -> Method {
-        if self.single_chirp {
-            Method::SingleChirp
-        } else {
-            Method::UntilDecided
-        }
-    }
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
@@ -98,11 +46,11 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let on_devices = is_guided(args, &config);
     let options = CampaignOptions {
         on_devices,
-        keep_recordings: args.keep_recordings,
-        method: args.method(),
+        keep_recordings: args.order.keep_recordings,
+        method: args.order.method(),
     };
     let mut campaign = Campaign::open(&args.out, &grid, &config, options)?;
-    campaign.description = args.description.description(args.bench.profile());
+    campaign.description = args.description.description(args.order.bench.profile());
     show_state(&campaign);
     if !campaign.missing().is_empty() {
         measure(args, &mut campaign, &config, tolerances)?;
@@ -117,8 +65,8 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 fn grid(args: &Args, config: &Config) -> Result<Grid, CliError> {
     let beam_length_m = StageModel::of(config)?.stage.beam_length_m;
-    let points = args.operating_points.ratios(beam_length_m)?;
-    Ok(Grid::new(points, args.asymmetries.ratios()?, config)?)
+    let points = args.order.operating_points.ratios(beam_length_m)?;
+    Ok(Grid::new(points, args.order.asymmetries.ratios()?, config)?)
 }
 
 /// Measures the missing points until all are done, or a signal stops it.
@@ -205,10 +153,10 @@ fn show(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<(),
     let report = Report::of(
         evaluation,
         &picture,
-        args.bench.profile(),
-        args.description.description(args.bench.profile()),
+        args.order.bench.profile(),
+        args.description.description(args.order.bench.profile()),
     );
-    print_result(args.bench.json, &report, Report::text)
+    print_result(args.order.bench.json, &report, Report::text)
 }
 
 /// Draws the picture into the folder; returns its path.
@@ -225,16 +173,16 @@ fn draw(args: &Args, config: &Config, evaluation: &Evaluation<'_>) -> Result<Pat
 
 /// The configuration of the campaign, without the settings that the grid varies.
 fn config(args: &Args) -> Result<Config, CliError> {
-    if args.bench.operating_point.is_some() || args.bench.asymmetry.is_some() {
+    if args.order.bench.operating_point.is_some() || args.order.bench.asymmetry.is_some() {
         return Err(CliError::Usage(
             "--operating-point and --asymmetry cannot be fixed here, because a campaign varies both; leave them out, or use `bench chirp`".into(),
         ));
     }
-    let bench = at_rate_of_thesis(&args.bench);
-    let config = bench.load(Purpose::Chirp, args.seed.setting().as_slice())?;
+    let bench = at_rate_of_thesis(&args.order.bench);
+    let config = bench.load(Purpose::Chirp, args.order.seed.setting().as_slice())?;
     check_mode(args, &config)?;
     if is_guided(args, &config) {
-        args.seed.refuse_on_devices()?;
+        args.order.seed.refuse_on_devices()?;
         refuse_threads(args)?;
     }
     Ok(config)
@@ -242,7 +190,7 @@ fn config(args: &Args) -> Result<Config, CliError> {
 
 /// Refuses `--threads` on devices, where it has no effect.
 fn refuse_threads(args: &Args) -> Result<(), CliError> {
-    match args.threads {
+    match args.order.threads {
         None => Ok(()),
         Some(_) => Err(CliError::Usage(
             "--threads is valid only for the simulated stage, because on devices one point is measured after the other; leave it out, or add --simulate".into(),
@@ -277,14 +225,18 @@ fn check_mode(args: &Args, config: &Config) -> Result<(), CliError> {
 
 /// Whether an operator loads the stage.
 fn is_guided(args: &Args, config: &Config) -> bool {
-    !args.simulate && !devices::is_simulated(config)
+    !args.order.simulate && !devices::is_simulated(config)
 }
 
 fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, CliError> {
     let stage = StageModel::of(config)?.stage;
     let half_step = 0.5 * grid.mass_step(stage);
-    let asymmetry = args.asymmetry_tolerance.unwrap_or(half_step);
-    let operating_point = args.operating_point_tolerance.ratio(stage.beam_length_m);
+    let asymmetry = args.order.asymmetry_tolerance.as_ref();
+    let asymmetry = asymmetry.map_or(half_step, Ratio::si);
+    let operating_point = args
+        .order
+        .operating_point_tolerance
+        .ratio(stage.beam_length_m);
     let operating_point = operating_point.map_err(|error| CliError::Usage(error.to_string()))?;
     Ok(Tolerances {
         asymmetry: below_one(
@@ -297,7 +249,7 @@ fn tolerances(args: &Args, grid: &Grid, config: &Config) -> Result<Tolerances, C
             operating_point,
             &format!(
                 "--operating-point-tolerance is {}; give a length between 0 and the beam length, for example 0.2% or 0.1mm",
-                args.operating_point_tolerance
+                args.order.operating_point_tolerance
             ),
         )?,
     })
@@ -314,5 +266,5 @@ fn below_one(ratio: f64, refusal: &str) -> Result<f64, CliError> {
 
 fn threads(args: &Args) -> usize {
     let processors = || std::thread::available_parallelism().map_or(1, usize::from);
-    args.threads.map_or_else(processors, usize::from)
+    args.order.threads.map_or_else(processors, usize::from)
 }

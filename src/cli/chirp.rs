@@ -2,122 +2,60 @@
 
 use std::path::Path;
 
-use clap::ValueEnum;
 use serde::Serialize;
 
 use super::analysis_output::{self, analysis_failed, open_analyse_and_write, outcome};
 use super::error::CliError;
-use super::excitation_options::ExcitationOptions;
-use super::figure_options::ResponseFigureOptions;
-use super::help::with_setting;
-use super::options::{BenchOptions, given};
+use super::figure_options::magnitude_axis;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, close, run_text};
+use super::run_options::{RunCommand, RunOptions, close, run_text};
 use super::table::{labelled, wrap};
-use super::until_decided::{SequenceCommand, SequentialOptions};
+use super::until_decided::SequenceCommand;
 use bench_base::progress::Progress;
-use bench_base::quantity::Time;
-use bench_config::{Config, ExcitationKind, OptionSetting, Purpose, Sweep, warnings};
+use bench_config::{Config, warnings};
 use bench_excitation::Extremes;
 use bench_experiment::sequential::first_shot_config;
 use bench_experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
+use bench_order::{ChirpOrder, Order};
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_rig::devices;
 
-/// The bench and its excitation.
+/// The order, and where its recording goes.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
-    bench: BenchOptions,
+    order: ChirpOrder,
     #[command(flatten)]
     pub(super) run: RunOptions,
-    #[command(flatten)]
-    figures: ResponseFigureOptions,
-    /// Kind of excitation
-    #[arg(long, value_name = "KIND", help = with_setting("Kind of excitation", "excitation.kind"))]
-    excitation: Option<ExcitationKind>,
-    #[command(flatten)]
-    band: ExcitationOptions,
-    /// Length of the sweep
-    #[arg(long, value_name = "TIME", allow_hyphen_values = true,
-        help = with_setting("Length of the sweep", "chirp.duration_s"))]
-    duration: Option<Time>,
-    /// Frequency as a function of time
-    #[arg(long, value_name = "KIND", help = with_setting("Frequency as a function of time", "chirp.sweep"))]
-    sweep: Option<Sweep>,
-    #[command(flatten)]
-    sequential: SequentialOptions,
     /// Only print what the run would do: travel, current, heat, duration; no motion
     #[arg(long)]
     plan: bool,
 }
 
 impl Args {
-    fn settings(&self) -> Vec<OptionSetting> {
-        let duration = given("chirp.duration_s", "--duration", self.duration.as_ref());
-        let sweep = self.sweep.map(word);
-        let kind = self.excitation.map(word);
-        let mut settings = self.band.settings();
-        settings.extend(self.run.seed.setting());
-        settings.extend(duration);
-        settings.extend(sweep.map(|word| word_setting("chirp.sweep", "--sweep", word)));
-        settings.extend(kind.map(|word| word_setting("excitation.kind", "--excitation", word)));
-        settings
-    }
-
-    /// The configuration with the requested amplitude over frequency.
-    fn config(&self) -> Result<Config, CliError> {
-        let config = self.bench.load(Purpose::Chirp, &self.settings())?;
-        self.refuse_unused(&config)?;
-        self.band.shaped(config)
+    /// The command with its order.
+    pub(super) fn command(&self) -> RunCommand<'_> {
+        RunCommand {
+            order: Order::Chirp(self.order.clone()),
+            bench: &self.order.bench,
+            rig: &self.order.rig,
+            options: &self.run,
+            is_plan: self.plan,
+        }
     }
 
     fn sequence(&self) -> SequenceCommand<'_> {
         SequenceCommand {
-            bench: &self.bench,
-            run: &self.run,
-            magnitude_axis: self.figures.magnitude_axis(),
+            command: self.command(),
+            magnitude_axis: magnitude_axis(self.order.figures),
         }
     }
-
-    /// Refuses options of a chirp that have no effect on another kind of excitation.
-    fn refuse_unused(&self, config: &Config) -> Result<(), CliError> {
-        let kind = config.excitation.kind;
-        if kind == ExcitationKind::Chirp {
-            return Ok(());
-        }
-        let (name, chosen) = (kind.name(), config.chosen_excitation());
-        let key = chosen.design.length(&chosen.shared).key;
-        let unused = match (&self.duration, self.sweep) {
-            (Some(duration), _) => {
-                format!(
-                    "--duration {duration} is the length of a chirp, not of `{name}`; use --set {key}=N"
-                )
-            }
-            (None, Some(_)) => format!(
-                "--sweep goes with --excitation chirp only, not with `{name}`; leave it out"
-            ),
-            (None, None) => return Ok(()),
-        };
-        Err(CliError::Usage(unused))
-    }
-}
-
-fn word_setting(key: &str, option: &str, word: String) -> OptionSetting {
-    let option = format!("{option} {word}");
-    OptionSetting::new(key, word, option)
-}
-
-/// The word of a value in help and settings.
-fn word(value: impl ValueEnum) -> String {
-    let value = value.to_possible_value();
-    value.map_or(String::new(), |value| value.get_name().to_string())
 }
 
 /// The JSON object of the command.
@@ -132,8 +70,8 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let base = args.config()?;
-    let max_motion_s = args.sequential.max_motion_s(&base)?;
+    let base = args.order.config()?;
+    let max_motion_s = args.order.sequential.max_motion_s(&base)?;
     let config = match max_motion_s {
         Some(_) => first_shot_config(&base)?,
         None => base.clone(),
@@ -141,10 +79,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let expected = predicted_extremes(&config)?;
     if args.plan {
         warn(&warnings(&config));
-        warn(&check_calibration(&config, args.run.stage(&config))?);
+        warn(&check_calibration(&config, args.order.rig.stage(&config))?);
         let mut plan = ExcitationPlan::new(&config, expected);
-        plan.motor = args.run.motor_summary(&Plan::chirp(config))?;
-        print_result(args.bench.json, &plan, plan_output::text)?;
+        plan.motor = args.order.rig.motor_summary(&Plan::chirp(config))?;
+        print_result(args.order.bench.json, &plan, plan_output::text)?;
         return Ok(Outcome::Done);
     }
     match max_motion_s {
@@ -155,14 +93,17 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 
 /// Runs the excitation and analyses its recording.
 fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, CliError> {
-    if !args.bench.json {
+    if !args.order.bench.json {
         print_text(&plan_text(config, &expected))?;
     }
-    let mut run = args
-        .run
-        .run(&args.bench, &Plan::chirp(config.clone()), "chirp")?;
+    let mut run = args.command().run(&Plan::chirp(config.clone()), "chirp")?;
     let summary = RunSummary::of(&mut run)?;
-    let made = outputs(&summary, &run.path, config, args.figures.magnitude_axis())?;
+    let made = outputs(
+        &summary,
+        &run.path,
+        config,
+        magnitude_axis(args.order.figures),
+    )?;
     let report = Report {
         run: summary,
         expected_travel_m: expected.travel_m,
@@ -170,7 +111,7 @@ fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, 
         made,
     };
     let text = run_text(&report.run, config) + &analysis_output::text(&report.made);
-    close(run, &report, args.bench.json, &text)?;
+    close(run, &report, args.order.bench.json, &text)?;
     Ok(outcome(&report.run, &report.made))
 }
 

@@ -2,18 +2,17 @@
 
 use clap::{CommandFactory, Parser, Subcommand};
 
-use super::arguments::arguments;
-use super::description_options::DescriptionOptions;
 use super::error::{CliError, ErrorReport};
-use super::help::GLOSSARY;
 use super::outcome::Outcome;
 use super::output::{print_json, print_note};
+use super::run_options::RunCommand;
 use super::{
     calibrate, campaign, chirp, compare, completions, config, control, controller, doctor, emulate,
     export, identify, linearity, margins, model, recover, remote, replay, report, resume, serve,
     tune,
 };
 use bench_experiment::survive_file_size_limit;
+use bench_order::GLOSSARY;
 
 /// Identifies and controls a precision-motion stage.
 ///
@@ -83,14 +82,13 @@ enum Command {
 }
 
 impl Command {
-    /// Name, note and operator, of a command that makes runs.
-    fn description(&self) -> Option<&DescriptionOptions> {
+    /// A command that makes runs and can be carried out by the daemon of another machine.
+    fn run_command(&self) -> Option<RunCommand<'_>> {
         match self {
-            Command::Chirp(args) => Some(&args.run.description),
-            Command::Linearity(args) => Some(&args.run.description),
-            Command::Control(args) => Some(&args.run.description),
-            Command::Calibrate(args) => Some(&args.run.description),
-            Command::Campaign(args) => Some(&args.description),
+            Command::Chirp(args) => Some(args.command()),
+            Command::Linearity(args) => Some(args.command()),
+            Command::Control(args) => Some(args.command()),
+            Command::Calibrate(args) => Some(args.command()),
             _ => None,
         }
     }
@@ -110,14 +108,12 @@ pub fn main() -> Outcome {
 
 /// Runs a parsed command line in this process, or at the daemon that it names.
 fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
-    let arguments: Vec<String> = arguments().collect();
-    match remote::target(&arguments)? {
-        Some(target) if !matches!(cli.command, Command::Resume(_)) => {
-            let description = cli.command.description().cloned().unwrap_or_default();
-            remote::carry_out(&target, &arguments, &description)
-        }
-        Some(_) | None => run(cli),
+    if let Some(command) = cli.command.run_command()
+        && let Some(target) = command.remote()?
+    {
+        return remote::carry_out(&target, &command.order, &command.options.description);
     }
+    run(cli)
 }
 
 fn failed(error: &CliError, json: bool) -> Outcome {

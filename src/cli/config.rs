@@ -8,12 +8,12 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
 use bench_config::{Config, Purpose, profiles};
 use bench_experiment::check_named_files;
+use bench_order::{BenchOptions, SeedOption};
 use bench_settings::files::{find, own};
 
 /// What to do with the configuration.
@@ -52,7 +52,7 @@ struct ConfigArgs {
 
 impl ConfigArgs {
     fn load(&self, purpose: Purpose) -> Result<Config, CliError> {
-        self.bench.load(purpose, self.seed.setting().as_slice())
+        Ok(self.bench.load(purpose, self.seed.setting().as_slice())?)
     }
 }
 

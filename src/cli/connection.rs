@@ -3,12 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::arguments::arguments;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
+use super::remote::tcp_target;
 use bench_daemon::client::{DaemonOwner, rig_of, running_daemon};
-use bench_daemon::{Command, OnDisconnect, RunRequest};
+use bench_daemon::http_client::Target;
+use bench_daemon::{OnDisconnect, RunRequest};
 use bench_experiment::{RigOwner, Stage};
+use bench_order::Order;
 
 /// Where runs are made.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -23,10 +25,20 @@ pub(super) struct ConnectOption {
 }
 
 impl ConnectOption {
+    /// The daemon at an address, which carries out the whole command; `None` for a daemon of this machine or this process.
+    pub fn remote(&self) -> Result<Option<Target>, CliError> {
+        let connect = self.connect.as_deref();
+        match connect.and_then(|url| url.strip_prefix(SCHEME)) {
+            Some(address) => Ok(Some(tcp_target(address, self.token_file.as_deref())?)),
+            None => Ok(None),
+        }
+    }
+
     /// The daemon that makes the runs; `None` for this process.
     pub fn owner(
         &self,
         stage: Stage,
+        order: &Order,
         description: &DescriptionOptions,
     ) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
         let socket = match self.connect.as_deref() {
@@ -37,8 +49,9 @@ impl ConnectOption {
             Some(path) => Some(required(PathBuf::from(path), stage)?),
             None => running_daemon().filter(|socket| rig_of(socket).ok() == Some(stage)),
         };
-        let owner = socket
-            .map(|socket| DaemonOwner::new(socket, request(description), description.operator()));
+        let owner = socket.map(|socket| {
+            DaemonOwner::new(socket, request(order, description), description.operator())
+        });
         Ok(owner.map(|owner| Arc::new(owner) as Arc<dyn RigOwner>))
     }
 }
@@ -75,18 +88,31 @@ fn name(stage: Stage) -> &'static str {
     }
 }
 
-/// The command line of this process, for the queue of the daemon.
-fn request(description: &DescriptionOptions) -> RunRequest {
-    let mut words = arguments();
-    let named = words.next().unwrap_or_default();
-    let command = Command::ALL
-        .into_iter()
-        .find(|command| command.name() == named);
+/// The order, for the queue of the daemon.
+fn request(order: &Order, description: &DescriptionOptions) -> RunRequest {
     RunRequest {
-        command: command.unwrap_or(Command::Chirp),
-        args: words.collect(),
+        order: order.clone(),
         name: description.name().into(),
         note: description.note().into(),
         on_disconnect: OnDisconnect::Default,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_an_address_is_another_machine() {
+        let option = |connect: Option<&str>| ConnectOption {
+            connect: connect.map(String::from),
+            token_file: None,
+        };
+        for local in [Some("none"), Some("a.sock"), None] {
+            assert!(matches!(option(local).remote(), Ok(None)), "{local:?}");
+        }
+        let found = option(Some("http://lab:8020")).remote();
+        let found = found.expect("an address");
+        assert!(matches!(found, Some(Target::Tcp { address, .. }) if address == "lab:8020"));
     }
 }

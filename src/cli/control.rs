@@ -4,14 +4,13 @@ use serde::Serialize;
 
 use super::analysis_output::outcome;
 use super::chirp::outputs;
-pub(super) use super::control_options::Args;
 use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
-use super::run_options::{close, exit};
-use bench_config::{Purpose, warnings};
+use super::run_options::{RunCommand, RunOptions, close, exit};
+use bench_config::warnings;
 use bench_control::{ClosedLoop, Margins, listed_poles};
 use bench_excitation::Extremes;
 use bench_experiment::evidence::{Evidence, require_evidence};
@@ -19,21 +18,48 @@ use bench_experiment::{
     CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
     predicted_step, require_margins,
 };
+use bench_order::{ControlOrder, Order, defaults_help};
 use bench_report::MagnitudeAxis;
 
+/// The order, and where its recording goes.
+#[derive(Clone, Debug, clap::Args)]
+#[command(after_help = defaults_help())]
+pub(super) struct Args {
+    #[command(flatten)]
+    order: ControlOrder,
+    #[command(flatten)]
+    pub run: RunOptions,
+    /// Only print what the run would do: margins, travel, current, heat, duration; no motion
+    #[arg(long)]
+    plan: bool,
+}
+
+impl Args {
+    /// The command with its order.
+    pub(super) fn command(&self) -> RunCommand<'_> {
+        RunCommand {
+            order: Order::Control(Box::new(self.order.clone())),
+            bench: &self.order.bench,
+            rig: &self.order.rig,
+            options: &self.run,
+            is_plan: self.plan,
+        }
+    }
+}
+
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let config = args.bench.load(Purpose::Control, &args.settings()?)?;
+    let config = args.order.config()?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
-    let stage = args.run.stage(&config);
+    let stage = args.order.rig.stage(&config);
     require_margins(&config, &margins, stage)?;
-    let plan = Plan::control(config.clone())?.with_override(args.override_reason.clone());
+    let plan = Plan::control(config.clone())?.with_override(args.order.override_reason.clone());
     let evidence = require_evidence(&plan, stage, None)?;
     let predicted = predicted(margins, &plan, &closed_loop);
     if args.plan {
         return print_plan(args, &plan, predicted, evidence);
     }
-    if !args.bench.json {
+    if !args.order.bench.json {
         let poles = listed_poles(&closed_loop.poles(), config.servo.rate_hz);
         let text = PlanText {
             plan: &plan,
@@ -43,10 +69,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         };
         print_text(&text.to_string())?;
     }
-    let mut run = args.run.run(&args.bench, &plan, "control")?;
-    let report = report(&mut run, &plan, predicted, evidence, args.no_report)?;
+    let mut run = args.command().run(&plan, "control")?;
+    let report = report(&mut run, &plan, predicted, evidence, args.order.no_report)?;
     let text = control_output::text(&report, &config);
-    close(run, &report, args.bench.json, &text)?;
+    close(run, &report, args.order.bench.json, &text)?;
     Ok(match &report.made {
         Some(made) => outcome(&report.run, made),
         None => exit(&report.run),
@@ -83,7 +109,7 @@ fn print_plan(
         reference: control_output::reference_text(config),
         expected: plan.loop_extremes()?,
         limits: PlanLimits::of(config),
-        motor: args.run.motor_summary(plan)?,
+        motor: args.order.rig.motor_summary(plan)?,
         probe: config.probe.device.scale_text(),
         predicted,
         command: plan.command_summary().cloned(),
@@ -91,7 +117,7 @@ fn print_plan(
     };
     warn(&warnings(config));
     warn(&report.evidence.defects);
-    print_result(args.bench.json, &report, |report| {
+    print_result(args.order.bench.json, &report, |report| {
         let command = report.command.as_ref().map(control_output::command_text);
         let text = plan_output::control_text(
             &(report.reference.clone() + &command.unwrap_or_default()),

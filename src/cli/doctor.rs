@@ -4,12 +4,12 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::table::wrap;
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
 use bench_config::{Config, Purpose};
+use bench_order::BenchOptions;
 
 /// Configuration and folder of the runs
 #[derive(Clone, Debug, clap::Args)]

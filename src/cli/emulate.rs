@@ -10,12 +10,12 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use super::error::CliError;
-use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::{print_json, print_message, print_note};
 use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
 use bench_config::{Config, OptionSetting, Purpose};
 use bench_experiment::StopSignals;
+use bench_order::{BenchOptions, SeedOption};
 use bench_rig::emulator::{
     EmulatedDevice, EmulatedDevices, Emulator, EmulatorError, FaultRequest, FaultSchedule,
     LogEntry, PlannedFault, ProbeEndpoint, fault,

@@ -1,10 +1,8 @@
 //! Why a command failed.
 
-use clap::error::ContextKind;
 use serde::Serialize;
 
 use super::outcome::Outcome;
-use bench_base::remedy;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_control::tuning::TuneError;
@@ -19,6 +17,7 @@ use bench_experiment::{
 use bench_experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use bench_identify::IdentifyError;
 use bench_identify::external_csv::ExternalCsvError;
+use bench_order::{ColumnsError, refused_option, usage_message};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;
 use bench_rig::calibration::CalibrationError;
@@ -87,6 +86,15 @@ experiment_errors!(
     ConfigError,
     ControllerError,
 );
+
+impl From<ColumnsError> for CliError {
+    fn from(error: ColumnsError) -> Self {
+        match error {
+            ColumnsError::Options(error) => error.into(),
+            ColumnsError::File(error) => error.into(),
+        }
+    }
+}
 
 impl From<CampaignError> for CliError {
     fn from(error: CampaignError) -> Self {
@@ -166,9 +174,11 @@ impl ErrorReport {
 
     /// The report of a command line that cannot be parsed.
     pub(super) fn of_usage(error: &clap::Error) -> ErrorReport {
-        let argument = error.get(ContextKind::InvalidArg);
-        let place = argument.map(|argument| argument.to_string());
-        ErrorReport::new(usage_message(error), ErrorKind::Usage, place)
+        ErrorReport::new(
+            usage_message(error),
+            ErrorKind::Usage,
+            refused_option(error),
+        )
     }
 
     /// The text of the error.
@@ -180,26 +190,5 @@ impl ErrorReport {
         ErrorReport {
             error: ErrorObject::new(message, kind, place),
         }
-    }
-}
-
-/// The first paragraph of the parser's message, on one line and with a remedy: the messages of our own value parsers have
-/// one already.
-fn usage_message(error: &clap::Error) -> String {
-    let text = error.to_string();
-    let paragraph = text.split("\n\n").next().unwrap_or_default();
-    let words: Vec<&str> = paragraph.split_whitespace().collect();
-    let what = words.join(" ");
-    let what = what.strip_prefix("error: ").unwrap_or(&what);
-    let suggestions = [
-        ContextKind::SuggestedArg,
-        ContextKind::SuggestedSubcommand,
-        ContextKind::SuggestedValue,
-    ];
-    let suggested = suggestions.into_iter().find_map(|kind| error.get(kind));
-    match (remedy::split(what).1, suggested) {
-        (Some(_), _) => what.to_string(),
-        (None, Some(suggested)) => remedy::join(what, &format!("use {suggested}, or see --help")),
-        (None, None) => remedy::join(what, "see --help for the arguments"),
     }
 }

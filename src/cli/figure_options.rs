@@ -5,23 +5,15 @@ use std::path::{Path, PathBuf};
 use super::columns::cannot_write;
 use super::error::CliError;
 use bench_base::atomic_file::write_atomic;
+use bench_order::ResponseFigureOptions;
 use bench_report::{MagnitudeAxis, Picture, ReportError};
 
-/// How the responses of a run are drawn.
-#[derive(Clone, Copy, Debug, Default, clap::Args)]
-pub(super) struct ResponseFigureOptions {
-    /// Draw magnitudes of responses in dB [default: on a logarithmic axis]
-    #[arg(long)]
-    db: bool,
-}
-
-impl ResponseFigureOptions {
-    pub fn magnitude_axis(self) -> MagnitudeAxis {
-        if self.db {
-            MagnitudeAxis::Decibels
-        } else {
-            MagnitudeAxis::Logarithmic
-        }
+/// The axis of the magnitudes of responses.
+pub(super) fn magnitude_axis(options: ResponseFigureOptions) -> MagnitudeAxis {
+    if options.db {
+        MagnitudeAxis::Decibels
+    } else {
+        MagnitudeAxis::Logarithmic
     }
 }
 

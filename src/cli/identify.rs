@@ -6,9 +6,8 @@ use serde::Serialize;
 
 use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
-use super::figure_options::ResponseFigureOptions;
-use super::help::GLOSSARY;
-use super::identify_external::{self, ExternalOptions};
+use super::figure_options::magnitude_axis;
+use super::identify_external;
 use super::outcome::Outcome;
 use super::output::print_result;
 use super::progress::ProgressLine;
@@ -18,25 +17,19 @@ use bench_config::Config;
 use bench_experiment::{
     Description, Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals,
 };
+use bench_order::{GLOSSARY, IdentifyOrder};
 use bench_recording::Recording;
 use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 
-/// The recording, and where the results go.
+/// The order, and where the results go.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = GLOSSARY)]
 pub(super) struct Args {
-    /// The recording (MCAP) of a chirp, or an external CSV with --input and --output
-    recording: PathBuf,
     #[command(flatten)]
-    table: ExternalOptions,
+    order: IdentifyOrder,
     /// Output folder [default: the folder of the input file]
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    figures: ResponseFigureOptions,
-    /// Print one JSON object on standard output and nothing else
-    #[arg(long)]
-    json: bool,
 }
 
 /// The JSON object of the command.
@@ -58,22 +51,22 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    if args.table.selects_csv(&args.recording) {
+    if args.order.table.selects_csv(&args.order.recording) {
         return identify_external::run(
-            &args.recording,
+            &args.order.recording,
             args.out.as_deref(),
-            &args.table,
-            args.figures.magnitude_axis(),
-            args.json,
+            &args.order.table,
+            magnitude_axis(args.order.figures),
+            args.order.json,
         );
     }
-    let (recording, signals) = open_with_signals(&args.recording)?;
+    let (recording, signals) = open_with_signals(&args.order.recording)?;
     warn_of_unchecked(&recording);
     let plan = Plan::of(&recording)?;
-    check_kind(plan.kind, &args.recording)?;
+    check_kind(plan.kind, &args.order.recording)?;
     let made = analysed(&recording, signals, &plan.config, args)?;
-    let report = Report::new(&recording, &args.recording, made);
-    print_result(args.json, &report, |report| report.text(&plan.config))?;
+    let report = Report::new(&recording, &args.order.recording, made);
+    print_result(args.order.json, &report, |report| report.text(&plan.config))?;
     Ok(if report.is_whole() {
         Outcome::Done
     } else {
@@ -117,10 +110,10 @@ fn analysed(
     config: &Config,
     args: &Args,
 ) -> Result<AnalysisOutputs, CliError> {
-    let beside = in_folder(args.out.as_deref(), &args.recording)?;
+    let beside = in_folder(args.out.as_deref(), &args.order.recording)?;
     let results = ResultFiles {
         beside: &beside,
-        existing: existing_file(&beside, &args.recording),
+        existing: existing_file(&beside, &args.order.recording),
     };
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);
@@ -129,7 +122,7 @@ fn analysed(
         signals,
         config,
         results,
-        args.figures.magnitude_axis(),
+        magnitude_axis(args.order.figures),
         &progress,
     )
 }

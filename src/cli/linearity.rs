@@ -1,6 +1,5 @@
 //! `bench linearity`: the same multisine at several amplitudes.
 
-use std::ops::RangeInclusive;
 use std::path::Path;
 
 use serde::Serialize;
@@ -9,81 +8,45 @@ use super::analysis_output;
 use super::analysis_output::outcome;
 use super::chirp::outputs;
 use super::error::CliError;
-use super::excitation_options::ExcitationOptions;
-use super::figure_options::ResponseFigureOptions;
+use super::figure_options::magnitude_axis;
 use super::linearity_output;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, run_text};
+use super::run_options::{RunCommand, RunOptions, run_text};
 use super::table::{labelled, table, wrap};
 use bench_base::progress::Progress;
-use bench_base::quantity::Ratio;
-use bench_config::{Config, OptionSetting, Purpose};
+use bench_config::Config;
 use bench_excitation::Extremes;
 use bench_experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
 use bench_experiment::{Run, RunSummary, Runner};
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use bench_order::{LinearityOrder, Order};
 use bench_report::MagnitudeAxis;
 use bench_report::number::interval;
 use bench_report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
 
-/// Odd lines, one of each group of four omitted.
-const LINES: [(&str, &str); 2] = [
-    ("excitation.kind", "multisine"),
-    ("multisine.lines", "odd_random"),
-];
-/// Largest number of amplitudes.
-const MAX_AMPLITUDES: usize = 10;
-/// Allowed ratios of the planned amplitude.
-const SCALES: RangeInclusive<f64> = 1e-6..=1e6;
-
-/// Arguments of the command.
+/// The order, and where its recordings go.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct Args {
     #[command(flatten)]
-    bench: BenchOptions,
+    order: LinearityOrder,
     #[command(flatten)]
     pub run: RunOptions,
-    #[command(flatten)]
-    band: ExcitationOptions,
-    #[command(flatten)]
-    figures: ResponseFigureOptions,
-    /// Amplitudes as ratios of the planned amplitude; one run for each ratio
-    #[arg(
-        long,
-        value_name = "RATIO,RATIO,...",
-        value_delimiter = ',',
-        default_value = "0.25,0.5,1",
-        allow_hyphen_values = true
-    )]
-    scales: Vec<Ratio>,
 }
 
 impl Args {
-    /// The ratios, rising.
-    fn scales(&self) -> Result<Vec<f64>, CliError> {
-        let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
-        scales.sort_by(f64::total_cmp);
-        if are_amplitudes(&scales) {
-            Ok(scales)
-        } else {
-            Err(CliError::Usage(format!(
-                "--scales {scales:?} is not a list of amplitudes; give two to {MAX_AMPLITUDES} different ratios from 0.000001 to 1000000, for example 0.5,1,2"
-            )))
+    /// The command with its order.
+    pub(super) fn command(&self) -> RunCommand<'_> {
+        RunCommand {
+            order: Order::Linearity(self.order.clone()),
+            bench: &self.order.bench,
+            rig: &self.order.rig,
+            options: &self.run,
+            is_plan: false,
         }
-    }
-
-    /// The settings with the planned amplitude.
-    fn planned(&self) -> Result<Config, CliError> {
-        let lines = LINES.map(|(key, value)| OptionSetting::new(key, value, "bench linearity"));
-        let mut settings = [&lines[..], &self.band.settings()].concat();
-        settings.extend(self.run.seed.setting());
-        let config = self.bench.load(Purpose::Chirp, &settings)?;
-        self.band.shaped(config)
     }
 }
 
@@ -120,9 +83,9 @@ impl AmplitudeRun {
 }
 
 pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let planned = args.planned()?;
-    let plans = plan_amplitudes(&planned, &args.scales()?)?;
-    if !args.bench.json {
+    let planned = args.order.planned()?;
+    let plans = plan_amplitudes(&planned, &args.order.amplitude_ratios()?)?;
+    if !args.order.bench.json {
         print_text(&plan_text(&plans))?;
     }
     let runs = measure(args, &plans)?;
@@ -130,7 +93,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let band_hz = planned.chirp.band_hz();
     let mut report = report(runs, band_hz, outcome != Outcome::Failed);
     report.overview = overview(&report, &plans)?;
-    print_result(args.bench.json, &report, |report| text(report, &plans))?;
+    print_result(args.order.bench.json, &report, |report| {
+        text(report, &plans)
+    })?;
     Ok(outcome)
 }
 
@@ -153,25 +118,18 @@ fn expected_text(scale: f64, extremes: &Extremes) -> String {
     )
 }
 
-/// Whether sorted ratios are different, allowed, and of an allowed number.
-fn are_amplitudes(scales: &[f64]) -> bool {
-    let are_allowed = scales.iter().all(|scale| SCALES.contains(scale));
-    let are_rising = scales.windows(2).all(|pair| pair[0] < pair[1]);
-    are_allowed && are_rising && (2..=MAX_AMPLITUDES).contains(&scales.len())
-}
-
 /// Runs and analyses each amplitude, until a run fails.
 fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, CliError> {
     let Some(first) = plans.first() else {
         return Ok(Vec::new());
     };
-    let setup = args.run.setup(&args.bench, &first.config)?;
+    let setup = args.command().setup(&first.config)?;
     let progress = Progress::new("linearity");
     let _line = ProgressLine::show(&progress);
     let runner = Runner::with_progress(setup, progress);
     let mut runs = Vec::new();
     linearity::run(&runner, plans, &mut |plan, run| {
-        let finished = finish(plan, run, args.figures.magnitude_axis())?;
+        let finished = finish(plan, run, magnitude_axis(args.order.figures))?;
         let is_failed = finished.outcome() == Outcome::Failed;
         runs.push(finished);
         Ok::<bool, CliError>(!is_failed)

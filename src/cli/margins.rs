@@ -5,12 +5,9 @@ use std::path::PathBuf;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::controller_choice::ControllerChoice;
 use super::error::CliError;
 use super::figure_options::PictureOptions;
-use super::help::GLOSSARY;
 use super::measured_margins::{self, Measured};
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{no_json, print_result, warn};
 use super::table::{table, wrap};
@@ -18,6 +15,7 @@ use bench_base::decimal::Decimal;
 use bench_config::{Config, ProbeSettings, Purpose};
 use bench_control::{ClosedLoop, Margins, Pole, listed_poles};
 use bench_experiment::{LoopModel, Stage, check_calibration, closed_loop};
+use bench_order::{BenchOptions, ControllerChoice, GLOSSARY};
 use bench_report::{
     LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
 };

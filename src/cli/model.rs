@@ -20,9 +20,8 @@ use clap::Subcommand;
 use serde::Serialize;
 
 use super::error::CliError;
-use super::help::GLOSSARY;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
+use bench_order::{BenchOptions, GLOSSARY};
 use bench_thesis::veering::report::VeeringPoint;
 
 /// What to compute.

@@ -1,5 +1,7 @@
 //! `--connect http://HOST:PORT`: the command is carried out by the daemon of another machine, and prints here what it prints there.
 
+use std::path::Path;
+
 use bytes::{Buf, Bytes};
 use http_body_util::BodyExt;
 use hyper::Method;
@@ -8,14 +10,14 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{Duration, interval};
 
-use super::connection::SCHEME;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
 use super::outcome::Outcome;
 use super::output::{print_message, print_note, print_text};
 use bench_daemon::http_client::{Ask, HttpError, Target, json as answer, send};
-use bench_daemon::{Hold, OutputPiece};
+use bench_daemon::{Hold, OnDisconnect, OutputPiece, RunRequest};
 use bench_experiment::StopSignals;
+use bench_order::Order;
 
 /// Period of the renewals of the arm lease.
 const RENEWAL: Duration = Duration::from_secs(3);
@@ -23,18 +25,8 @@ const RENEWAL: Duration = Duration::from_secs(3);
 /// Variable of the environment with the token.
 const TOKEN_VARIABLE: &str = "BENCH_TOKEN";
 
-/// The daemon that `--connect` names, if it is at an address.
-pub(super) fn target(arguments: &[String]) -> Result<Option<Target>, CliError> {
-    let (_, value) = split(arguments, "--connect");
-    let Some(address) = value.as_deref().and_then(|url| url.strip_prefix(SCHEME)) else {
-        return Ok(None);
-    };
-    let (_, file) = split(arguments, "--token-file");
-    Ok(Some(tcp_target(address, file.as_deref())?))
-}
-
 /// The daemon at `HOST:PORT`, with the token of a file or of the environment.
-pub(super) fn tcp_target(address: &str, token_file: Option<&str>) -> Result<Target, CliError> {
+pub(super) fn tcp_target(address: &str, token_file: Option<&Path>) -> Result<Target, CliError> {
     require_plain_address(address)?;
     Ok(Target::tcp(address, token(token_file)?))
 }
@@ -51,55 +43,26 @@ fn require_plain_address(address: &str) -> Result<(), CliError> {
 }
 
 /// The token in the file, or that of the environment.
-fn token(file: Option<&str>) -> Result<Option<String>, CliError> {
+fn token(file: Option<&Path>) -> Result<Option<String>, CliError> {
     let Some(file) = file else {
         return Ok(std::env::var(TOKEN_VARIABLE).ok());
     };
     let text = std::fs::read_to_string(file).map_err(|error| {
         CliError::Usage(format!(
-            "--token-file {file}: {error}; give a file with the token of the daemon, which `bench serve --listen` names when it starts"
+            "--token-file {}: {error}; give a file with the token of the daemon, which `bench serve --listen` names when it starts",
+            file.display()
         ))
     })?;
     Ok(Some(text.trim().into()))
 }
 
-/// The arguments without an option such as `--connect`, and its value.
-fn split(arguments: &[String], option: &str) -> (Vec<String>, Option<String>) {
-    let mut rest = Vec::new();
-    let mut value = None;
-    let mut all = arguments.iter();
-    while let Some(argument) = all.next() {
-        match argument.strip_prefix(option) {
-            Some("") => value = all.next().cloned(),
-            Some(given) if given.starts_with('=') => value = Some(given[1..].to_string()),
-            _ => rest.push(argument.clone()),
-        }
-    }
-    (rest, value)
-}
-
-/// The arguments without the options that the request of the daemon or its arm lease contains.
-fn command_line(arguments: &[String]) -> Vec<String> {
-    let sent_apart = [
-        "--connect",
-        "--token-file",
-        "--name",
-        "--note",
-        "--operator",
-    ];
-    sent_apart
-        .iter()
-        .fold(arguments.to_vec(), |rest, option| split(&rest, option).0)
-}
-
-/// Carries out the command line of this process at a daemon.
+/// Carries out an order at a daemon.
 pub(super) fn carry_out(
     target: &Target,
-    arguments: &[String],
+    order: &Order,
     description: &DescriptionOptions,
 ) -> Result<Outcome, CliError> {
-    let arguments = command_line(arguments);
-    in_runtime(target, carried_out(target, &arguments, description))
+    in_runtime(target, carried_out(target, order, description))
 }
 
 /// Waits for requests to a daemon.
@@ -116,12 +79,9 @@ pub(super) fn in_runtime<T>(
 
 async fn carried_out(
     target: &Target,
-    arguments: &[String],
+    order: &Order,
     description: &DescriptionOptions,
 ) -> Result<Outcome, CliError> {
-    let (command, args) = arguments
-        .split_first()
-        .map_or(("", &[][..]), |(first, rest)| (first.as_str(), rest));
     let lease = ask(
         target,
         Method::POST,
@@ -131,18 +91,18 @@ async fn carried_out(
     )
     .await?;
     let lease = lease["lease"].as_str().unwrap_or_default().to_string();
-    let request = json!({
-        "command": command,
-        "args": args,
-        "name": description.name(),
-        "note": description.note(),
-    });
+    let request = RunRequest {
+        order: order.clone(),
+        name: description.name().into(),
+        note: description.note().into(),
+        on_disconnect: OnDisconnect::Default,
+    };
     let run = ask(
         target,
         Method::POST,
         "/api/v1/runs",
         Some(&lease),
-        Some(request),
+        Some(json!(request)),
     )
     .await;
     let outcome = match run {
@@ -272,44 +232,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn takes_the_option_out_of_the_arguments() {
-        let words = |text: &str| -> Vec<String> { text.split(' ').map(String::from).collect() };
-        for line in [
-            "chirp --connect http://lab:1 --seed 4",
-            "chirp --connect=http://lab:1 --seed 4",
-        ] {
-            let (rest, value) = split(&words(line), "--connect");
-            assert_eq!(rest, words("chirp --seed 4"));
-            assert_eq!(value.as_deref(), Some("http://lab:1"));
-        }
-        let line =
-            "chirp --name a --connect=http://lab:1 --token-file t --note=b --operator c --seed 4";
-        assert_eq!(command_line(&words(line)), words("chirp --seed 4"));
-    }
-
-    fn target_of(line: &str) -> Result<Option<Target>, CliError> {
-        let words: Vec<String> = line.split(' ').map(String::from).collect();
-        target(&words)
-    }
-
-    #[test]
-    fn only_an_address_is_another_machine() {
-        for line in ["chirp --connect none", "chirp --connect a.sock", "chirp"] {
-            assert!(matches!(target_of(line), Ok(None)), "{line}");
-        }
-        let found = target_of("chirp --connect http://lab:8020").expect("an address");
-        assert!(matches!(found, Some(Target::Tcp { address, .. }) if address == "lab:8020"));
-    }
-
-    #[test]
     fn token_comes_from_a_file() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("token");
         std::fs::write(&file, "0123\n").expect("a file");
-        let line = format!("chirp --connect http://lab --token-file {}", file.display());
-        let found = target_of(&line).expect("an address");
-        assert_eq!(found, Some(Target::tcp("lab", Some("0123".into()))));
-        let missing = target_of("chirp --connect http://lab --token-file /nonexistent/token");
+        let found = tcp_target("lab", Some(&file)).expect("an address");
+        assert_eq!(found, Target::tcp("lab", Some("0123".into())));
+        let missing = tcp_target("lab", Some("/nonexistent/token".as_ref()));
         let error = missing.expect_err("no file").to_string();
         assert!(error.contains("--token-file /nonexistent/token"), "{error}");
     }
@@ -317,21 +246,16 @@ mod tests {
     #[test]
     fn rejects_token_among_the_arguments_without_repeating_it() {
         for address in [
-            "http://lab:8020/#token=0123abcd",
-            "http://lab:8020/?token=0123abcd",
-            "http://x:0123abcd@lab:8020",
+            "lab:8020/#token=0123abcd",
+            "lab:8020/?token=0123abcd",
+            "x:0123abcd@lab:8020",
         ] {
-            for line in [
-                format!("chirp --connect {address}"),
-                format!("chirp --connect={address}"),
-            ] {
-                let error = target_of(&line).expect_err("refused").to_string();
-                assert!(!error.contains("0123abcd"), "{error}");
-                assert!(
-                    error.contains("--token-file") && error.contains("BENCH_TOKEN"),
-                    "{error}"
-                );
-            }
+            let error = tcp_target(address, None).expect_err("refused").to_string();
+            assert!(!error.contains("0123abcd"), "{error}");
+            assert!(
+                error.contains("--token-file") && error.contains("BENCH_TOKEN"),
+                "{error}"
+            );
         }
     }
 }

@@ -1,5 +1,7 @@
 //! `bench resume`: releases the bench of a daemon after a stop or a trip.
 
+use std::path::PathBuf;
+
 use hyper::Method;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -29,7 +31,7 @@ pub(super) struct Args {
     connect: Option<String>,
     /// File with the token of the daemon at --connect http://HOST:PORT [default: $BENCH_TOKEN]
     #[arg(long, value_name = "FILE", requires = "connect")]
-    token_file: Option<String>,
+    token_file: Option<PathBuf>,
     /// Who resumes [default: the user]
     #[arg(long, value_name = "NAME", value_parser = operator_name, allow_hyphen_values = true)]
     operator: Option<String>,

@@ -8,162 +8,99 @@ use serde::Serialize;
 use super::connection::ConnectOption;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
-use super::options::{BenchOptions, SeedOption};
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_daemon::http_client::Target;
 use bench_experiment::{
-    self, Description, MotorError, MotorForecast, MotorHandling, MotorSummary, Plan, RigOwner, Run,
-    RunSummary, Runner, Setup, Stage, StopCause, TimingSummary, TripSummary,
+    self, Description, Plan, RigOwner, Run, RunSummary, Runner, Setup, StopCause, TimingSummary,
+    TripSummary,
 };
-use bench_rig::motor::{Moment, MotorMemory};
+use bench_order::{BenchOptions, Order, RigOptions};
+use bench_rig::motor::Moment;
 use bench_rt::thread::Pace;
 
-/// Where and how to run.
+/// Folder for recordings without `--out`.
+const FOLDER: &str = "recordings";
+
+/// Where the runs of a command are made, and where their recordings go.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct RunOptions {
-    #[command(flatten)]
-    pub seed: SeedOption,
-    /// Pace of the loop [default: virtual on the simulated stage, realtime on devices]
-    #[arg(long, value_name = "PACE")]
-    pace: Option<Pace>,
-    /// Run on the simulated stage, with the rates, delays and resolution of the configured devices
-    #[arg(long)]
-    simulate: bool,
-    /// Clear a latched fault of the amplifier; first remove its cause
-    #[arg(long)]
-    clear_fault: bool,
-    /// The motor is cold: it has had no current for several thermal time constants. Needed at most before the first run on a
-    /// device; later the program knows the state of the motor
-    #[arg(long)]
-    motor_cold: bool,
-    /// Wait until the motor is cool enough, where the run would be refused because of the heat of earlier runs
-    #[arg(long)]
-    wait_for_motor: bool,
-    /// Folder for the recording and the files computed from it
-    #[arg(long, value_name = "DIR", default_value = "recordings")]
-    pub out: PathBuf,
+    /// Folder for the recording and the files computed from it [default: recordings]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     pub description: DescriptionOptions,
     #[command(flatten)]
-    connect: ConnectOption,
+    pub connect: ConnectOption,
 }
 
-impl RunOptions {
-    /// The stage of the run.
-    pub fn stage(&self, config: &Config) -> Stage {
-        if self.simulate {
-            Stage::Simulated
-        } else {
-            Stage::of(config)
-        }
-    }
+/// A command that makes runs: what is ordered, and how it is carried out.
+pub(super) struct RunCommand<'a> {
+    pub order: Order,
+    pub bench: &'a BenchOptions,
+    pub rig: &'a RigOptions,
+    pub options: &'a RunOptions,
+    /// Whether it only predicts what it would do.
+    pub is_plan: bool,
+}
 
-    /// Whether the run is on the simulated stage.
-    pub fn is_simulated(&self, config: &Config) -> bool {
-        self.stage(config) == Stage::Simulated
-    }
-
-    /// The requested pace, or that of the rig. Devices run in real time only.
-    fn pace(&self, config: &Config) -> Result<Pace, CliError> {
-        match (self.pace, self.is_simulated(config)) {
-            (Some(Pace::Virtual), false) => Err(CliError::Usage(
-                "--pace virtual is valid only for the simulated stage, because devices run in real time; leave it out, or add --simulate".into(),
-            )),
-            (Some(pace), _) => Ok(pace),
-            (None, true) => Ok(Pace::Virtual),
-            (None, false) => Ok(Pace::Realtime),
-        }
+impl RunCommand<'_> {
+    /// The daemon at an address that carries out the whole command, if the command names one.
+    pub fn remote(&self) -> Result<Option<Target>, CliError> {
+        let target = self.options.connect.remote()?;
+        let unused = match (&target, self.is_plan, &self.options.out) {
+            (Some(_), true, _) => "--plan is computed in this process",
+            (Some(_), false, Some(_)) => "--out is chosen by the daemon at --connect",
+            _ => return Ok(target),
+        };
+        Err(CliError::Usage(format!(
+            "{unused}; leave it out, or leave --connect out"
+        )))
     }
 
     /// Rig, pace and folder of a run.
-    pub fn setup(&self, bench: &BenchOptions, config: &Config) -> Result<Setup, CliError> {
-        if !self.is_simulated(config) {
-            self.seed.refuse_on_devices()?;
+    pub fn setup(&self, config: &Config) -> Result<Setup, CliError> {
+        let (rig, options) = (self.rig, self.options);
+        if !rig.is_simulated(config) {
+            rig.seed.refuse_on_devices()?;
         }
+        let folder = options.out.clone();
         Ok(Setup {
-            pace: self.pace(config)?,
-            simulate: self.simulate,
-            clear_fault: self.clear_fault,
-            motor: self.motor(config)?,
+            pace: rig.loop_pace(config)?,
+            simulate: rig.simulate,
+            clear_fault: rig.clear_fault,
+            motor: rig.motor_handling(config)?,
             now: Moment::now,
-            folder: self.out.clone(),
-            description: self.description.description(bench.profile()),
+            folder: folder.unwrap_or_else(|| FOLDER.into()),
+            description: options.description.description(self.bench.profile()),
             owner: self.owner(config)?,
         })
     }
 
     /// The daemon that makes the run. A rehearsal of a run on devices is made in this process.
     fn owner(&self, config: &Config) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
-        if self.simulate {
-            Ok(None)
-        } else {
-            self.connect.owner(self.stage(config), &self.description)
+        if self.rig.simulate {
+            return Ok(None);
         }
-    }
-
-    /// How the heat of the motor is treated. With `--motor-cold` this statement is stored first.
-    fn motor(&self, config: &Config) -> Result<MotorHandling, CliError> {
-        if self.is_simulated(config) {
-            self.refuse_motor_options()?;
-            return Ok(MotorHandling::Simulated);
-        }
-        if self.motor_cold {
-            let stated = motor_memory(config)?.state_cold(&Moment::now());
-            stated.map_err(MotorError::from)?;
-        }
-        Ok(if self.wait_for_motor {
-            MotorHandling::WaitUntilCool
-        } else {
-            MotorHandling::Remembered
-        })
-    }
-
-    fn refuse_motor_options(&self) -> Result<(), CliError> {
-        let options = [
-            (self.motor_cold, "--motor-cold"),
-            (self.wait_for_motor, "--wait-for-motor"),
-        ];
-        match options.iter().find(|(is_given, _)| *is_given) {
-            None => Ok(()),
-            Some((_, option)) => Err(CliError::Usage(format!(
-                "{option} is valid only on devices, because the simulated motor is cold at its first run and rests between runs; leave it out"
-            ))),
-        }
-    }
-
-    /// The motor of the configured devices before the run `plan`; `None` for a simulated motor.
-    pub fn motor_summary(&self, plan: &Plan) -> Result<Option<MotorSummary>, CliError> {
-        match self.motor(&plan.config)? {
-            MotorHandling::Simulated => Ok(None),
-            MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
-                let memory = motor_memory(&plan.config)?;
-                let forecast = MotorForecast::of(plan, &memory, None, Moment::now())?;
-                Ok(Some(forecast.summary()))
-            }
-        }
+        let RunOptions {
+            connect,
+            description,
+            ..
+        } = self.options;
+        connect.owner(self.rig.stage(config), &self.order, description)
     }
 
     /// Runs a plan on the rig of its configuration, with progress on a terminal.
-    pub fn run(
-        &self,
-        bench: &BenchOptions,
-        plan: &Plan,
-        phase: &'static str,
-    ) -> Result<Run, CliError> {
-        let setup = self.setup(bench, &plan.config)?;
+    pub fn run(&self, plan: &Plan, phase: &'static str) -> Result<Run, CliError> {
+        let setup = self.setup(&plan.config)?;
         let progress = Progress::new(phase);
         let _line = ProgressLine::show(&progress);
         Ok(Runner::with_progress(setup, progress).run(plan, phase)?)
     }
-}
-
-fn motor_memory(config: &Config) -> Result<MotorMemory, CliError> {
-    let memory = MotorMemory::of(config);
-    Ok(memory.map_err(MotorError::from)?)
 }
 
 /// Adds the report of a run to its recording, closes the file, and prints the report in the requested form.

@@ -5,12 +5,12 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use super::error::CliError;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::table::labelled;
 use bench_config::{Purpose, Source};
 use bench_daemon::{DaemonConfig, ServeOptions, Started, own_socket, serve};
+use bench_order::BenchOptions;
 use bench_rig::devices::is_simulated;
 
 /// Address of the page of a demonstration.

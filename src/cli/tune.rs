@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::help::GLOSSARY;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
@@ -27,6 +25,7 @@ use bench_experiment::tuning::{
     DesignCertificate, DesignExtras, IdentifiedFrf, OppositeAsymmetry, TuneSourceError, evidence,
     recorded_disturbance,
 };
+use bench_order::{BenchOptions, GLOSSARY};
 use bench_plant::SignalPath;
 use bench_recording::Recording;
 use bench_report::{DesignLimits, DesignPage, ReportError, design_loop_svg, design_nyquist_svg};
@@ -164,7 +163,7 @@ impl Args {
         } else {
             self.bench.clone()
         };
-        bench.load(Purpose::Model, &[])
+        Ok(bench.load(Purpose::Model, &[])?)
     }
 }
 

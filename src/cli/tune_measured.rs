@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use super::error::CliError;
-use super::options::BenchOptions;
 use super::output::warn;
 use super::table::{table, wrap};
 use bench_base::progress::Progress;
@@ -14,6 +13,7 @@ use bench_control::tuning::{Goal, MeasuredPlant};
 use bench_experiment::campaign::recorded_points;
 use bench_experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
 use bench_identify::verdict::Cnmp;
+use bench_order::BenchOptions;
 
 /// Where the plants come from.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,10 +1,10 @@
 //! The plants of the model for which `bench tune` designs.
 
 use super::error::CliError;
-use super::options::BenchOptions;
 use bench_base::quantity::{OperatingPoint, QuantityError};
 use bench_config::{Config, OptionSetting, Purpose};
 use bench_control::tuning::NamedPlant;
+use bench_order::BenchOptions;
 
 /// Name of the plant of a model without operating points.
 const ONLY_PLANT: &str = "the plant";

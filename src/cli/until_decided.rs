@@ -6,60 +6,21 @@ use serde::Serialize;
 
 use super::analysis_output::{self, analysis_failed, outcome};
 use super::error::CliError;
-use super::options::BenchOptions;
 use super::outcome::Outcome;
 use super::output::print_text;
 use super::progress::ProgressLine;
-use super::run_options::{RunOptions, close, run_text};
+use super::run_options::{RunCommand, close, run_text};
 use super::table::wrap;
 use bench_base::progress::Progress;
-use bench_base::quantity::Time;
 use bench_config::Config;
 use bench_experiment::sequential::{
-    Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, default_max_motion_s,
-    first_shot_config, until_decided,
+    Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, until_decided,
 };
 use bench_experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use bench_identify::verdict::MAX_LOOKS;
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
-
-/// Options of a sequential experiment.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct SequentialOptions {
-    /// Make short chirps until the verdict on CNMP zeros is certain; bands, lengths and amplitudes are planned within the interlocks
-    #[arg(long, conflicts_with_all = ["duration", "sweep", "excitation", "amplitude", "shape"])]
-    until_decided: bool,
-    /// Limit of the length of all chirps together [default: 20 times the first chirp]
-    #[arg(
-        long,
-        value_name = "TIME",
-        requires = "until_decided",
-        allow_hyphen_values = true
-    )]
-    max_duration: Option<Time>,
-}
-
-impl SequentialOptions {
-    /// The limit of the motion in seconds; `None` for a single chirp.
-    pub(super) fn max_motion_s(&self, config: &Config) -> Result<Option<f64>, CliError> {
-        if !self.until_decided {
-            return Ok(None);
-        }
-        let Some(limit) = &self.max_duration else {
-            return Ok(Some(default_max_motion_s(config)?));
-        };
-        let first_s = first_shot_config(config)?.chirp.duration_s;
-        if limit.si() >= first_s {
-            Ok(Some(limit.si()))
-        } else {
-            Err(CliError::Usage(format!(
-                "--max-duration is {limit}, but the first chirp takes {first_s:.2} s; give a longer time"
-            )))
-        }
-    }
-}
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
@@ -74,18 +35,16 @@ struct Report {
 }
 
 /// What a sequence needs besides the configuration.
-#[derive(Clone, Copy)]
 pub(super) struct SequenceCommand<'a> {
-    pub(super) bench: &'a BenchOptions,
-    pub(super) run: &'a RunOptions,
+    pub(super) command: RunCommand<'a>,
     pub(super) magnitude_axis: MagnitudeAxis,
 }
 
 impl SequenceCommand<'_> {
     /// Makes the shots and writes the results of all of them beside the last recording.
     pub(super) fn measure(&self, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
-        let setup = self.run.setup(self.bench, base)?;
-        let json = self.bench.json;
+        let setup = self.command.setup(base)?;
+        let json = self.command.bench.json;
         let sequence = stop_on_signal(|stop| {
             let limits = SequenceLimits { max_motion_s, stop };
             shots(base, limits, setup, json)
@@ -109,7 +68,7 @@ impl SequenceCommand<'_> {
         let text = run_text(&report.run, &sequence.config)
             + &wrap(&end_text(report.sequence, report.motion_s), 2)
             + &analysis_output::text(&report.made);
-        close(sequence.last, &report, self.bench.json, &text)?;
+        close(sequence.last, &report, self.command.bench.json, &text)?;
         let last = outcome(&report.run, &report.made);
         Ok(sequence_outcome(report.sequence, &report.shots, last))
     }

@@ -3,6 +3,8 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
+use crate::daemon::common::order;
+
 /// How a client reaches the daemon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Access {
@@ -182,5 +184,5 @@ impl Action {
 
 pub fn command() -> Value {
     let args = ["--slow", "--duration", "5s", "--pace", "realtime"];
-    json!({ "command": "control", "args": args })
+    order("control", &args)
 }

@@ -163,7 +163,7 @@ impl Daemon {
     }
 
     pub fn start_run(&self, lease: &str, command: &str, args: &[&str]) -> u64 {
-        let body = json!({ "command": command, "args": args });
+        let body = order(command, args);
         let answer = self.ask("POST", "/api/v1/runs", lease, Some(body));
         assert_eq!(
             answer.status,
@@ -353,4 +353,25 @@ fn dechunked(mut body: &[u8]) -> Vec<u8> {
         body = &body[end + 2 + size + 2..];
     }
     data
+}
+
+/// The order of a command with options as on the command line.
+pub fn order(command: &str, arguments: &[&str]) -> Value {
+    let mut order = json!({ "command": command });
+    let mut words = arguments.iter().peekable();
+    while let Some(word) = words.next() {
+        let option = word.strip_prefix("--").expect("an option");
+        let value = words.next_if(|next| !next.starts_with("--"));
+        let field = option.replace('-', "_");
+        match (field.as_str(), value) {
+            (_, None) => order[field] = json!(true),
+            ("set", Some(value)) => match order["set"].as_array_mut() {
+                Some(sets) => sets.push(json!(value)),
+                None => order["set"] = json!([value]),
+            },
+            ("seed", Some(value)) => order[field] = json!(value.parse::<u64>().expect("a seed")),
+            (_, Some(value)) => order[field] = json!(value),
+        }
+    }
+    order
 }

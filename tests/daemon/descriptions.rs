@@ -3,9 +3,9 @@ use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
-use crate::daemon::common::Daemon;
+use crate::daemon::common::{Daemon, order};
 
 const RUN: [&str; 4] = ["--slow", "--duration", "1s", "--no-report"];
 
@@ -36,8 +36,9 @@ fn listed(daemon: &Daemon) -> [Value; 3] {
 fn run_over_http_is_recorded_with_its_name_and_the_operator_of_the_lease() {
     let daemon = Daemon::start();
     let lease = daemon.take_lease("anna");
-    let body =
-        json!({ "command": "control", "args": RUN, "name": "first", "note": "new\nflexure" });
+    let mut body = order("control", &RUN);
+    body["name"] = "first".into();
+    body["note"] = "new\nflexure".into();
     let started = daemon.ask("POST", "/api/v1/runs", &lease, Some(body));
     assert_eq!(started.status, 202, "{started:?}");
     daemon.wait_for_end(started.json()["id"].as_u64().expect("a number"), &lease);
@@ -159,7 +160,9 @@ fn refuses_names_and_notes_that_a_recording_cannot_contain() {
             "note: it has 2001 characters",
         ),
     ] {
-        let body = json!({ "command": "control", "args": RUN, "name": name, "note": note });
+        let mut body = order("control", &RUN);
+        body["name"] = name.into();
+        body["note"] = note.into();
         let refused = daemon.ask("POST", "/api/v1/runs", &lease, Some(body));
         assert_eq!(refused.status, 400, "{refused:?}");
         let message = refused.json()["error"]["message"].to_string();

@@ -8,7 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
-use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, freeze, signal};
+use crate::daemon::common::{Daemon, NO_OVERRUN_LIMIT, TIME_LIMIT, freeze, order, signal};
 
 /// Sequences in a test run, some 10 s each; `BENCH_HELD_SEQUENCES` for more.
 const SEQUENCES: u64 = 4;
@@ -84,7 +84,7 @@ impl Bench {
                     0 => &TRIPS[..],
                     _ => &SLOW,
                 };
-                let body = json!({ "command": "control", "args": args });
+                let body = order("control", args);
                 self.daemon.ask("POST", "/api/v1/runs", &lease, Some(body));
             }
             4 => self.start_terminal(who),

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use nix::sys::socket::{AddressFamily, SockFlag, SockType, SockaddrIn, bind, connect, socket};
 use serde_json::json;
 
-use crate::daemon::common::{Daemon, TIME_LIMIT};
+use crate::daemon::common::{Daemon, TIME_LIMIT, order};
 use crate::daemon::wire::{exchange, request, status, tcp, unix};
 
 /// Connections of one address, by docs/daemon.md.
@@ -214,12 +214,12 @@ fn links_out_of_the_folder_and_hidden_files_are_not_served() {
     let listed = daemon.get("/api/v1/recordings");
     assert_eq!(listed["recordings"], json!([]));
     let plan = |args: &[&str]| {
-        let body = Some(json!({ "command": "control", "args": args }));
-        daemon.ask("POST", "/api/v1/plan", "", body)
+        let body = order("control", args);
+        daemon.ask("POST", "/api/v1/plan", "", Some(body))
     };
     for args in [
         &["--slow", "--reference", "link.csv"][..],
-        &["--controller=link.toml"],
+        &["--controller", "link.toml"],
         &["--set", "calibration.file=\"link.toml\""],
     ] {
         let refused = plan(args);

@@ -97,10 +97,10 @@ fn oversized_and_unknown_requests_are_refused() {
     ] {
         assert_eq!(daemon.ask("GET", path, "", None).status, 404, "{path}");
     }
-    let args = json!({ "command": "chirp", "args": ["--config", "/etc/passwd"] });
+    let outside = json!({ "command": "chirp", "config": "/etc/passwd" });
     let lease = daemon.take_lease("anna");
     for path in ["/api/v1/plan", "/api/v1/runs"] {
-        let answer = daemon.ask("POST", path, &lease, Some(args.clone()));
+        let answer = daemon.ask("POST", path, &lease, Some(outside.clone()));
         assert_eq!(answer.status, 422, "{path}");
     }
 }
@@ -137,6 +137,8 @@ fn any_json() -> impl Strategy<Value = Value> {
         let names = prop_oneof![
             Just("command"),
             Just("args"),
+            Just("duration"),
+            Just("set"),
             Just("how"),
             Just("operator"),
             Just("reference"),

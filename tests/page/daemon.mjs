@@ -111,8 +111,8 @@ export class Daemon {
     await this.until((state) => state.run === null && state.queue.length === 0 && state.lease === null);
     const { lease } = await this.ask("POST", "/lease", { operator: "test" });
     await this.ask("POST", "/resume", undefined, lease);
-    const args = ["--fast", "--reference", "hold", "--duration", "3000s", "--pace", "realtime"];
-    await this.ask("POST", "/runs", { command: "control", args, on_disconnect: "continue" }, lease);
+    const order = { command: "control", fast: true, reference: "hold", duration: "3000s", pace: "realtime" };
+    await this.ask("POST", "/runs", { ...order, on_disconnect: "continue" }, lease);
     await this.until((state) => state.loop.state === "running");
     await this.ask("DELETE", "/lease", undefined, lease);
   }

@@ -70,7 +70,7 @@ test("every control does its work", async () => {
 
   // A sine in closed loop: start is possible after the plan only.
   await choose("command", "control");
-  await choose("controller", "--slow");
+  await choose("controller", "slow");
   await choose("reference", "sine");
   await fill("amplitude", "30um");
   await fill("frequency", "2Hz");

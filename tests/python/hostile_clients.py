@@ -27,7 +27,7 @@ import time
 ADDRESSES = [f"127.0.0.{last}" for last in range(1, 5)]
 MAX_GROWTH_MB = 10.0
 MAX_MEDIAN_S, MAX_STOP_S = 0.05, 0.5
-LOOP = ["--slow", "--pace", "realtime", "--duration", "60s"]
+LOOP = {"command": "control", "slow": True, "pace": "realtime", "duration": "60s"}
 SETTINGS = ["--set", "loop.rate_hz=1000", "--set", "chirp.stop_hz=200", "--set", "interlock.overruns_per_s=1000000"]
 
 
@@ -206,7 +206,7 @@ def wait(what, is_reached, seconds=60):
 
 def start_loop(daemon, lease):
     daemon.ask("POST", "/resume", {}, lease)  # needed after a stop
-    status, run = daemon.ask("POST", "/runs", {"command": "control", "args": LOOP}, lease)
+    status, run = daemon.ask("POST", "/runs", LOOP, lease)
     if status != 202:
         sys.exit(f"the loop was not queued: {status} {run}")
     wait("the loop runs", lambda: daemon.ask("GET", "/state")[1]["loop"]["state"] == "running")

@@ -45,16 +45,16 @@ end() {
 # newest NAME: stores the name of the newest recording.
 newest() { ls -t recordings/*.mcap | head -n 1 >"$1.recording"; }
 
-# order NAME COMMAND [ARGUMENT...]: starts a run by the HTTP interface. `follow NAME` waits for its end.
+# order NAME COMMAND [--OPTION=VALUE...]: starts a run by the HTTP interface. `follow NAME` waits for its end.
 order() {
   name=$1 command=$2
   shift 2
-  args=\"--json\"
-  for arg in "$@"; do args="$args,\"$arg\""; done
+  options=
+  for option in "$@"; do options="$options,$(echo "$option" | sed 's/^--\([^=]*\)=\(.*\)$/"\1":"\2"/')"; done
   api POST /lease --json '{"operator":"rehearsal"}' >"$name.lease.json"
   lease=$(sed 's/.*"lease":"\([^"]*\)".*/\1/' "$name.lease.json")
   api POST /runs --header "Bench-Lease: $lease" \
-    --json "{\"command\":\"$command\",\"args\":[$args],\"name\":\"$name\",\"on_disconnect\":\"continue\"}" >"$name.order.json"
+    --json "{\"command\":\"$command\",\"json\":true$options,\"name\":\"$name\",\"on_disconnect\":\"continue\"}" >"$name.order.json"
   id=$(sed 's/.*"id":\([0-9]*\),.*/\1/' "$name.order.json")
 }
 follow() {
@@ -74,7 +74,7 @@ well() {
   closed control --duration 6
   order chirp_api chirp
   follow chirp_api
-  order control_api control "$(evidence "")" --duration 6
+  order control_api control "$(evidence "")" --duration=6
   follow control_api
   api GET /runs >well.runs.json
   end well
@@ -85,7 +85,7 @@ well() {
 cable() {
   act cable
   serve cable
-  order cable control "$(evidence "")" --duration 20
+  order cable control "$(evidence "")" --duration=20
   sleep 6
   ip link set vcan0 down
   follow cable
@@ -119,7 +119,7 @@ idle() {
 silence() {
   act silence --fault probe.silence@4s..7s
   serve silence
-  order silence control "$(evidence "")" --duration 20
+  order silence control "$(evidence "")" --duration=20
   follow silence
   state silence
   await '"position_m":[-0-9]'
@@ -133,7 +133,7 @@ silence() {
 power() {
   act power
   serve power
-  order power control "$(evidence "")" --duration 20
+  order power control "$(evidence "")" --duration=20
   sleep 6
   kill -KILL "$device"
   follow power
@@ -157,7 +157,7 @@ power() {
 fault() {
   act fault --fault amplifier.fault=0x2310@4s..5s
   serve fault
-  order fault control "$(evidence "")" --duration 20
+  order fault control "$(evidence "")" --duration=20
   follow fault
   await '--clear-fault'
   state fault
@@ -172,7 +172,7 @@ fault() {
 killed() {
   act killed
   serve killed
-  order killed control "$(evidence "")" --duration 20
+  order killed control "$(evidence "")" --duration=20
   sleep 7
   state killed
   newest killed
@@ -192,7 +192,7 @@ killed() {
 terminated() {
   act terminated
   serve terminated
-  order terminated control "$(evidence "")" --duration 20
+  order terminated control "$(evidence "")" --duration=20
   sleep 7
   state terminated
   newest terminated

@@ -54,7 +54,7 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
         run = id,
         operator = entry.operator,
         "{} begins",
-        entry.request.command.name()
+        entry.request.order.command().name()
     );
     let Carrier::Started { ticket } = entry.carrier else {
         return;
@@ -68,7 +68,7 @@ fn begin(daemon: &Arc<Daemon>, id: u64) {
     tokio::spawn(async move {
         let output = daemon.output(id);
         let stopped = process_must_end(&daemon, id);
-        let ended = worker::run(&daemon, &entry.request, &ticket, &output, stopped).await;
+        let ended = worker::run(&daemon, &entry.request.order, &ticket, &output, stopped).await;
         finish(
             &daemon,
             id,

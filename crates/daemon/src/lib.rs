@@ -42,7 +42,7 @@ mod worker;
 
 pub use hold::Hold;
 pub use output::OutputPiece;
-pub use run_entry::{Command, OnDisconnect, RunRequest};
+pub use run_entry::{OnDisconnect, RunRequest};
 pub use serve::serve;
 pub use shared::DaemonConfig;
 pub use socket::own_socket;

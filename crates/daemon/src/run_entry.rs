@@ -1,59 +1,19 @@
 //! One command of the queue, from its entry to its end.
 
+use std::borrow::Cow;
 use std::time::Instant;
 
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
 
 use super::hold::StopKind;
 use super::secret::Secret;
 use bench_base::progress::Progress;
 use bench_experiment::{Description, operator_name, run_name, run_note};
+use bench_order::{Order, order_schema};
 use bench_rt::supervision::StopFlags;
-
-/// Commands that may be queued.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Command {
-    /// Excite the stage and estimate its frequency response.
-    Chirp,
-    /// Run the closed loop with a reference.
-    Control,
-    /// Measure scale, sign and offset of amplifier and probe.
-    Calibrate,
-    /// Excite the stage at several amplitudes.
-    Linearity,
-    /// A chirp at each point of a grid.
-    Campaign,
-    /// Analyse a recording, without motion.
-    Identify,
-}
-
-impl Command {
-    /// All commands.
-    pub const ALL: [Command; 6] = [
-        Command::Chirp,
-        Command::Control,
-        Command::Calibrate,
-        Command::Linearity,
-        Command::Campaign,
-        Command::Identify,
-    ];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Command::Chirp => "chirp",
-            Command::Control => "control",
-            Command::Calibrate => "calibrate",
-            Command::Linearity => "linearity",
-            Command::Campaign => "campaign",
-            Command::Identify => "identify",
-        }
-    }
-}
 
 /// What happens to a run whose client disappears.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -68,39 +28,81 @@ pub enum OnDisconnect {
     Continue,
 }
 
-/// What a client asks for.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// What a client asks for: an order, and what the bench keeps with it. As JSON it is one object with the fields of both.
+#[derive(Clone, Debug, Serialize)]
 pub struct RunRequest {
-    /// The command.
-    pub command: Command,
-    /// Its arguments, as on the command line.
-    #[serde(default)]
-    pub args: Vec<String>,
+    /// The order.
+    #[serde(flatten)]
+    pub order: Order,
     /// A name for the list of recordings.
-    #[serde(default)]
     pub name: String,
     /// A note of the operator.
-    #[serde(default)]
     pub note: String,
     /// What happens if the client disappears.
-    #[serde(default)]
     pub on_disconnect: OnDisconnect,
+}
+
+/// The fields of a request beside its order.
+#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[serde(default)]
+struct Remarks {
+    /// A name for the list of recordings.
+    name: String,
+    /// A note of the operator.
+    note: String,
+    /// What happens if the client disappears.
+    on_disconnect: OnDisconnect,
+}
+
+impl Remarks {
+    /// The names of its fields.
+    const FIELDS: [&str; 3] = ["name", "note", "on_disconnect"];
+}
+
+impl<'de> Deserialize<'de> for RunRequest {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<RunRequest, D::Error> {
+        let (mut order, mut remarks) = (Map::deserialize(deserializer)?, Map::new());
+        for field in Remarks::FIELDS {
+            if let Some(value) = order.shift_remove(field) {
+                remarks.insert(field.into(), value);
+            }
+        }
+        let order = Order::from_json(Value::Object(order)).map_err(D::Error::custom)?;
+        let remarks = Remarks::deserialize(Value::Object(remarks)).map_err(D::Error::custom)?;
+        Ok(RunRequest {
+            order,
+            name: remarks.name,
+            note: remarks.note,
+            on_disconnect: remarks.on_disconnect,
+        })
+    }
+}
+
+impl JsonSchema for RunRequest {
+    fn schema_name() -> Cow<'static, str> {
+        "RunRequest".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        let remarks = Remarks::json_schema(generator).remove("properties");
+        let remarks = remarks.and_then(|fields| fields.as_object().cloned());
+        order_schema(generator, &remarks.unwrap_or_default())
+    }
 }
 
 impl RunRequest {
     /// Whether the run settles when its client disappears.
     pub fn ends_with_client(&self) -> bool {
-        match (self.on_disconnect, self.command) {
-            (OnDisconnect::Stop, _) | (OnDisconnect::Default, Command::Control) => true,
+        match (self.on_disconnect, &self.order) {
+            (OnDisconnect::Stop, _) | (OnDisconnect::Default, Order::Control(_)) => true,
             (OnDisconnect::Continue, _)
             | (
                 OnDisconnect::Default,
-                Command::Chirp
-                | Command::Calibrate
-                | Command::Linearity
-                | Command::Campaign
-                | Command::Identify,
+                Order::Chirp(_)
+                | Order::Calibrate(_)
+                | Order::Linearity(_)
+                | Order::Campaign(_)
+                | Order::Identify(_),
             ) => false,
         }
     }

@@ -17,8 +17,9 @@ use std::time::{Duration, Instant};
 use super::hold::Hold;
 pub use super::hold::StopKind;
 use super::lease::{Keeper, LEASE, Lease};
-use super::run_entry::{Carrier, Command, Phase, RunEntry, RunOutcome, RunRequest};
+use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome, RunRequest};
 use super::secret::Secret;
+use bench_order::Command;
 use bench_rt::supervision::StopFlags;
 
 /// Commands that may wait at the same time.
@@ -399,7 +400,7 @@ impl Schedule {
         };
         *(self
             .ended
-            .entry((entry.request.command, outcome))
+            .entry((entry.request.order.command(), outcome))
             .or_default()) += 1;
         entry.phase = Phase::Finished;
         entry.turn_ends = None;

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use axum::middleware;
 use sd_notify::NotifyState;
+use serde_json::json;
 use tokio::net::{TcpListener, UnixListener};
 
 use super::api::guard::{Guard, guard};
@@ -20,13 +21,14 @@ use super::heap;
 use super::live::hub::{LiveHub, Viewer};
 use super::owner::Owner;
 use super::ownership::Ownership;
-use super::run_entry::{Carrier, Command, OnDisconnect, RunRequest};
+use super::run_entry::{Carrier, OnDisconnect, RunRequest};
 use super::run_record::{LastEnd, recover_cut_recordings};
 use super::schedule::{NewEntry, StopKind};
 use super::secret::Secret;
 use super::shared::{Daemon, Parts};
 use super::start::{ServeError, ServeOptions, Started};
 use bench_experiment::{FeedSender, StopSignals};
+use bench_order::Order;
 
 /// Longest time in which a run ends after a signal; then the loop is closed, which disables the amplifier.
 const SHUTDOWN: Duration = Duration::from_secs(8);
@@ -273,28 +275,24 @@ async fn shut_down(daemon: &Daemon, signals: &mut StopSignals) {
 
 /// Starts a closed loop with a step on the simulated stage, again and again.
 fn start_demo(daemon: &Arc<Daemon>) {
-    let args = [
-        "--slow",
-        "--reference",
-        "sine",
-        "--amplitude",
-        "50um",
-        "--frequency",
-        "2Hz",
-        "--duration",
-        "3600s",
-        "--pace",
-        "realtime",
+    let order = json!({
+        "command": "control",
+        "slow": true,
+        "reference": "sine",
+        "amplitude": "50um",
+        "frequency": "2Hz",
+        "duration": "3600s",
+        "pace": "realtime",
         // Missed ticks do no harm to a simulated stage, and the program may have no real-time priority.
-        "--set",
-        "interlock.overruns_per_s=5000",
-    ];
+        "set": ["interlock.overruns_per_s=5000"],
+    });
     let ticket = Secret::random();
-    let Ok(ticket) = ticket else { return };
+    let (Ok(ticket), Ok(order)) = (ticket, Order::from_json(order)) else {
+        return;
+    };
     let new = NewEntry {
         request: RunRequest {
-            command: Command::Control,
-            args: args.map(String::from).to_vec(),
+            order,
             name: "demonstration".into(),
             note: String::new(),
             on_disconnect: OnDisconnect::Continue,

@@ -435,7 +435,7 @@ impl Session {
             .daemon
             .read(|schedule| schedule.entry(self.id).cloned());
         let info = RecordingInfo {
-            command: entry.ok()?.request.command.name().into(),
+            command: entry.ok()?.request.order.command().name().into(),
             operator: run.description.operator.clone().unwrap_or_default(),
             name: run.description.name.clone().unwrap_or_default(),
             note: run.description.note.clone().unwrap_or_default(),
@@ -534,7 +534,7 @@ fn in_use(why: &str) -> String {
 
 /// Who stops a command at its terminal.
 fn stopped_by(entry: &RunEntry) -> String {
-    let command = entry.request.command.name();
+    let command = entry.request.order.command().name();
     format!(
         "Ctrl-C or a signal to bench {command} by {}",
         entry.operator

@@ -1,7 +1,6 @@
 //! Commands as processes of their own: they send their plan to the owner of the rig and analyse the recording in their own memory.
 
 use std::io;
-use std::path::Path;
 use std::pin::pin;
 use std::process::{ExitStatus, Output, Stdio};
 use std::sync::Arc;
@@ -12,124 +11,27 @@ use nix::unistd::Pid;
 use tokio::io::{AsyncRead, AsyncReadExt};
 use tokio::process::{Child, Command as Process};
 
-use super::catalogue::Catalogue;
 use super::computations::{Busy, Purpose};
 use super::output::{OutputPiece, RunOutput};
-use super::run_entry::{Command, RunRequest};
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::socket::{SOCKET_VARIABLE, TICKET_VARIABLE};
-use bench_config::{Source, texts_of_set};
-use bench_experiment::option_in;
+use bench_config::Source;
+use bench_order::Order;
 
 /// Longest time of a computation without motion.
 const COMPUTATION: Duration = Duration::from_secs(60);
 /// Longest time in which a stopped process ends by itself.
 const END_TIME: Duration = Duration::from_secs(5);
-/// Most arguments of a command.
-const MAX_ARGS: usize = 200;
-/// Longest arguments of a command together, in bytes.
-const MAX_ARG_BYTES: usize = 16 << 10;
 /// Exit code of a command that was stopped before its process began.
 const STOPPED: i32 = 1;
 
-/// Arguments that a client may not give.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ArgsError {
-    /// The daemon chooses the value of this option.
-    #[error("{0} cannot be given here, because the daemon chooses it; leave it out")]
-    Reserved(String),
-    /// A path outside the folder of the daemon.
-    #[error(
-        "`{0}` is a path outside the folder of the daemon; name a profile, or a file in that folder"
-    )]
-    Outside(String),
-    /// Too many, or too long.
-    #[error(
-        "a command has at most {MAX_ARGS} arguments of together at most {MAX_ARG_BYTES} bytes, without a zero byte; shorten it"
-    )]
-    TooLong,
-}
-
-/// Options that the daemon gives itself.
-const RESERVED: [&str; 3] = ["--connect", "--out", "--plan"];
-
-/// Refuses arguments with which a command would read or write outside the folder of the daemon.
-///
-/// # Errors
-/// With the first argument that is refused.
-pub fn check_args(args: &[String]) -> Result<(), ArgsError> {
-    let bytes: usize = args.iter().map(String::len).sum();
-    let has_zero = args.iter().any(|arg| arg.contains('\0'));
-    if args.len() > MAX_ARGS || bytes > MAX_ARG_BYTES || has_zero {
-        return Err(ArgsError::TooLong);
-    }
-    for arg in args {
-        let option = option_in(arg).unwrap_or_default();
-        let option = option.split('=').next().unwrap_or_default();
-        if RESERVED.contains(&option) {
-            return Err(ArgsError::Reserved(option.into()));
-        }
-        if is_outside(arg) {
-            return Err(ArgsError::Outside(arg.clone()));
-        }
-    }
-    Ok(())
-}
-
-/// Refuses arguments that leave the folder through a link. It asks the file system.
-///
-/// # Errors
-/// With the first argument that is refused.
-pub fn check_links(args: &[String], catalogue: &Catalogue) -> Result<(), ArgsError> {
-    let leaves = |arg: &&String| paths_in(arg).iter().any(|path| catalogue.leaves(path));
-    match args.iter().find(leaves) {
-        Some(arg) => Err(ArgsError::Outside(arg.clone())),
-        None => Ok(()),
-    }
-}
-
-/// Whether an argument may be a path that leaves the folder. Quantities such as `0.1mm/s` are not paths.
-fn is_outside(arg: &str) -> bool {
-    paths_in(arg).iter().any(|text| leaves_folder(text))
-}
-
-/// What may be a path in an argument.
-fn paths_in(arg: &str) -> Vec<String> {
-    let after_option = match arg.strip_prefix("--") {
-        Some(option) => option.split_once('=').map_or("", |(_, value)| value),
-        None => arg,
-    };
-    let last = arg.rsplit('=').next().unwrap_or(arg);
-    let mut texts = vec![after_option.to_string(), last.to_string()];
-    texts.extend(texts_of_set(after_option));
-    texts.iter().map(|text| plain_path(text)).collect()
-}
-
-/// A text without the quotation marks of TOML.
-fn plain_path(text: &str) -> String {
-    text.trim().trim_matches(['"', '\'']).into()
-}
-
-fn leaves_folder(path: &str) -> bool {
-    let mut parts = Path::new(path).components();
-    path.starts_with(['/', '~']) || parts.any(|part| part.as_os_str() == "..")
-}
-
-/// Commands that take the configuration from the recording.
-const WITHOUT_CONFIG: [&str; 2] = ["identify", "report"];
-
-/// The program of the daemon itself, with a command (`chirp`, or `model modes`) and arguments. The configuration of the daemon
-/// applies unless the client names another.
-fn process(daemon: &Daemon, command: &[&str], args: &[String]) -> io::Result<Process> {
+/// The program of the daemon itself, with the words of a command line.
+fn process(daemon: &Daemon, words: &[String]) -> io::Result<Process> {
     let program = std::env::current_exe()?;
     let mut process = Process::new(program);
-    process.args(command);
-    if !command.iter().any(|word| WITHOUT_CONFIG.contains(word)) {
-        process.args(source_args(&daemon.configuration().source, args));
-    }
     process
-        .args(args)
+        .args(words)
         .current_dir(&daemon.recordings)
         .env(SOCKET_VARIABLE, &daemon.socket)
         .stdin(Stdio::null())
@@ -139,17 +41,13 @@ fn process(daemon: &Daemon, command: &[&str], args: &[String]) -> io::Result<Pro
     Ok(process)
 }
 
-/// The options of the configuration of the daemon.
-fn source_args(source: &Source, args: &[String]) -> Vec<String> {
-    let names_config = |arg: &String| arg == "--config" || arg.starts_with("--config=");
-    if args.iter().any(names_config) {
-        return Vec::new();
-    }
-    let config = source.config.iter();
-    let config = config.flat_map(|name| ["--config".to_string(), name.clone()]);
-    let sets = source.sets.iter();
-    let sets = sets.flat_map(|set| ["--set".to_string(), set.clone()]);
-    config.chain(sets).collect()
+/// The words of an order. The configuration of the daemon applies unless the order names another.
+fn order_words(daemon: &Daemon, order: &Order) -> Vec<String> {
+    let Source { config, sets, .. } = &daemon.configuration().source;
+    let order = order.clone().on_bench(config.as_deref(), sets);
+    let mut words = vec![order.command().name().to_string()];
+    words.extend(order.arguments());
+    words
 }
 
 /// Runs a command to its end, or ends its process when `stopped` is ready; returns its exit code.
@@ -158,16 +56,23 @@ fn source_args(source: &Source, args: &[String]) -> Vec<String> {
 /// When the system refuses the process.
 pub async fn run(
     daemon: &Daemon,
-    request: &RunRequest,
+    order: &Order,
     ticket: &Secret,
     output: &Arc<RunOutput>,
     stopped: impl Future<Output = ()>,
 ) -> io::Result<i32> {
-    let command = request.command;
-    let mut process = process(daemon, &[command.name()], &request.args)?;
+    let mut process = process(daemon, &order_words(daemon, order))?;
     process.env(TICKET_VARIABLE, ticket.reveal());
-    if command != Command::Identify {
-        process.arg("--out").arg(&daemon.recordings);
+    match order {
+        // Its results stand beside the recording.
+        Order::Identify(_) => {}
+        Order::Chirp(_)
+        | Order::Control(_)
+        | Order::Calibrate(_)
+        | Order::Linearity(_)
+        | Order::Campaign(_) => {
+            process.arg("--out").arg(&daemon.recordings);
+        }
     }
     let stopped = pin!(stopped);
     let Some((mut child, stopped)) = spawned(process, stopped).await? else {
@@ -257,20 +162,45 @@ pub enum ComputeError {
     NoResult(String),
 }
 
-/// Runs a command that moves nothing and prints one JSON object.
+/// What an order would do. It moves nothing.
 ///
 /// # Errors
 /// When the process cannot be started, takes too long, or prints no object.
-pub async fn compute(
+pub async fn plan(daemon: &Daemon, order: Order) -> Result<serde_json::Value, ComputeError> {
+    let mut words = order_words(daemon, &order.with_json());
+    // In front of the recording of an analysis.
+    words.insert(1, "--plan".into());
+    object(daemon, Purpose::Plan, &words).await
+}
+
+/// What a command shows of the bench of the daemon (`doctor`, or `model modes`).
+///
+/// # Errors
+/// When the process cannot be started, takes too long, or prints no object.
+pub async fn view(
     daemon: &Daemon,
     purpose: Purpose,
     command: &[&str],
-    args: &[String],
 ) -> Result<serde_json::Value, ComputeError> {
-    // In front of the others, so that none of them takes it as its value.
-    let args = [&["--json".to_string()], args].concat();
-    let process = process(daemon, command, &args)?;
-    let output = printed(daemon, purpose, process).await?;
+    let Source { config, sets, .. } = &daemon.configuration().source;
+    let config = config.iter().map(|name| format!("--config={name}"));
+    let sets = sets.iter().map(|set| format!("--set={set}"));
+    let command = command.iter().map(|word| (*word).to_string());
+    let words: Vec<String> = command
+        .chain(["--json".to_string()])
+        .chain(config)
+        .chain(sets)
+        .collect();
+    object(daemon, purpose, &words).await
+}
+
+/// Runs a command that prints one JSON object.
+async fn object(
+    daemon: &Daemon,
+    purpose: Purpose,
+    words: &[String],
+) -> Result<serde_json::Value, ComputeError> {
+    let output = printed(daemon, purpose, process(daemon, words)?).await?;
     serde_json::from_slice(&output.stdout).map_err(|_| ComputeError::of(&output))
 }
 
@@ -283,8 +213,8 @@ pub async fn page(
     purpose: Purpose,
     files: &[String],
 ) -> Result<String, ComputeError> {
-    let mut process = process(daemon, &["report"], files)?;
-    process.args(["--out", "-"]);
+    let mut process = process(daemon, &["report".to_string()])?;
+    process.args(["--out", "-", "--"]).args(files);
     let output = printed(daemon, purpose, process).await?;
     if output.status.success() {
         Ok(String::from_utf8_lossy(&output.stdout).into_owned())
@@ -315,64 +245,5 @@ impl ComputeError {
     fn of(output: &Output) -> ComputeError {
         let errors = String::from_utf8_lossy(&output.stderr);
         ComputeError::NoResult(errors.lines().last().unwrap_or("no output").into())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn checked(args: &[&str]) -> Result<(), ArgsError> {
-        let args: Vec<String> = args.iter().map(|arg| (*arg).to_string()).collect();
-        check_args(&args)
-    }
-
-    #[test]
-    fn refuses_paths_outside_the_folder_and_reserved_options() {
-        for args in [
-            &["--config", "/etc/passwd"][..],
-            &["--config=/etc/passwd"],
-            &["--set", "calibration.file=\"/etc/passwd\""],
-            &["--set", "calibration.file= /etc/passwd"],
-            &["--set", "calibration.file=\"/etc/passwd\" # =x"],
-            &["--set", "calibration.file=\"\\u002fetc/passwd\""],
-            &["--set=interlock.heat_file= ../x"],
-            &["--set", "a={b=[\"x\", \"../c\"], d=1}"],
-            &["--controller", "../secret.toml"],
-            &["--reference", "a/../../b.csv"],
-            &["--controller", "~/x.toml"],
-            &["--out", "x"],
-            &["--out=x"],
-            &["--connect", "none"],
-        ] {
-            assert!(checked(args).is_err(), "{args:?}");
-        }
-    }
-
-    #[test]
-    fn refuses_arguments_that_are_too_many_or_too_long() {
-        assert!(checked(&vec!["x"; MAX_ARGS]).is_ok());
-        assert_eq!(checked(&vec!["x"; MAX_ARGS + 1]), Err(ArgsError::TooLong));
-        let long = "x".repeat(MAX_ARG_BYTES / 2);
-        let long = long.as_str();
-        assert!(checked(&[long, long]).is_ok());
-        assert_eq!(checked(&[long, long, "x"]), Err(ArgsError::TooLong));
-        assert_eq!(checked(&["a\0b"]), Err(ArgsError::TooLong));
-    }
-
-    #[test]
-    fn accepts_quantities_profiles_and_files_of_the_folder() {
-        for args in [
-            &["--amplitude", "0.2A", "--band", "1Hz..200Hz"][..],
-            &["--speed", "0.1mm/s"],
-            &["--operating-point", "-3.8mm"],
-            &["--config", "stage", "--set", "loop.rate_hz=5000"],
-            &["--controller", "own.toml"],
-            &["--set=chirp.stop_hz=200"],
-            &["--set", "sim.noise=[1e-9, 2e-9]"],
-            &["--reference=step"],
-        ] {
-            assert_eq!(checked(args), Ok(()), "{args:?}");
-        }
     }
 }

@@ -6,13 +6,14 @@ use std::fs::{File, OpenOptions};
 use std::io::Write;
 
 use nix::sys::mman::{MlockAllFlags, mlockall, munlockall};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use bench_base::thread_priority::set_fifo;
 use bench_config::LoopSettings;
 
 /// `virtual` or `realtime`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {

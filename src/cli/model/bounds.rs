@@ -3,13 +3,13 @@
 use serde::Serialize;
 
 use super::super::error::CliError;
-use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::{table, wrap};
 use super::Profiled;
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OfAngularFrequency, OfRatio, si};
 use bench_config::Purpose;
+use bench_order::BenchOptions;
 use bench_plant::zeros::{damped_zeros, undamped_zeros};
 use bench_thesis::{Bound, Demand, PlantSummary};
 

@@ -5,13 +5,12 @@ use serde::Serialize;
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::figure_options::PictureOptions;
-use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::wrap;
-use super::super::value_range::{ValueRange, asymmetries, operating_points};
 use bench_base::decimal::Decimal;
 use bench_base::quantity::{OperatingPoint, Ratio};
 use bench_config::{OptionSetting, PlantSettings, Purpose, Sr4dofSettings};
+use bench_order::{BenchOptions, ValueRange, asymmetries, operating_points};
 use bench_report::{CnmpMap, Picture, ReportError, map_svg};
 
 /// The largest picture in lines and characters, which fits 80 columns.

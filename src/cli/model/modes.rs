@@ -1,12 +1,12 @@
 //! `bench model modes`: modes, residues, signs and zeros at one operating point.
 
 use super::super::error::CliError;
-use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::super::table::table;
 use super::Profiled;
 use bench_base::decimal::Decimal;
 use bench_config::Purpose;
+use bench_order::BenchOptions;
 use bench_plant::zeros::Zero;
 use bench_thesis::{ModeSummary, PlantSummary};
 

@@ -1,10 +1,10 @@
 //! `bench model sequence`: signs, dominant modes, and the kinds of zeros that the tables of Chapter 3 read from them.
 
 use super::super::error::CliError;
-use super::super::options::BenchOptions;
 use super::super::output::print_result;
 use super::Profiled;
 use bench_config::Purpose;
+use bench_order::BenchOptions;
 use bench_plant::zeros::ZeroCounts;
 use bench_plant::{ModalModel, build};
 use bench_thesis::{SequenceReport, TableRow};

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
 use super::super::figure_options::PictureOptions;
-use super::super::options::{BenchOptions, SeedOption};
 use super::super::outcome::Outcome;
 use super::super::output::{print_note, print_result};
 use super::super::progress::ProgressLine;
@@ -13,6 +12,7 @@ use super::study_text::text;
 use bench_base::progress::Progress;
 use bench_config::Purpose;
 use bench_experiment::stop_on_signal;
+use bench_order::{BenchOptions, SeedOption};
 use bench_report::{Picture, ReportError, plant_conditions, study_svg};
 use bench_study::{
     Answer, Block, Opened, Plan, Results, Shard, StudyFile, Tolerance, complete, joined,

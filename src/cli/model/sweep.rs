@@ -1,10 +1,10 @@
 //! One setting that varies over a grid.
 
 use super::super::error::CliError;
-use super::super::options::BenchOptions;
 use bench_base::numeric::linspace;
 use bench_base::quantity::{Quantity, QuantityError};
 use bench_config::{Config, OptionSetting, Purpose};
+use bench_order::BenchOptions;
 use bench_plant::Structure;
 use bench_thesis::veering::PairError;
 
@@ -65,7 +65,7 @@ impl SweepArgs {
     pub fn config(&self, value: f64) -> Result<Config, CliError> {
         let option = format!("--vary {}", self.vary);
         let setting = OptionSetting::new(&self.vary, value, option);
-        self.bench.load(Purpose::Model, &[setting])
+        Ok(self.bench.load(Purpose::Model, &[setting])?)
     }
 
     fn check_fixed(&self) -> Result<(), CliError> {

@@ -1,8 +1,12 @@
 //! Quantities of one dimension.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::marker::PhantomData;
 use std::str::FromStr;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Serialize, Serializer};
 
 use super::dimension::Dimension;
 use super::typed::{Quantity, QuantityError};
@@ -53,6 +57,28 @@ impl<D: OfDimension> FromStr for Measure<D> {
             quantity,
             dimension: PhantomData,
         })
+    }
+}
+
+/// As it was typed.
+impl<D> Serialize for Measure<D> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.text())
+    }
+}
+
+impl<D: OfDimension> JsonSchema for Measure<D> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        D::DIMENSION.description().into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let examples: Vec<&str> = D::DIMENSION.example().split(" or ").collect();
+        json_schema!({ "type": "string", "examples": examples })
     }
 }
 

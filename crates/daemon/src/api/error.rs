@@ -9,9 +9,10 @@ use axum::response::{IntoResponse, Response};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::file_check::Outside;
 use crate::files::FolderError;
 use crate::schedule::ScheduleError;
-use crate::worker::{ArgsError, ComputeError};
+use crate::worker::ComputeError;
 use bench_experiment::{ErrorKind, ErrorObject};
 
 /// An error with its status.
@@ -125,8 +126,8 @@ impl From<ScheduleError> for ApiError {
     }
 }
 
-impl From<ArgsError> for ApiError {
-    fn from(error: ArgsError) -> ApiError {
+impl From<Outside> for ApiError {
+    fn from(error: Outside) -> ApiError {
         ApiError::refused(ErrorKind::Usage, error.to_string())
     }
 }

@@ -1,9 +1,9 @@
 //! The HTTP interface: one line per request in [`routes`], one file per resource.
 
-mod arguments;
 mod download;
 pub mod error;
 mod extract;
+mod file_check;
 pub mod guard;
 mod lease;
 mod live;

@@ -13,21 +13,21 @@ use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::arguments::check_arguments;
 use super::error::ApiError;
 use super::extract::{Body, Client, InPath, LeaseHeader, StopBody};
+use super::file_check::check_files;
 use super::lease::random;
 use super::reply::{Accepted, Reply};
 use super::texts::check_texts;
 use super::views::RunView;
-use crate::computations::Purpose;
 use crate::output::{OutputPiece, RunOutput};
-use crate::run_entry::{Carrier, Command, Phase, RunRequest};
+use crate::run_entry::{Carrier, Phase, RunRequest};
 use crate::schedule::{NewEntry, ScheduleError, StopKind};
 use crate::secret::Secret;
 use crate::shared::{Daemon, now};
 use crate::worker;
 use bench_experiment::{ErrorKind, Stage, TuneRefusal, check_tune};
+use bench_order::Order;
 use bench_rt::tuning::{Factors, Tune};
 
 /// The part of a path that names a command.
@@ -77,8 +77,8 @@ pub async fn start(
         let lease = schedule.require_lease(&lease, now())?;
         Ok::<_, ApiError>(lease.operator.clone())
     })?;
-    check_arguments(&daemon, &request.args).await?;
-    let (command, args) = (request.command, request.args.clone());
+    check_files(&daemon, request.order.files()).await?;
+    let order = request.order.clone();
     let new = NewEntry {
         request,
         carrier: Carrier::Started { ticket: random()? },
@@ -89,15 +89,13 @@ pub async fn start(
         let id = schedule.enqueue(new, now)?;
         schedule.entry(id).map(RunView::from)
     })?;
-    tokio::spawn(estimate(daemon, view.id, command, args));
+    tokio::spawn(estimate(daemon, view.id, order));
     Ok(Reply(view))
 }
 
 /// Adds the length of a command by its plan. A command without a plan has none.
-async fn estimate(daemon: Arc<Daemon>, id: u64, command: Command, mut args: Vec<String>) {
-    args.push("--plan".into());
-    let computed = worker::compute(&daemon, Purpose::Plan, &[command.name()], &args).await;
-    let plan = computed.unwrap_or_default();
+async fn estimate(daemon: Arc<Daemon>, id: u64, order: Order) {
+    let plan = worker::plan(&daemon, order).await.unwrap_or_default();
     let length_s = plan["expected"]["duration_s"].as_f64();
     daemon.change(|schedule, _| {
         if let Ok(entry) = schedule.open_entry(id) {
@@ -171,28 +169,13 @@ pub async fn clear(
     Ok(NoContent)
 }
 
-/// What a command would do.
-#[derive(Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PlanRequest {
-    /// The command.
-    command: Command,
-    /// Its arguments.
-    #[serde(default)]
-    args: Vec<String>,
-}
-
 /// Predicts travel, current, heat and duration. Moves nothing.
 pub async fn plan(
     State(daemon): State<Arc<Daemon>>,
-    Body(request): Body<PlanRequest>,
+    Body(order): Body<Order>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
-    check_arguments(&daemon, &request.args).await?;
-    // In front of the others, so that none of them takes it as its value.
-    let mut args = request.args;
-    args.insert(0, "--plan".into());
-    let computed =
-        worker::compute(&daemon, Purpose::Plan, &[request.command.name()], &args).await?;
+    check_files(&daemon, order.files()).await?;
+    let computed = worker::plan(&daemon, order).await?;
     match computed.get("error") {
         Some(_) => Err(ApiError::of_command(&computed)),
         None => Ok(Json(computed)),

@@ -7,14 +7,15 @@ use axum::extract::State;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::arguments::check_arguments;
 use super::error::ApiError;
 use super::extract::{Body, ClientAddress};
+use super::file_check::check_files;
 use crate::computations::Purpose;
 use crate::shared::{Daemon, DaemonConfig};
 use crate::worker;
 use bench_config::{Config, Source, load, profiles};
 use bench_experiment::ErrorKind;
+use bench_order::BenchOptions;
 use bench_rig::devices;
 
 /// Findings of `bench doctor`.
@@ -38,7 +39,7 @@ async fn computed(
     purpose: Purpose,
     command: &[&str],
 ) -> Result<Json<serde_json::Value>, ApiError> {
-    let computed = worker::compute(daemon, purpose, command, &[]).await?;
+    let computed = worker::view(daemon, purpose, command).await?;
     match computed.get("error") {
         Some(_) => Err(ApiError::of_command(&computed)),
         None => Ok(Json(computed)),
@@ -99,8 +100,12 @@ pub async fn check(
     State(daemon): State<Arc<Daemon>>,
     Body(new): Body<NewConfig>,
 ) -> Result<Json<ConfigView>, ApiError> {
-    check_arguments(&daemon, &new.sets).await?;
-    check_arguments(&daemon, new.profile.as_slice()).await?;
+    let bench = BenchOptions {
+        config: new.profile.clone(),
+        sets: new.sets.clone(),
+        ..BenchOptions::default()
+    };
+    check_files(&daemon, bench.files()).await?;
     let source = source(&daemon, new);
     let view = daemon.files.run(move || config_view(&loaded(source)?));
     view.await?.map(Json)

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use crate::hold::Hold;
 use crate::lease::Lease;
 use crate::live::hub::{LoopView, Share, TripView};
-use crate::run_entry::{Command, OnDisconnect, Phase, RunEntry, RunOutcome};
+use crate::run_entry::{OnDisconnect, Phase, RunEntry, RunOutcome};
 use crate::schedule::Now;
 use crate::shared::{Daemon, now};
 use bench_base::progress::Snapshot;
+use bench_order::{Command, Order};
 use bench_rig::devices::is_simulated;
 
 /// Everything at one moment.
@@ -77,8 +78,10 @@ pub struct RunView {
     pub id: u64,
     /// The command.
     pub command: Command,
-    /// Its arguments.
+    /// Its arguments as on the command line.
     pub args: Vec<String>,
+    /// The order: the command with its options.
+    pub order: Order,
     /// Its name.
     pub name: String,
     /// Note of the operator.
@@ -145,8 +148,9 @@ impl From<&RunEntry> for RunView {
         let progress = entry.progress.as_ref().filter(|_| entry.is_current());
         RunView {
             id: entry.id,
-            command: entry.request.command,
-            args: entry.request.args.clone(),
+            command: entry.request.order.command(),
+            args: entry.request.order.arguments(),
+            order: entry.request.order.clone(),
             name: entry.request.name.clone(),
             note: entry.request.note.clone(),
             operator: entry.operator.clone(),

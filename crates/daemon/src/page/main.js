@@ -9,7 +9,7 @@ import { Lease } from "/page/lease.js";
 import { isStopped, mayMove } from "/page/motion.js";
 import { compare, showRecordings, showResult } from "/page/recordings.js";
 import { Response } from "/page/response.js";
-import { formArguments, planRows, showFields, table } from "/page/run_form.js";
+import { formOrder, planRows, showFields, table } from "/page/run_form.js";
 import { Samples } from "/page/samples.js";
 import { Scope } from "/page/scope.js";
 import { Spectrum } from "/page/spectrum.js";
@@ -291,15 +291,11 @@ function showPlanText(lines, isError) {
   }));
 }
 
-function request() {
-  return { command: byId("command").value, args: formArguments() };
-}
-
 async function plan() {
   byId("start").disabled = true;
   showPlanText(["computing the plan"], false);
   await attempt(async () => {
-    const wanted = request(), found = await ask("POST", "/plan", wanted);
+    const wanted = formOrder(), found = await ask("POST", "/plan", wanted);
     showPlanText([table(planRows(found))], false);
     planned = JSON.stringify(wanted);
     byId("start").disabled = false;
@@ -308,13 +304,13 @@ async function plan() {
 
 async function start(event) {
   event.preventDefault();
-  const wanted = request();
+  const wanted = formOrder();
   if (JSON.stringify(wanted) !== planned) return plan();
   const isSimulated = state?.daemon.rig === "simulated";
   // A simulated run is shown in real time.
-  const args = isSimulated ? [...wanted.args, "--pace", "realtime"] : wanted.args;
+  const order = isSimulated ? { ...wanted, pace: "realtime" } : wanted;
   return withLease(async () => {
-    const run = await lease.ask("POST", "/runs", { ...wanted, args, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value });
+    const run = await lease.ask("POST", "/runs", { ...order, name: byId("run-name").value, note: byId("run-note").value, on_disconnect: byId("on-disconnect").value });
     showPlanText([run.phase === "held" ? "queued; the bench is held, the run starts after Resume" : "queued"], false);
   });
 }
@@ -429,7 +425,7 @@ function connectControls() {
   byId("cursors").onclick = () => byId("cursors").setAttribute("aria-pressed", scope.toggleCursors());
   byId("plan").onclick = plan;
   byId("run-form").onsubmit = start;
-  byId("run-form").oninput = () => { showFields(); byId("start").disabled = JSON.stringify(request()) !== planned; };
+  byId("run-form").oninput = () => { showFields(); byId("start").disabled = JSON.stringify(formOrder()) !== planned; };
   byId("tune-apply").onclick = tune;
   byId("compare").onclick = () => attempt(compare);
   byId("theme").value = localStorage.getItem("theme") ?? "auto";

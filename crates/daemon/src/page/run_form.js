@@ -1,4 +1,4 @@
-// The form of a run: arguments, plan, start.
+// The form of a run: order, plan, start.
 
 import { quantity } from "/page/drawing.js";
 
@@ -7,22 +7,23 @@ const WITH_FREQUENCY = ["sine", "square", "triangle", "random"];
 
 const byId = (id) => document.getElementById(id);
 
-/** The arguments of the command line that the form stands for. */
-export function formArguments() {
-  const command = byId("command").value, reference = byId("reference").value, args = [];
-  const add = (option, id) => { const text = byId(id).value.trim(); if (text) args.push(option, text); };
+/** The order that the form stands for. */
+export function formOrder() {
+  const command = byId("command").value, reference = byId("reference").value, order = { command };
+  const add = (option, id) => { const text = byId(id).value.trim(); if (text) order[option] = text; };
   if (command === "control") {
-    args.push(byId("controller").value, "--reference", reference);
-    add("--certificate", "certificate");
-    if (WITH_FREQUENCY.includes(reference)) add("--frequency", "frequency");
+    order.controller = byId("controller").value;
+    order.reference = reference;
+    add("certificate", "certificate");
+    if (WITH_FREQUENCY.includes(reference)) add("frequency", "frequency");
   }
   if (command === "chirp" || (command === "control" && reference === "chirp")) {
-    add("--start", "from");
-    add("--stop", "to");
+    add("start", "from");
+    add("stop", "to");
   }
-  if (reference !== "hold" || command !== "control") add("--amplitude", "amplitude");
-  if (command !== "calibrate") add("--duration", "duration");
-  return args;
+  if (reference !== "hold" || command !== "control") add("amplitude", "amplitude");
+  if (command !== "calibrate") add("duration", "duration");
+  return order;
 }
 
 /** Shows the fields that belong to the command. */

@@ -6,8 +6,9 @@ use std::time::Duration;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::tests::order;
 use super::*;
-use crate::run_entry::{Command, OnDisconnect};
+use crate::run_entry::OnDisconnect;
 
 /// Sequences: some thousands in each test run, 100,000 with BENCH_HOLDS=100000.
 const SEQUENCES: u64 = 4_000;
@@ -98,8 +99,7 @@ impl Expected {
         let ticket = self.secret();
         let new = NewEntry {
             request: RunRequest {
-                command: commands[random.below(commands.len())],
-                args: Vec::new(),
+                order: order(commands[random.below(commands.len())]),
                 name: String::new(),
                 note: String::new(),
                 on_disconnect: behaviours[random.below(behaviours.len())],

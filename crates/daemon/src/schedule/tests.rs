@@ -6,7 +6,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::hold::HoldCause;
-use crate::run_entry::{Command, OnDisconnect};
+use crate::run_entry::OnDisconnect;
+use bench_order::Order;
 
 /// What may happen.
 #[derive(Clone, Debug)]
@@ -73,10 +74,17 @@ fn kind(cut: bool) -> StopKind {
     if cut { StopKind::Cut } else { StopKind::Settle }
 }
 
+/// An order without options.
+pub(super) fn order(command: Command) -> Order {
+    let order = serde_json::json!({ "command": command.name() });
+    let of_recording = serde_json::json!({ "command": command.name(), "recording": "a.mcap" });
+    let made = Order::from_json(order).or_else(|_| Order::from_json(of_recording));
+    made.expect("an order")
+}
+
 fn request(command: Command, on_disconnect: OnDisconnect) -> RunRequest {
     RunRequest {
-        command,
-        args: Vec::new(),
+        order: order(command),
         name: String::new(),
         note: String::new(),
         on_disconnect,

@@ -1,23 +1,26 @@
 //! Which controller: an option of `bench control` and `bench margins`.
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 use super::help::with_setting;
 use bench_config::OptionSetting;
 use bench_control::CONTROLLERS;
 use bench_settings::files::names;
 
 /// Which controller.
-#[derive(Clone, Debug, Default, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, JsonSchema)]
 #[group(multiple = false)]
-pub(super) struct ControllerChoice {
+pub struct ControllerChoice {
     /// The fast controller of the thesis, Eq. (6-7)
     #[arg(long)]
-    fast: bool,
+    pub fast: bool,
     /// The slow controller of the thesis, Eq. (6-6)
     #[arg(long)]
-    slow: bool,
+    pub slow: bool,
     /// A controller by name, or a TOML file
     #[arg(long, value_name = "NAME|FILE", help = controller_help())]
-    controller: Option<String>,
+    pub controller: Option<String>,
 }
 
 impl ControllerChoice {

@@ -9,18 +9,18 @@ use bench_config::profiles;
 use bench_settings::files::find;
 
 /// Where the terms of the help texts are explained.
-pub(super) const GLOSSARY: &str =
+pub const GLOSSARY: &str =
     "docs/glossary.md explains the terms: CNMP zeros, residues, operating point.";
 
 /// `TEXT [default: KEY of the profile; 0.1 Hz in "stage"]`, with the value of the default profile.
-pub(super) fn with_setting(text: &str, key: &str) -> String {
+pub fn with_setting(text: &str, key: &str) -> String {
     let value = default_value(key).unwrap_or_default();
     let profile = profiles::DEFAULT;
     format!("{text} [default: {key} of the profile; {value} in `{profile}`]")
 }
 
 /// The value of a setting in the default profile, with its unit.
-pub(super) fn default_value(key: &str) -> Option<String> {
+pub fn default_value(key: &str) -> Option<String> {
     let mut value = profile().get(key.split('.').next()?)?;
     for part in key.split('.').skip(1) {
         value = value.get(part)?;

@@ -1,17 +1,20 @@
-//! Options of `bench control`, and the settings that they change.
+//! The order of a closed loop, and the settings that it changes.
 
-use std::path::Path;
+use std::convert::Infallible;
+use std::str::FromStr;
 
 use clap::ValueEnum;
+use schemars::JsonSchema;
+use serde::{Serialize, Serializer};
 use toml::{Table, Value};
 
+use super::bench_options::{BenchOptions, given};
 use super::controller_choice::ControllerChoice;
-use super::error::CliError;
 use super::help::{default_value, with_setting};
-use super::options::{BenchOptions, given};
-use super::run_options::RunOptions;
+use super::rig_options::RigOptions;
 use bench_base::quantity::{Acceleration, Frequency, Jerk, Length, Measure, Ratio, Speed, Time};
-use bench_config::OptionSetting;
+use bench_config::{Config, OptionSetting, Purpose};
+use bench_experiment::ExperimentError;
 use bench_experiment::certificate::OverrideReason;
 
 /// A setting of a reference without its option.
@@ -45,45 +48,51 @@ const PREFILTER_KEY: &str = "control.prefilter.frequency_hz";
 const TABLE: &str = "control.reference";
 
 /// The loop and its reference.
-#[derive(Clone, Debug, clap::Args)]
-#[command(after_help = defaults_help())]
-pub(super) struct Args {
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, JsonSchema)]
+pub struct ControlOrder {
+    /// The bench.
     #[command(flatten)]
+    #[serde(flatten)]
     pub bench: BenchOptions,
+    /// The controller.
     #[command(flatten)]
-    choice: ControllerChoice,
+    #[serde(flatten)]
+    pub choice: ControllerChoice,
+    /// Rig and pace.
     #[command(flatten)]
-    pub run: RunOptions,
+    #[serde(flatten)]
+    pub rig: RigOptions,
     /// Reference: step, hold (rest position), ramp, sine, square, triangle, s-curve (move with bounded speed, acceleration and
     /// jerk), random (limited to a band), chirp (identification in closed loop), or a CSV file with the columns
     /// time_s,reference_m [default: control.reference of the profile]
-    #[arg(long, value_name = "KIND|FILE", value_parser = reference)]
-    reference: Option<Reference>,
+    #[arg(long, value_name = "KIND|FILE")]
+    #[schemars(with = "Option<String>")]
+    pub reference: Option<Reference>,
     /// Height of step, ramp and s-curve, amplitude of sine, square and triangle, largest position of random
     /// [default: 50um]; for a chirp: largest travel predicted by the model [default: 20um]
     #[arg(long, value_name = "LENGTH", allow_hyphen_values = true)]
-    amplitude: Option<Length>,
+    pub amplitude: Option<Length>,
     /// Frequency of sine, square and triangle [default: 1Hz]; for random: highest frequency [default: 10Hz]
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true)]
-    frequency: Option<Frequency>,
+    pub frequency: Option<Frequency>,
     /// Speed of the ramp [default: 0.1mm/s]; for an s-curve: largest speed [default: 1mm/s]
     #[arg(long, value_name = "SPEED", allow_hyphen_values = true)]
-    speed: Option<Speed>,
+    pub speed: Option<Speed>,
     /// Largest acceleration of the s-curve [default: 50mm/s^2]
     #[arg(long, value_name = "ACCELERATION", allow_hyphen_values = true)]
-    acceleration: Option<Acceleration>,
+    pub acceleration: Option<Acceleration>,
     /// Largest jerk of the s-curve [default: 5m/s^3]
     #[arg(long, value_name = "JERK", allow_hyphen_values = true)]
-    jerk: Option<Jerk>,
+    pub jerk: Option<Jerk>,
     /// Time after which the random reference repeats [default: 10s]
     #[arg(long, value_name = "TIME", allow_hyphen_values = true)]
-    period: Option<Time>,
+    pub period: Option<Time>,
     /// Seed of the random reference [default: 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
-    reference_seed: Option<u64>,
+    pub reference_seed: Option<u64>,
     /// Time with the loop closed; of a chirp the length of its sweep
     #[arg(long, value_name = "TIME", allow_hyphen_values = true, help = duration_help())]
-    duration: Option<Time>,
+    pub duration: Option<Time>,
     /// Shape the reference: zv, zvd, ei (impulses that cancel the vibration of the closed loop), or minimum-time (fastest
     /// step within the limits of current and travel) [default: control.shaper of the profile]
     #[arg(
@@ -92,27 +101,26 @@ pub(super) struct Args {
         value_enum,
         hide_possible_values = true
     )]
-    shaper: Option<Shaper>,
+    pub shaper: Option<Shaper>,
     /// Largest overshoot of a minimum-time step: 5% or 0.05 [default: not limited]
     #[arg(long, value_name = "RATIO", allow_hyphen_values = true)]
-    max_overshoot: Option<Ratio>,
+    pub max_overshoot: Option<Ratio>,
     /// Filter the reference by a critically damped low-pass of second order at this frequency
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true)]
-    prefilter: Option<Frequency>,
+    pub prefilter: Option<Frequency>,
     /// Add the current that moves the model along the reference (inverse of the plant, with preview)
     #[arg(long)]
-    feedforward: bool,
+    pub feedforward: bool,
     /// Certificate of a chirp (`*_certificate.json`): the evidence that devices, load and controller belong together. On devices a
     /// loop closes only with one [default: control.certificate; none]
     #[arg(long, value_name = "FILE")]
-    certificate: Option<String>,
+    pub certificate: Option<String>,
     /// Close the loop on devices although the certificate is missing or does not fit; the reason (at least 10 characters) is
     /// recorded. A loop that is unstable by the model is refused nevertheless
     #[arg(long = "override", value_name = "REASON")]
+    #[serde(rename = "override")]
+    #[schemars(with = "Option<String>")]
     pub override_reason: Option<OverrideReason>,
-    /// Only print what the run would do: margins, travel, current, heat, duration; no motion
-    #[arg(long)]
-    pub plan: bool,
     /// Write only the recording, without plots and report
     #[arg(long)]
     pub no_report: bool,
@@ -124,7 +132,8 @@ fn duration_help() -> String {
     format!("{closed}; for a chirp: length of the sweep [default: chirp.duration_s; {sweep}]")
 }
 
-fn defaults_help() -> String {
+/// What `bench control` does without options.
+pub fn defaults_help() -> String {
     let value = |key| default_value(key).unwrap_or_default();
     format!(
         "Without options, in the profile `stage`: {} controller; reference: {} of {}, {} after the loop is closed; the loop is closed for {}.",
@@ -138,25 +147,39 @@ fn defaults_help() -> String {
 
 /// The kinds of reference that an option can name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum ReferenceKind {
+pub enum ReferenceKind {
+    /// A step.
     Step,
+    /// The rest position.
     Hold,
+    /// A motion of constant speed.
     Ramp,
+    /// A sine.
     Sine,
+    /// A square wave.
     Square,
+    /// A triangle wave.
     Triangle,
+    /// A move with bounded speed, acceleration and jerk.
     #[value(alias = "s_curve")]
     SCurve,
+    /// A random motion, limited to a band.
     Random,
+    /// A sweep, for identification in closed loop.
     Chirp,
 }
 
 /// The kinds of shaper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Shaper {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shaper {
+    /// Two impulses.
     Zv,
+    /// Three impulses, for an uncertain frequency.
     Zvd,
+    /// Three impulses with some residual vibration, for a frequency of larger uncertainty.
     Ei,
+    /// The fastest step within the limits of current and travel.
     MinimumTime,
 }
 
@@ -173,10 +196,32 @@ impl Shaper {
 }
 
 /// The value of `--reference`.
-#[derive(Clone, Debug)]
-enum Reference {
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reference {
+    /// A kind by its name.
     Kind(ReferenceKind),
+    /// A CSV file.
     File(String),
+}
+
+impl FromStr for Reference {
+    type Err = Infallible;
+
+    /// What is not the name of a kind is a file.
+    fn from_str(text: &str) -> Result<Reference, Infallible> {
+        let kind = <ReferenceKind as ValueEnum>::from_str(text, false);
+        Ok(kind.map_or_else(|_| Reference::File(text.into()), Reference::Kind))
+    }
+}
+
+/// As it was typed.
+impl Serialize for Reference {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Reference::Kind(kind) => serializer.serialize_str(&kind.text()),
+            Reference::File(path) => serializer.serialize_str(path),
+        }
+    }
 }
 
 impl ReferenceKind {
@@ -192,6 +237,12 @@ impl ReferenceKind {
             ReferenceKind::Random => "random",
             ReferenceKind::Chirp => "chirp",
         }
+    }
+
+    /// The name on the command line.
+    fn text(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or(String::new(), |value| value.get_name().to_string())
     }
 
     /// Its settings without other options.
@@ -255,23 +306,35 @@ impl Reference {
     }
 }
 
-fn reference(text: &str) -> Result<Reference, String> {
-    if let Ok(kind) = ReferenceKind::from_str(text, false) {
-        return Ok(Reference::Kind(kind));
+impl ControlOrder {
+    /// Controller, reference and certificate, as far as they may be files.
+    pub(crate) fn files(&self) -> Vec<String> {
+        let reference = match &self.reference {
+            Some(Reference::File(path)) => Some(path),
+            Some(Reference::Kind(_)) | None => None,
+        };
+        let files = [
+            self.choice.controller.as_ref(),
+            reference,
+            self.certificate.as_ref(),
+        ];
+        files.into_iter().flatten().cloned().collect()
     }
-    match std::fs::metadata(Path::new(text)) {
-        Ok(_) => Ok(Reference::File(text.into())),
-        Err(error) => Err(format!(
-            "neither a kind of reference nor a file: {error}; choose {}, or a file",
-            names(|_| true)
-        )),
-    }
-}
 
-impl Args {
+    /// The configuration of the loop.
+    ///
+    /// # Errors
+    /// When an option or the configuration is refused.
+    pub fn config(&self) -> Result<Config, ExperimentError> {
+        self.bench.load(Purpose::Control, &self.settings()?)
+    }
+
     /// The settings that the options change.
-    pub fn settings(&self) -> Result<Vec<OptionSetting>, CliError> {
+    fn settings(&self) -> Result<Vec<OptionSetting>, ExperimentError> {
         self.refuse_unused()?;
+        if let Some(Reference::File(path)) = &self.reference {
+            require_file(path)?;
+        }
         let mut settings = self.choice.settings();
         settings.extend(self.reference.as_ref().map(Reference::setting));
         let duration_key = match self.kind() {
@@ -291,7 +354,7 @@ impl Args {
         settings.extend(options.into_iter().flatten());
         settings.extend(self.command_settings());
         settings.extend(self.certificate.as_deref().map(certificate_setting));
-        settings.extend(self.run.seed.setting());
+        settings.extend(self.rig.seed.setting());
         Ok(settings)
     }
 
@@ -358,9 +421,9 @@ impl Args {
     }
 
     /// Refuses an option that the reference does not use.
-    fn refuse_unused(&self) -> Result<(), CliError> {
+    fn refuse_unused(&self) -> Result<(), ExperimentError> {
         if self.max_overshoot.is_some() && self.shaper != Some(Shaper::MinimumTime) {
-            return Err(CliError::Usage(
+            return Err(ExperimentError::Refused(
                 "--max-overshoot is valid only with --shaper minimum-time; leave it out, or choose that shaper".into(),
             ));
         }
@@ -395,14 +458,25 @@ impl Args {
         is_given: bool,
         option: &str,
         is_used: impl Fn(ReferenceKind) -> bool,
-    ) -> Result<(), CliError> {
+    ) -> Result<(), ExperimentError> {
         if !is_given || self.kind().is_some_and(&is_used) {
             return Ok(());
         }
         let kinds = names(is_used);
-        Err(CliError::Usage(format!(
+        Err(ExperimentError::Refused(format!(
             "{option} is valid only with --reference {kinds}; leave it out, or choose such a reference"
         )))
+    }
+}
+
+/// Refuses a reference that is neither a kind nor a file.
+fn require_file(path: &str) -> Result<(), ExperimentError> {
+    match std::fs::metadata(path) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(ExperimentError::Refused(format!(
+            "--reference {path}: neither a kind of reference nor a file: {error}; choose {}, or a file",
+            names(|_| true)
+        ))),
     }
 }
 

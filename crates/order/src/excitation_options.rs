@@ -1,37 +1,51 @@
 //! Options of the excitation, for every command that excites the stage.
 
+use schemars::JsonSchema;
+use serde::{Serialize, Serializer};
 use toml::{Table, Value};
 
-use super::error::CliError;
+use super::bench_options::given;
 use super::help::with_setting;
-use super::options::given;
 use bench_base::quantity::{Current, Frequency};
 use bench_config::{Config, OptionSetting};
-use bench_experiment::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
+use bench_experiment::{
+    AmplitudePlanError, ExperimentError, ResponseSource, default_amplitude, shape_amplitude,
+};
 
 /// Frequency band and amplitude.
-#[derive(Clone, Debug, clap::Args)]
-pub(super) struct ExcitationOptions {
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, JsonSchema)]
+pub struct ExcitationOptions {
     /// First frequency
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true,
         help = with_setting("First frequency", "chirp.start_hz"))]
-    start: Option<Frequency>,
+    pub start: Option<Frequency>,
     /// Last frequency
     #[arg(long, value_name = "FREQUENCY", allow_hyphen_values = true,
         help = with_setting("Last frequency", "chirp.stop_hz"))]
-    stop: Option<Frequency>,
+    pub stop: Option<Frequency>,
     /// Constant amplitude: 0.1A or 100mA [default: chirp.amplitude of the profile, which depends on
     /// the frequency; for a binary sequence prbs.amplitude_a]
     #[arg(long, value_name = "CURRENT", allow_hyphen_values = true)]
-    amplitude: Option<Current>,
+    pub amplitude: Option<Current>,
     /// Amplitude as a function of frequency for equal displacement at all frequencies, from the model or a measured FRF
     /// [default for a stepped sine without --amplitude: model]
     #[arg(long, value_name = "model|FRF.csv", conflicts_with = "amplitude")]
-    shape: Option<ResponseSource>,
+    #[serde(serialize_with = "text")]
+    #[schemars(with = "Option<String>")]
+    pub shape: Option<ResponseSource>,
 }
 
 impl ExcitationOptions {
-    pub(super) fn settings(&self) -> Vec<OptionSetting> {
+    /// The file of the response for the amplitude.
+    pub(crate) fn file(&self) -> Option<String> {
+        match &self.shape {
+            Some(ResponseSource::Frf(path)) => Some(path.to_string_lossy().into_owned()),
+            Some(ResponseSource::Model) | None => None,
+        }
+    }
+
+    /// The settings that the options change.
+    pub fn settings(&self) -> Vec<OptionSetting> {
         let start = given("chirp.start_hz", "--start", self.start.as_ref());
         let stop = given("chirp.stop_hz", "--stop", self.stop.as_ref());
         let mut settings: Vec<OptionSetting> = start.into_iter().chain(stop).collect();
@@ -42,7 +56,7 @@ impl ExcitationOptions {
     }
 
     /// The configuration with the requested amplitude over frequency.
-    pub(super) fn shaped(&self, config: Config) -> Result<Config, CliError> {
+    pub fn shaped(&self, config: Config) -> Result<Config, ExperimentError> {
         let shaped = match (&self.shape, &self.amplitude) {
             (Some(source), _) => shape_amplitude(config, source),
             (None, Some(_)) => Ok(config),
@@ -54,10 +68,10 @@ impl ExcitationOptions {
 }
 
 /// Errors of the model are returned unchanged; every other error names the option `--shape`.
-fn refused(source: &ResponseSource, error: AmplitudePlanError) -> CliError {
+fn refused(source: &ResponseSource, error: AmplitudePlanError) -> ExperimentError {
     match error {
         AmplitudePlanError::Model(error) => error.into(),
-        other => CliError::Usage(format!("--shape {source}: {other}")),
+        other => ExperimentError::Refused(format!("--shape {source}: {other}")),
     }
 }
 
@@ -72,4 +86,10 @@ fn flat(amplitude: &Current) -> [OptionSetting; 2] {
         OptionSetting::new("chirp.amplitude", vec![point], option.clone()),
         OptionSetting::new("prbs.amplitude_a", amplitude.si(), option),
     ]
+}
+
+/// As it was typed.
+fn text<S: Serializer>(source: &Option<ResponseSource>, serializer: S) -> Result<S::Ok, S::Error> {
+    let text = source.as_ref().map(ToString::to_string);
+    text.serialize(serializer)
 }

@@ -1,28 +1,54 @@
 //! A grid as it is typed: FROM:TO:COUNT.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 
-use super::error::CliError;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Serialize, Serializer};
+
 use bench_base::quantity::{OperatingPoint, QuantityError, Ratio};
+use bench_experiment::ExperimentError;
 
 /// Largest number of values of a grid.
 const MOST: usize = 10_000;
 
 /// At least two values at equal distances, with both ends.
-#[derive(Clone, Debug)]
-pub(super) struct ValueRange<T> {
+#[derive(Clone, Debug, PartialEq)]
+pub struct ValueRange<T> {
     from: T,
     to: T,
     count: usize,
 }
 
+/// As it was typed, with the units.
+impl<T: Display> Serialize for ValueRange<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let ValueRange { from, to, count } = self;
+        serializer.collect_str(&format_args!("{from}:{to}:{count}"))
+    }
+}
+
+impl<T> JsonSchema for ValueRange<T> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "ValueRange".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "string", "examples": ["-10%:10%:10"] })
+    }
+}
+
 /// A range of operating points, each with its unit. For clap.
-pub(super) fn operating_points(text: &str) -> Result<ValueRange<OperatingPoint>, String> {
+pub fn operating_points(text: &str) -> Result<ValueRange<OperatingPoint>, String> {
     ValueRange::parse(text, "0%:8%:15 or 0mm:3.8mm:15", OperatingPoint::with_unit)
 }
 
 /// A range of mass asymmetries. For clap.
-pub(super) fn asymmetries(text: &str) -> Result<ValueRange<Ratio>, String> {
+pub fn asymmetries(text: &str) -> Result<ValueRange<Ratio>, String> {
     ValueRange::parse(text, "-10%:10%:41", str::parse)
 }
 
@@ -46,10 +72,10 @@ impl<T> ValueRange<T> {
 
 impl ValueRange<OperatingPoint> {
     /// The values of `--operating-points` as ratios of the beam length.
-    pub fn ratios(&self, beam_length_m: f64) -> Result<Vec<f64>, CliError> {
+    pub fn ratios(&self, beam_length_m: f64) -> Result<Vec<f64>, ExperimentError> {
         let ratio = |point: &OperatingPoint| {
             let ratio = point.ratio(beam_length_m);
-            ratio.map_err(|error| CliError::Usage(error.to_string()))
+            ratio.map_err(|error| ExperimentError::Refused(error.to_string()))
         };
         self.spaced("--operating-points", ratio(&self.from)?, ratio(&self.to)?)
     }
@@ -57,15 +83,15 @@ impl ValueRange<OperatingPoint> {
 
 impl ValueRange<Ratio> {
     /// The values of `--asymmetries`.
-    pub fn ratios(&self) -> Result<Vec<f64>, CliError> {
+    pub fn ratios(&self) -> Result<Vec<f64>, ExperimentError> {
         self.spaced("--asymmetries", self.from.si(), self.to.si())
     }
 }
 
 impl<T: Display> ValueRange<T> {
-    fn spaced(&self, option: &str, from: f64, to: f64) -> Result<Vec<f64>, CliError> {
+    fn spaced(&self, option: &str, from: f64, to: f64) -> Result<Vec<f64>, ExperimentError> {
         if from == to {
-            return Err(CliError::Usage(format!(
+            return Err(ExperimentError::Refused(format!(
                 "{option}: FROM ({}) and TO ({}) are equal; give two different values",
                 self.from, self.to
             )));

@@ -1,0 +1,233 @@
+//! The order: one command with its options.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::ser::Error as _;
+use serde::{Deserialize, Serialize, Serializer};
+use serde_json::{Map, Value};
+
+use super::bench_options::BenchOptions;
+use super::calibrate::CalibrateOrder;
+use super::campaign::CampaignOrder;
+use super::chirp::ChirpOrder;
+use super::control::ControlOrder;
+use super::identify::IdentifyOrder;
+use super::linearity::LinearityOrder;
+
+/// Commands that may be ordered.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// Excite the stage and estimate its frequency response.
+    Chirp,
+    /// Run the closed loop with a reference.
+    Control,
+    /// Measure scale, sign and offset of amplifier and probe.
+    Calibrate,
+    /// Excite the stage at several amplitudes.
+    Linearity,
+    /// A chirp at each point of a grid.
+    Campaign,
+    /// Analyse a recording, without motion.
+    Identify,
+}
+
+impl Command {
+    /// All commands.
+    pub const ALL: [Command; 6] = [
+        Command::Chirp,
+        Command::Control,
+        Command::Calibrate,
+        Command::Linearity,
+        Command::Campaign,
+        Command::Identify,
+    ];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Command::Chirp => "chirp",
+            Command::Control => "control",
+            Command::Calibrate => "calibrate",
+            Command::Linearity => "linearity",
+            Command::Campaign => "campaign",
+            Command::Identify => "identify",
+        }
+    }
+
+    /// What it does.
+    pub(crate) fn description(self) -> &'static str {
+        match self {
+            Command::Chirp => "Excite the stage and estimate its frequency response.",
+            Command::Control => "Run the closed loop with a reference.",
+            Command::Calibrate => "Measure scale, sign and offset of amplifier and probe.",
+            Command::Linearity => "Excite the stage at several amplitudes.",
+            Command::Campaign => "A chirp at each point of a grid.",
+            Command::Identify => "Analyse a recording, without motion.",
+        }
+    }
+
+    /// The schema of its options, as an object.
+    pub(crate) fn options_schema(self, generator: &mut SchemaGenerator) -> Schema {
+        match self {
+            Command::Chirp => ChirpOrder::json_schema(generator),
+            Command::Control => ControlOrder::json_schema(generator),
+            Command::Calibrate => CalibrateOrder::json_schema(generator),
+            Command::Linearity => LinearityOrder::json_schema(generator),
+            Command::Campaign => CampaignOrder::json_schema(generator),
+            Command::Identify => IdentifyOrder::json_schema(generator),
+        }
+    }
+}
+
+/// A command with its options: what a command line fills, what a client of the daemon sends, and what its queue holds.
+///
+/// As JSON it is one object: `command`, and each option by its name on the command line with `_` for `-`. Quantities are texts as typed
+/// (`"0.1A"`), switches are `true`, an option that may be repeated is a list.
+///
+/// ```
+/// use bench_order::Order;
+///
+/// let json = r#"{"command":"control","slow":true,"duration":"2s","set":["loop.rate_hz=5000"]}"#;
+/// let order: Order = serde_json::from_str(json)?;
+/// assert_eq!(order.arguments(), ["--set=loop.rate_hz=5000", "--slow", "--duration=2s"]);
+/// let error = serde_json::from_str::<Order>(r#"{"command":"chirp","duration":"2m"}"#).unwrap_err();
+/// assert!(error.to_string().contains("give a time in s, such as 20s"));
+/// # Ok::<(), serde_json::Error>(())
+/// ```
+#[derive(Clone, Debug, PartialEq)]
+pub enum Order {
+    /// Excite the stage and estimate its frequency response.
+    Chirp(ChirpOrder),
+    /// Run the closed loop with a reference.
+    Control(Box<ControlOrder>),
+    /// Measure scale, sign and offset of amplifier and probe.
+    Calibrate(CalibrateOrder),
+    /// Excite the stage at several amplitudes.
+    Linearity(LinearityOrder),
+    /// A chirp at each point of a grid.
+    Campaign(CampaignOrder),
+    /// Analyse a recording, without motion.
+    Identify(IdentifyOrder),
+}
+
+impl Order {
+    /// The command.
+    pub fn command(&self) -> Command {
+        match self {
+            Order::Chirp(_) => Command::Chirp,
+            Order::Control(_) => Command::Control,
+            Order::Calibrate(_) => Command::Calibrate,
+            Order::Linearity(_) => Command::Linearity,
+            Order::Campaign(_) => Command::Campaign,
+            Order::Identify(_) => Command::Identify,
+        }
+    }
+
+    /// The options of the bench; an analysis takes its bench from the recording.
+    pub fn bench(&self) -> Option<&BenchOptions> {
+        match self {
+            Order::Chirp(order) => Some(&order.bench),
+            Order::Control(order) => Some(&order.bench),
+            Order::Calibrate(order) => Some(&order.bench),
+            Order::Linearity(order) => Some(&order.bench),
+            Order::Campaign(order) => Some(&order.bench),
+            Order::Identify(_) => None,
+        }
+    }
+
+    fn bench_mut(&mut self) -> Option<&mut BenchOptions> {
+        match self {
+            Order::Chirp(order) => Some(&mut order.bench),
+            Order::Control(order) => Some(&mut order.bench),
+            Order::Calibrate(order) => Some(&mut order.bench),
+            Order::Linearity(order) => Some(&mut order.bench),
+            Order::Campaign(order) => Some(&mut order.bench),
+            Order::Identify(_) => None,
+        }
+    }
+
+    /// The same order on the bench `config` with `sets`, unless it names another bench itself. Its own settings apply over `sets`.
+    pub fn on_bench(mut self, config: Option<&str>, sets: &[String]) -> Order {
+        if let Some(bench) = self.bench_mut()
+            && bench.config.is_none()
+        {
+            bench.config = config.map(String::from);
+            bench.sets.splice(0..0, sets.iter().cloned());
+        }
+        self
+    }
+
+    /// The same order, whose result is printed as JSON.
+    pub fn with_json(mut self) -> Order {
+        match &mut self {
+            Order::Identify(order) => order.json = true,
+            other => {
+                if let Some(bench) = other.bench_mut() {
+                    bench.json = true;
+                }
+            }
+        }
+        self
+    }
+
+    /// The files that the order names, and what may be a file in its settings.
+    pub fn files(&self) -> Vec<String> {
+        let mut files = self.bench().map_or(Vec::new(), BenchOptions::files);
+        match self {
+            Order::Chirp(order) => files.extend(order.band.file()),
+            Order::Linearity(order) => files.extend(order.band.file()),
+            Order::Control(order) => files.extend(order.files()),
+            Order::Calibrate(order) => {
+                let file = order.write.iter();
+                files.extend(file.map(|file| file.to_string_lossy().into_owned()));
+            }
+            Order::Identify(order) => files.push(order.recording.to_string_lossy().into_owned()),
+            Order::Campaign(_) => {}
+        }
+        files
+    }
+
+    /// The arguments of the command line after the name of the command. Parsed, they are the same order.
+    pub fn arguments(&self) -> Vec<String> {
+        // The types of all options have a JSON form.
+        let fields = self.fields().unwrap_or_default();
+        super::arguments::arguments(&fields)
+    }
+
+    /// The options that are given, by their names in JSON.
+    fn fields(&self) -> Result<Map<String, Value>, serde_json::Error> {
+        let object = match self {
+            Order::Chirp(order) => serde_json::to_value(order),
+            Order::Control(order) => serde_json::to_value(order),
+            Order::Calibrate(order) => serde_json::to_value(order),
+            Order::Linearity(order) => serde_json::to_value(order),
+            Order::Campaign(order) => serde_json::to_value(order),
+            Order::Identify(order) => serde_json::to_value(order),
+        };
+        let Value::Object(mut fields) = object? else {
+            return Ok(Map::new());
+        };
+        fields.retain(|_, value| is_given(value));
+        Ok(fields)
+    }
+}
+
+/// Whether the value of an option is not that of an absent one.
+fn is_given(value: &Value) -> bool {
+    match value {
+        Value::Null | Value::Bool(false) => false,
+        Value::Array(values) => !values.is_empty(),
+        Value::Bool(true) | Value::Number(_) | Value::String(_) | Value::Object(_) => true,
+    }
+}
+
+impl Serialize for Order {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut object = Map::new();
+        object.insert("command".into(), self.command().name().into());
+        object.extend(self.fields().map_err(S::Error::custom)?);
+        object.serialize(serializer)
+    }
+}
