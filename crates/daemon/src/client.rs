@@ -22,7 +22,7 @@ use super::session_messages::{FromCommand, FromDaemon, MAX_MESSAGE_BYTES, OpenCo
 use super::socket::{TICKET_VARIABLE, default_socket, sockets};
 use bench_base::progress::Progress;
 use bench_experiment::{
-    ErrorKind, ErrorObject, ExperimentError, RemoteError, RemoteRecording, RigOwner, RunOrder,
+    ErrorKind, ErrorObject, ExperimentError, PlannedRun, RemoteError, RemoteRecording, RigOwner,
     RunReport, Stage, StopSignals,
 };
 use bench_recording::{RecordingError, Totals};
@@ -114,7 +114,7 @@ impl DaemonOwner {
     /// The connection with its turn.
     fn connection(
         &self,
-        order: &RunOrder,
+        order: &PlannedRun,
         progress: &Progress,
     ) -> Result<Arc<Mutex<Connection>>, ExperimentError> {
         let mut open = lock(&self.connection);
@@ -129,7 +129,7 @@ impl DaemonOwner {
         Ok(connection)
     }
 
-    fn opening(&self, order: &RunOrder) -> OpenCommand {
+    fn opening(&self, order: &PlannedRun) -> OpenCommand {
         OpenCommand {
             request: self.request.clone(),
             operator: self.operator.clone(),
@@ -140,7 +140,7 @@ impl DaemonOwner {
 }
 
 /// Length of a run in real time, by its plan.
-fn estimated_s(order: &RunOrder) -> Option<f64> {
+fn estimated_s(order: &PlannedRun) -> Option<f64> {
     if order.pace == Pace::Virtual {
         return None;
     }
@@ -152,7 +152,7 @@ fn estimated_s(order: &RunOrder) -> Option<f64> {
 impl RigOwner for DaemonOwner {
     fn run(
         &self,
-        order: &RunOrder,
+        order: &PlannedRun,
         progress: &Progress,
     ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError> {
         require_text(&order.folder)?;
@@ -200,7 +200,7 @@ struct Copy {
 
 impl Copy {
     /// The copy of a run; `None` if its recording is in the ordered folder.
-    fn of(report: &RunReport, order: &RunOrder, socket: &Path) -> Option<Copy> {
+    fn of(report: &RunReport, order: &PlannedRun, socket: &Path) -> Option<Copy> {
         let made = report.path();
         let file = made.file_name()?.to_str()?;
         (made.parent() != Some(&order.folder)).then(|| Copy {
@@ -239,7 +239,7 @@ struct Connection {
 }
 
 /// Period of the renewals of the arm lease of a run.
-fn renewal_period(order: &RunOrder) -> Duration {
+fn renewal_period(order: &PlannedRun) -> Duration {
     let lease_s = order
         .plan()
         .map_or(f64::INFINITY, |plan| plan.config.servo.arm_lease_s());
@@ -288,7 +288,11 @@ impl Connection {
         }
     }
 
-    fn run(&mut self, order: &RunOrder, progress: &Progress) -> Result<RunReport, ExperimentError> {
+    fn run(
+        &mut self,
+        order: &PlannedRun,
+        progress: &Progress,
+    ) -> Result<RunReport, ExperimentError> {
         let period = renewal_period(order);
         self.renewals = self.runtime.block_on(async { renewals(period) });
         self.send(&FromCommand::Run(Box::new(order.clone())))?;

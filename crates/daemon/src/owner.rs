@@ -14,7 +14,7 @@ use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::{
     Description, DeviceNames, ExperimentError, FeedSender, MotorHandling, OpenBench, Opening,
-    RecordingDefect, Run, RunHooks, RunOrder, Runner, Setup, Stage, StopCause, TripCount,
+    PlannedRun, RecordingDefect, Run, RunHooks, Runner, Setup, Stage, StopCause, TripCount,
 };
 use bench_rig::motor::Moment;
 use bench_rt::supervision::{ArmLease, StopFlags};
@@ -32,7 +32,7 @@ pub struct OwnerOrder {
     /// The command to which it belongs. The rig stays the same for all plans of a command.
     pub command: u64,
     /// The plan.
-    pub order: RunOrder,
+    pub order: PlannedRun,
     /// Ends the run.
     pub stop: StopFlags,
     /// The arm lease of the run, if its client renews it.
@@ -250,12 +250,12 @@ impl OwnerThread {
 
     fn run(&mut self, order: OwnerOrder) {
         let _copy = copy_warnings(order.warnings.clone());
-        let result = self.run_order(&order);
+        let result = self.planned_run(&order);
         // Without a receiver the client is disconnected, and the recording is completed when it is dropped.
         let _ = order.reply.send(result);
     }
 
-    fn run_order(&mut self, order: &OwnerOrder) -> Result<Run, ExperimentError> {
+    fn planned_run(&mut self, order: &OwnerOrder) -> Result<Run, ExperimentError> {
         let plan = order.order.plan()?;
         require_same_rig(&self.config, &plan.config)?;
         let calibration = order.order.calibration()?;

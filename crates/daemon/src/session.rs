@@ -19,7 +19,7 @@ use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
 use super::shared::Daemon;
 use bench_base::progress::Progress;
 use bench_experiment::{
-    Ending, ExperimentError, MotorError, RemoteError, Run, RunError, RunOrder, RunReport,
+    Ending, ExperimentError, MotorError, PlannedRun, RemoteError, Run, RunError, RunReport,
     RunSummary, close,
 };
 use bench_rt::record::Origin;
@@ -89,7 +89,7 @@ fn enter(daemon: &Daemon, open: &OpenCommand, peer: Peer) -> Result<(u64, bool),
 
 /// A file of an order that the command of another user may not be able to read: neither that of the daemon's own configuration, nor in the
 /// folder of its recordings.
-fn foreign_file(daemon: &Daemon, order: &RunOrder) -> Option<String> {
+fn foreign_file(daemon: &Daemon, order: &PlannedRun) -> Option<String> {
     let file = order.plan().ok()?.config.calibration.file?;
     let own = daemon.configuration().config.calibration.file.as_ref();
     let is_known = own == Some(&file) || is_in(Path::new(&file), &daemon.recordings);
@@ -233,7 +233,7 @@ impl Session {
         });
     }
 
-    async fn run(&mut self, mut order: RunOrder) {
+    async fn run(&mut self, mut order: PlannedRun) {
         if !self.is_own_user {
             // The command fetches the recording from there.
             order.folder.clone_from(&self.daemon.recordings);

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::run_entry::RunRequest;
 use super::schedule::StopKind;
-use bench_experiment::{RemoteError, RunOrder, RunReport};
+use bench_experiment::{PlannedRun, RemoteError, RunReport};
 use bench_recording::Totals;
 
 /// Largest message of a command in bytes. The largest parts of a message are the text of a reference (some 20 bytes a tick) and the
@@ -26,7 +26,7 @@ pub enum FromCommand {
     /// Asks for a turn.
     Open(OpenCommand),
     /// Orders a run.
-    Run(Box<RunOrder>),
+    Run(Box<PlannedRun>),
     /// The command waits for the end of its run.
     Alive,
     /// Stops the run.

@@ -80,6 +80,6 @@ pub use results::{
     run_figures, step_response, tracking_metrics,
 };
 pub use run::{
-    MotorHandling, PlannedStageCheck, RigOwner, RunOrder, RunReport, RunSummary, Runner, Setup,
+    MotorHandling, PlannedRun, PlannedStageCheck, RigOwner, RunReport, RunSummary, Runner, Setup,
     TimingSummary, TripSummary, check_calibration, check_named_files, close,
 };

@@ -7,9 +7,9 @@ use std::time::SystemTime;
 
 use serde::Serialize;
 
+use super::planned_run::{RigOwner, RunConditions, run_elsewhere};
 use super::planned_stage_check::PlannedStageCheck;
 use super::remembered_motor::{MotorHandling, RememberedMotor, rested};
-use super::run_order::{RigOwner, RunConditions, run_elsewhere};
 use crate::analysis::Ending;
 use crate::errors::{ExperimentError, MotorError, RunError};
 use crate::evidence::{OpenRig, require_evidence, require_evidence_or_warn};

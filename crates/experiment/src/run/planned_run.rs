@@ -20,7 +20,7 @@ use bench_rt::thread::{Pace, Scheduling};
 
 /// Everything that the owner of a rig needs for a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct RunOrder {
+pub struct PlannedRun {
     /// Kind of the run.
     pub kind: RunKind,
     /// The settings as TOML.
@@ -63,13 +63,13 @@ pub(super) struct RunConditions<'a> {
     pub folder: &'a Path,
 }
 
-impl RunOrder {
+impl PlannedRun {
     /// The order of a plan.
     pub(super) fn of(
         plan: &Plan,
         conditions: &RunConditions<'_>,
         calibration: Option<&Calibration>,
-    ) -> Result<RunOrder, ExperimentError> {
+    ) -> Result<PlannedRun, ExperimentError> {
         let mut plan = plan.clone();
         let file = plan.config.calibration.file.as_mut();
         // A file that is missing is named as the user named it.
@@ -77,7 +77,7 @@ impl RunOrder {
             *file = absolute(Path::new(file))?.display().to_string();
         }
         let calibration_toml = calibration.map(Calibration::to_toml).transpose();
-        Ok(RunOrder {
+        Ok(PlannedRun {
             kind: plan.kind,
             config_toml: plan.config_toml()?,
             reference: plan.reference_file().map(String::from),
@@ -202,7 +202,7 @@ pub trait RigOwner: Debug + Send + Sync {
     /// When the owner refuses the order, when the run fails, or when the owner cannot be reached.
     fn run(
         &self,
-        order: &RunOrder,
+        order: &PlannedRun,
         progress: &Progress,
     ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError>;
 }
@@ -215,7 +215,7 @@ pub(super) fn run_elsewhere(
     calibration: Option<&Calibration>,
     progress: &Progress,
 ) -> Result<Run, ExperimentError> {
-    let order = RunOrder::of(plan, conditions, calibration)?;
+    let order = PlannedRun::of(plan, conditions, calibration)?;
     let (report, recording) = owner.run(&order, progress)?;
     Ok(report.run(recording, conditions.folder))
 }
