@@ -16,8 +16,8 @@ use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_daemon::http_client::Target;
 use bench_experiment::{
-    self, Description, Plan, RigOwner, Run, RunSummary, Runner, Setup, StopCause, TimingSummary,
-    TripSummary,
+    self, Description, Plan, RigOwner, Run, RunConditions, RunSummary, Runner, Setup, StopCause,
+    TimingSummary, TripSummary,
 };
 use bench_order::{BenchOptions, Order, RigOptions};
 use bench_rig::motor::Moment;
@@ -70,12 +70,14 @@ impl RunCommand<'_> {
         }
         let folder = options.out.clone();
         Ok(Setup {
-            pace: rig.loop_pace(config)?,
+            conditions: RunConditions {
+                pace: rig.loop_pace(config)?,
+                clear_fault: rig.clear_fault,
+                motor: rig.motor_handling(config)?,
+                folder: folder.unwrap_or_else(|| FOLDER.into()),
+            },
             simulate: rig.simulate,
-            clear_fault: rig.clear_fault,
-            motor: rig.motor_handling(config)?,
             now: Moment::now,
-            folder: folder.unwrap_or_else(|| FOLDER.into()),
             description: options.description.description(self.bench.profile()),
             owner: self.owner(config)?,
         })

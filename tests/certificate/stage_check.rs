@@ -33,7 +33,7 @@ fn checked_of(plan: &Plan, rig: Box<dyn Rig>) -> StageCheck {
     );
     let run = run.expect("a run");
     let path = run.path.clone();
-    assert!(run.ended.completed, "{:?}", run.ended);
+    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
     run.finish("{}").expect("a good disk");
     planned
         .evaluated(&Recording::open(&path).expect("a recording"))

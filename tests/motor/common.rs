@@ -57,11 +57,9 @@ pub fn hot(folder: &Path) -> Config {
 
 /// The simulated stage as fast as possible, whose motor is known by a file like that of a real one.
 pub fn remembered(folder: &Path) -> Setup {
-    Setup {
-        motor: MotorHandling::Remembered,
-        now,
-        ..Setup::simulated(folder.join("recordings"))
-    }
+    let mut setup = Setup::simulated(folder.join("recordings"));
+    setup.conditions.motor = MotorHandling::Remembered;
+    Setup { now, ..setup }
 }
 
 /// A run in a new process: nothing but the file is known of earlier ones.

@@ -16,11 +16,10 @@ const FOLDER: &str = "BENCH_TEST_MOTOR_FOLDER";
 const TIME_LIMIT: Duration = Duration::from_secs(120);
 
 fn setup(folder: &Path, motor: MotorHandling) -> Setup {
-    Setup {
-        pace: Pace::Realtime,
-        motor,
-        ..Setup::simulated(folder.join("recordings"))
-    }
+    let mut setup = Setup::simulated(folder.join("recordings"));
+    setup.conditions.pace = Pace::Realtime;
+    setup.conditions.motor = motor;
+    setup
 }
 
 fn folder_of_child() -> Option<PathBuf> {

@@ -137,11 +137,10 @@ fn fast_clock() -> Moment {
 fn waits_until_the_motor_is_cool() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = hot(folder.path());
-    let runner = Runner::new(Setup {
-        motor: MotorHandling::WaitUntilCool,
-        now: fast_clock,
-        ..remembered(folder.path())
-    });
+    let mut setup = remembered(folder.path());
+    setup.conditions.motor = MotorHandling::WaitUntilCool;
+    setup.now = fast_clock;
+    let runner = Runner::new(setup);
     let begun = runner.progress.clone();
     let summary = run(&runner, &config).expect("it waits");
     assert!(summary.is_completed() && summary.motor.thermal_start_a > 0.5);
@@ -167,10 +166,8 @@ fn run_without_a_recording_leaves_the_motor_as_it_was() {
     let folder = tempfile::tempdir().expect("a folder");
     let config = hot(folder.path());
     memory(&config).state_cold(&now()).expect("a file");
-    let setup = Setup {
-        folder: "/proc/recordings".into(),
-        ..remembered(folder.path())
-    };
+    let mut setup = remembered(folder.path());
+    setup.conditions.folder = "/proc/recordings".into();
     let failed = Runner::new(setup).run(&Plan::chirp(config.clone()), "chirp");
     assert!(failed.is_err(), "there is no such folder");
     let state = memory(&config).read(Some("simulated"), &now());

@@ -129,7 +129,7 @@ fn control(controller: &str) -> Plan {
 }
 
 fn finished(run: Run) -> Recording {
-    assert!(run.ended.completed, "{:?}", run.ended);
+    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     Recording::open(&path).expect("a recording")
@@ -278,9 +278,17 @@ fn runner_opens_the_rig_again_after_a_trip() {
     let mut tripping = control("slow");
     tripping.config.interlock.soft_limit_m = 1e-9;
     let tripped = runner.run(&tripping, "control").expect("a run");
-    assert!(tripped.ended.trip.is_some(), "{:?}", tripped.ended);
+    assert!(
+        tripped.end.outcome.trip.is_some(),
+        "{:?}",
+        tripped.end.outcome
+    );
     let again = runner.run(&tripping, "control").expect("a run");
-    assert!(again.ended.trip.is_some(), "not refused: {:?}", again.ended);
+    assert!(
+        again.end.outcome.trip.is_some(),
+        "not refused: {:?}",
+        again.end.outcome
+    );
 }
 
 #[test]

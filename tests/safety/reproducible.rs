@@ -33,7 +33,7 @@ fn digest(plan: &Plan) -> u64 {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run = bench_experiment::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {})
         .expect("a run");
-    assert!(run.ended.completed, "{:?}", run.ended);
+    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
     run.finish("{}").expect("a good disk").loop_digest
 }
 

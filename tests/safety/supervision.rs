@@ -181,9 +181,9 @@ fn run_with_hanging_supervisor(folder: &std::path::Path) -> Run {
 fn a_hanging_supervisor_leaves_no_run_unattended() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let run = run_with_hanging_supervisor(folder.path());
-    assert_eq!(run.stop_cause, Some(StopCause::LeaseExpired));
-    assert!(!run.ended.completed && run.ended.trip.is_none());
-    assert_eq!(run.ended.stopped_by, Some(Origin::Lease));
+    assert_eq!(run.end.stop_cause, Some(StopCause::LeaseExpired));
+    assert!(!run.end.outcome.completed && run.end.outcome.trip.is_none());
+    assert_eq!(run.end.outcome.stopped_by, Some(Origin::Lease));
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     let recording = Recording::open(&path).expect("a recording");

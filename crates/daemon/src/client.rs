@@ -141,7 +141,7 @@ impl DaemonOwner {
 
 /// Length of a run in real time, by its plan.
 fn estimated_s(order: &PlannedRun) -> Option<f64> {
-    if order.pace == Pace::Virtual {
+    if order.conditions.pace == Pace::Virtual {
         return None;
     }
     let plan = order.plan().ok()?;
@@ -155,7 +155,7 @@ impl RigOwner for DaemonOwner {
         order: &PlannedRun,
         progress: &Progress,
     ) -> Result<(RunReport, Box<dyn RemoteRecording>), ExperimentError> {
-        require_text(&order.folder)?;
+        require_text(&order.conditions.folder)?;
         let connection = self.connection(order, progress)?;
         let report = lock(&connection).run(order, progress)?;
         let recording = DaemonRecording {
@@ -203,10 +203,10 @@ impl Copy {
     fn of(report: &RunReport, order: &PlannedRun, socket: &Path) -> Option<Copy> {
         let made = report.path();
         let file = made.file_name()?.to_str()?;
-        (made.parent() != Some(&order.folder)).then(|| Copy {
+        (made.parent() != Some(&order.conditions.folder)).then(|| Copy {
             socket: socket.into(),
             file: file.into(),
-            to: order.folder.join(file),
+            to: order.conditions.folder.join(file),
         })
     }
 

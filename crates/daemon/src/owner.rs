@@ -260,13 +260,14 @@ impl OwnerThread {
         require_same_rig(&self.config, &plan.config)?;
         let calibration = order.order.calibration()?;
         let mut runner = self.runner(order);
-        lock(&self.status).pace = order.order.pace;
+        lock(&self.status).pace = order.order.conditions.pace;
         runner.set_hooks(
             self.hooks
                 .with_stop(order.stop.clone(), order.lease.clone()),
         );
         runner.progress = order.progress.clone();
-        runner.setup.folder.clone_from(&order.order.folder);
+        let folder = &order.order.conditions.folder;
+        runner.setup.conditions.folder.clone_from(folder);
         let result = runner.run_calibrated(&plan, plan.kind.name(), calibration);
         self.command = Some((order.command, runner));
         result
@@ -286,18 +287,14 @@ impl OwnerThread {
     }
 
     fn setup(&self, order: &OwnerOrder) -> Setup {
-        let order = &order.order;
+        let mut conditions = order.order.conditions.clone();
+        if self.is_simulated() {
+            conditions.motor = MotorHandling::Simulated;
+        }
         Setup {
-            pace: order.pace,
+            conditions,
             simulate: false,
-            clear_fault: order.clear_fault,
-            motor: if self.is_simulated() {
-                MotorHandling::Simulated
-            } else {
-                order.motor
-            },
             now: Moment::now,
-            folder: order.folder.clone(),
             description: Description::default(),
             owner: None,
         }

@@ -236,7 +236,7 @@ impl Session {
     async fn run(&mut self, mut order: PlannedRun) {
         if !self.is_own_user {
             // The command fetches the recording from there.
-            order.folder.clone_from(&self.daemon.recordings);
+            order.conditions.folder.clone_from(&self.daemon.recordings);
             if let Some(file) = foreign_file(&self.daemon, &order) {
                 let message = format!(
                     "calibration.file is {file}, and the daemon, which runs as another user, reads no file for this command with its own rights; copy it into {}, or add --connect none",
@@ -366,7 +366,7 @@ impl Session {
             message: result.as_ref().err().map(ToString::to_string),
             tripped_by: trip.map(|reason| format!("the interlock {reason}")),
         };
-        let is_hung = run.is_some_and(|run| run.ended.stopped_by == Some(Origin::Lease));
+        let is_hung = run.is_some_and(|run| run.end.outcome.stopped_by == Some(Origin::Lease));
         self.daemon.change(|schedule, now| {
             schedule.end_run(self.id, ended, now);
             if is_hung {
@@ -436,10 +436,10 @@ impl Session {
             .read(|schedule| schedule.entry(self.id).cloned());
         let info = RecordingInfo {
             command: entry.ok()?.request.order.command().name().into(),
-            operator: run.description.operator.clone().unwrap_or_default(),
-            name: run.description.name.clone().unwrap_or_default(),
-            note: run.description.note.clone().unwrap_or_default(),
-            outcome: Some(Ending::from(&run.ended).name().into()),
+            operator: run.end.description.operator.clone().unwrap_or_default(),
+            name: run.end.description.name.clone().unwrap_or_default(),
+            note: run.end.description.note.clone().unwrap_or_default(),
+            outcome: Some(Ending::from(&run.end.outcome).name().into()),
             verdict: verdict(results),
         };
         Some(KnownInfo {
@@ -548,7 +548,7 @@ fn reported(mut run: Run) -> Result<(Run, RunReport), ExperimentError> {
 
 fn outcome(result: &Result<Run, ExperimentError>) -> RunOutcome {
     match result {
-        Ok(run) => match Ending::from(&run.ended) {
+        Ok(run) => match Ending::from(&run.end.outcome) {
             Ending::Completed => RunOutcome::Completed,
             Ending::Tripped(..) => RunOutcome::Tripped,
             Ending::Stopped | Ending::CutOff => RunOutcome::Stopped,

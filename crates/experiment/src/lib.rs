@@ -64,8 +64,8 @@ pub use forecast::{
 };
 pub use live::{
     DeviceNames, Feed, FeedSender, FeedSource, LiveRig, OpenBench, Opening, RecordingDefect,
-    RemoteRecording, Run, RunHooks, StopCause, StopSignals, TripCount, abandon_on_signal, run,
-    stop_on_signal, survive_file_size_limit,
+    RemoteRecording, Run, RunEnd, RunHooks, StopCause, StopSignals, TripCount, abandon_on_signal,
+    run, stop_on_signal, survive_file_size_limit,
 };
 pub use plan::{
     CommandSummary, Description, DescriptionError, Invocation, MarginError, MotorStart, Plan,
@@ -80,6 +80,6 @@ pub use results::{
     run_figures, step_response, tracking_metrics,
 };
 pub use run::{
-    MotorHandling, PlannedRun, PlannedStageCheck, RigOwner, RunReport, RunSummary, Runner, Setup,
-    TimingSummary, TripSummary, check_calibration, check_named_files, close,
+    MotorHandling, PlannedRun, PlannedStageCheck, RigOwner, RunConditions, RunReport, RunSummary,
+    Runner, Setup, TimingSummary, TripSummary, check_calibration, check_named_files, close,
 };

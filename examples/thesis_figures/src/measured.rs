@@ -101,12 +101,12 @@ impl Runs {
             bench_experiment::run(plan, rig, Pace::Virtual, &self.folder, &mut |_, _| {})?;
         run.totals()?;
         let path = run.path.clone();
-        if let Some((trip, tick)) = run.ended.trip {
+        if let Some((trip, tick)) = run.end.outcome.trip {
             return Err(FigureError::Run(format!(
                 "`bench {what}` tripped at tick {tick}: {trip}"
             )));
         }
-        if !run.ended.completed {
+        if !run.end.outcome.completed {
             return Err(FigureError::Run(format!("`bench {what}` was stopped")));
         }
         run.finish("{}")?;

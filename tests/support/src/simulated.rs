@@ -13,7 +13,7 @@ pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run =
         bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
-    let ended = (run.path.clone(), run.ended.clone());
+    let ended = (run.path.clone(), run.end.outcome.clone());
     run.finish("{}").expect("a good disk");
     ended
 }

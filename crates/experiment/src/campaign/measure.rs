@@ -72,7 +72,7 @@ impl PointMeasurement<'_> {
     ) -> Result<Option<PointResult>, CampaignError> {
         predicted_extremes(self.config)?;
         let mut run = make_run(&Plan::chirp(self.config.clone()))?;
-        if run.stop_cause.is_some() {
+        if run.end.stop_cause.is_some() {
             return Ok(None);
         }
         let result = analyse_point(&mut run, self.config).map_err(ExperimentError::from)?;
@@ -89,7 +89,7 @@ impl PointMeasurement<'_> {
             stop: self.stop,
         };
         let mut sequence = until_decided(self.config, limits, make_run, &mut |_| {})?;
-        let tripped = sequence.last.ended.trip.is_some();
+        let tripped = sequence.last.end.outcome.trip.is_some();
         if sequence.end == SequenceEnd::Interrupted && !tripped {
             return Ok(None);
         }

@@ -183,10 +183,10 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         let setup = self.campaign.on_devices(folder);
         let plan = Plan::quiet(self.campaign.config.clone());
         let run = (self.run)(setup, &plan, "rest")?;
-        if let Some((trip, tick)) = run.ended.trip {
+        if let Some((trip, tick)) = run.end.outcome.trip {
             return Err(tripped_at_rest(trip, tick).into());
         }
-        if run.stop_cause.is_some() {
+        if run.end.stop_cause.is_some() {
             return Ok(None);
         }
         let path = run.path.clone();

@@ -8,7 +8,7 @@ use std::sync::mpsc::Sender;
 use bench_hal::Rig;
 
 use super::connections::{OutsideEnds, connect};
-use super::run::{Run, RunFile, StopCause};
+use super::run::{Run, RunEnd, RunFile, StopCause};
 use super::run_hooks::{FEED_SLOTS, FeedSource, RunHooks};
 use super::run_recording::{create_recording, metadata, recording_bytes, require_space};
 use super::run_supervisor::Supervisor;
@@ -228,19 +228,21 @@ impl PreparedRun<'_> {
         ended.lost_records += health.discarded();
         Ok(Run {
             path,
-            description: self.plan.description.clone(),
-            pace: rig.pace,
-            scheduling: rig.live.scheduling().clone(),
-            stop_cause: supervisor
-                .cause
-                .or(ended.stopped_by.and_then(StopCause::by)),
-            unrecorded: rig
-                .hooks
-                .recording_defect
-                .get()
-                .filter(|_| on_recording_failure == OnRecordingFailure::Continue),
-            ended,
-            motor: self.plan.motor.clone(),
+            end: RunEnd {
+                description: self.plan.description.clone(),
+                pace: rig.pace,
+                scheduling: rig.live.scheduling().clone(),
+                stop_cause: supervisor
+                    .cause
+                    .or(ended.stopped_by.and_then(StopCause::by)),
+                unrecorded: rig
+                    .hooks
+                    .recording_defect
+                    .get()
+                    .filter(|_| on_recording_failure == OnRecordingFailure::Continue),
+                outcome: ended,
+                motor: self.plan.motor.clone(),
+            },
             file: RunFile::Own(Box::new(recorder)),
         })
     }

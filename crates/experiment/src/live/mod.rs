@@ -18,6 +18,6 @@ pub use live_rig::{LiveRig, run};
 pub(crate) use live_rig::{TAIL_S, servo_run};
 pub use open_bench::{DeviceNames, OpenBench, Opening};
 pub(crate) use run::RunFile;
-pub use run::{RemoteRecording, Run, StopCause};
+pub use run::{RemoteRecording, Run, RunEnd, StopCause};
 pub use run_hooks::{Feed, FeedSender, FeedSource, RecordingDefect, RunHooks, TripCount};
 pub use stop_signals::{StopSignals, abandon_on_signal, stop_on_signal, survive_file_size_limit};

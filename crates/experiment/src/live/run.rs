@@ -14,10 +14,19 @@ use bench_rt::thread::{Pace, Scheduling};
 pub struct Run {
     /// Path of the recording.
     pub path: PathBuf,
+    /// What the process that owns the rig knows of it.
+    pub end: RunEnd,
+    pub(crate) file: RunFile,
+}
+
+/// How a run was made and how it ended.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RunEnd {
     /// Its name, note and operator.
+    #[serde(default)]
     pub description: Description,
     /// How it ended.
-    pub ended: RunOutcome,
+    pub outcome: RunOutcome,
     /// Pace of the loop.
     pub pace: Pace,
     /// How the loop was scheduled.
@@ -28,7 +37,6 @@ pub struct Run {
     pub unrecorded: Option<StopCause>,
     /// The thermal state of the motor at its start.
     pub motor: MotorStart,
-    pub(crate) file: RunFile,
 }
 
 /// The open recording of a run.

@@ -12,7 +12,7 @@ mod run_summary;
 mod runner;
 
 pub use named_files::{check_calibration, check_named_files};
-pub use planned_run::{PlannedRun, RigOwner, RunReport};
+pub use planned_run::{PlannedRun, RigOwner, RunConditions, RunReport};
 pub use planned_stage_check::PlannedStageCheck;
 pub use remembered_motor::MotorHandling;
 pub use run_summary::{RunSummary, TimingSummary, TripSummary};

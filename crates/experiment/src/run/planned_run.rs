@@ -8,15 +8,14 @@ use serde::{Deserialize, Serialize};
 use super::remembered_motor::MotorHandling;
 use crate::certificate::{CertificateText, OverrideReason};
 use crate::errors::ExperimentError;
-use crate::live::{RemoteRecording, Run, RunFile, StopCause};
-use crate::plan::{Description, MotorStart, Plan, PlanError, RunKind};
+use crate::live::{RemoteRecording, Run, RunEnd, RunFile};
+use crate::plan::{Description, Plan, PlanError, RunKind};
 use bench_base::progress::Progress;
 use bench_control::ControllerText;
 use bench_excitation::command::CommandFilter;
 use bench_recording::Totals;
 use bench_rig::calibration::Calibration;
-use bench_rt::servo_run::RunOutcome;
-use bench_rt::thread::{Pace, Scheduling};
+use bench_rt::thread::Pace;
 
 /// Everything that the owner of a rig needs for a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -40,34 +39,31 @@ pub struct PlannedRun {
     /// Why an operator closes the loop without a valid certificate.
     #[serde(default)]
     override_reason: Option<OverrideReason>,
-    /// Pace of the loop.
-    pub pace: Pace,
-    /// Whether a stored fault of the amplifier is cleared first.
-    pub clear_fault: bool,
-    /// How the thermal state of the motor is treated.
-    pub motor: MotorHandling,
-    /// Folder for the recording, as an absolute path.
-    pub folder: PathBuf,
+    /// Pace, motor and folder. The folder is an absolute path.
+    pub conditions: RunConditions,
     /// Name, note and operator of the run.
     #[serde(default)]
     pub description: Description,
 }
 
 /// What a run needs besides its plan.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct RunConditions<'a> {
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct RunConditions {
+    /// Pace of the loop.
     pub pace: Pace,
+    /// Whether a stored fault of the amplifier is cleared first. The operator confirms that its cause was removed.
     pub clear_fault: bool,
+    /// How the thermal state of the motor is treated.
     pub motor: MotorHandling,
-    /// Folder for the recording.
-    pub folder: &'a Path,
+    /// Folder for the recordings.
+    pub folder: PathBuf,
 }
 
 impl PlannedRun {
     /// The order of a plan.
     pub(super) fn of(
         plan: &Plan,
-        conditions: &RunConditions<'_>,
+        conditions: &RunConditions,
         calibration: Option<&Calibration>,
     ) -> Result<PlannedRun, ExperimentError> {
         let mut plan = plan.clone();
@@ -87,10 +83,10 @@ impl PlannedRun {
             controller: plan.controller.map(|found| (found.name, found.text)),
             calibration_toml: calibration_toml
                 .map_err(|error| PlanError::Text(error.to_string()))?,
-            pace: conditions.pace,
-            clear_fault: conditions.clear_fault,
-            motor: conditions.motor,
-            folder: absolute(conditions.folder)?,
+            conditions: RunConditions {
+                folder: absolute(&conditions.folder)?,
+                ..conditions.clone()
+            },
             description: plan.description,
         })
     }
@@ -140,14 +136,7 @@ fn absolute(path: &Path) -> Result<PathBuf, ExperimentError> {
 /// A run that has ended in the process that owns the rig. Its recording is still open for results.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunReport {
-    #[serde(default)]
-    description: Description,
-    ended: RunOutcome,
-    pace: Pace,
-    scheduling: Scheduling,
-    stop_cause: Option<StopCause>,
-    unrecorded: Option<StopCause>,
-    motor: MotorStart,
+    end: RunEnd,
     totals: Totals,
 }
 
@@ -159,13 +148,7 @@ impl RunReport {
     pub fn of(run: &mut Run) -> Result<RunReport, ExperimentError> {
         Ok(RunReport {
             totals: run.totals()?,
-            description: run.description.clone(),
-            ended: run.ended.clone(),
-            pace: run.pace,
-            scheduling: run.scheduling.clone(),
-            stop_cause: run.stop_cause,
-            unrecorded: run.unrecorded,
-            motor: run.motor.clone(),
+            end: run.end.clone(),
         })
     }
 
@@ -179,13 +162,7 @@ impl RunReport {
         let name = self.totals.path.file_name().unwrap_or_default();
         Run {
             path: folder.join(name),
-            description: self.description,
-            ended: self.ended,
-            pace: self.pace,
-            scheduling: self.scheduling,
-            stop_cause: self.stop_cause,
-            unrecorded: self.unrecorded,
-            motor: self.motor,
+            end: self.end,
             file: RunFile::Remote {
                 totals: self.totals,
                 recording,
@@ -211,11 +188,11 @@ pub trait RigOwner: Debug + Send + Sync {
 pub(super) fn run_elsewhere(
     owner: &dyn RigOwner,
     plan: &Plan,
-    conditions: &RunConditions<'_>,
+    conditions: &RunConditions,
     calibration: Option<&Calibration>,
     progress: &Progress,
 ) -> Result<Run, ExperimentError> {
     let order = PlannedRun::of(plan, conditions, calibration)?;
     let (report, recording) = owner.run(&order, progress)?;
-    Ok(report.run(recording, conditions.folder))
+    Ok(report.run(recording, &conditions.folder))
 }

@@ -99,27 +99,27 @@ impl RunSummary {
     /// Summarises a run; its recording then contains every tick.
     pub fn of(run: &mut Run) -> Result<RunSummary, RecordingError> {
         let totals = run.totals()?;
-        let ending = Ending::from(&run.ended);
+        let ending = Ending::from(&run.end.outcome);
         Ok(RunSummary {
-            description: run.description.clone(),
+            description: run.end.description.clone(),
             outcome: ending,
-            stop_cause: run.stop_cause,
-            unrecorded: run.unrecorded,
+            stop_cause: run.end.stop_cause,
+            unrecorded: run.end.unrecorded,
             trip: TripSummary::of(ending),
             ticks: totals.ticks,
             overruns: totals.overruns,
             // Records lost at the very end leave no gap in the file; only the loop counts them.
-            lost_records: totals.lost_records.max(run.ended.lost_records),
+            lost_records: totals.lost_records.max(run.end.outcome.lost_records),
             recording: run.path.display().to_string(),
             loop_digest: format!("{:016x}", totals.loop_digest),
             motor: MotorRun {
-                thermal_start_a: run.motor.thermal_a2.sqrt(),
-                thermal_end_a: run.ended.thermal_a2.sqrt(),
-                known_from: run.motor.known_from.clone(),
+                thermal_start_a: run.end.motor.thermal_a2.sqrt(),
+                thermal_end_a: run.end.outcome.thermal_a2.sqrt(),
+                known_from: run.end.motor.known_from.clone(),
             },
             timing: TimingSummary {
-                pace: run.pace,
-                scheduling: run.scheduling.clone(),
+                pace: run.end.pace,
+                scheduling: run.end.scheduling.clone(),
                 lateness_ns: totals.lateness,
                 compute_ns: totals.compute,
             },

@@ -26,18 +26,12 @@ use bench_rt::thread::Pace;
 /// The rig on which a plan runs, its pace, and the folder for its recording.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// Pace of the loop.
-    pub pace: Pace,
+    /// Pace, motor and folder.
+    pub conditions: RunConditions,
     /// Whether the simulated stage replaces the configured devices.
     pub simulate: bool,
-    /// Whether a stored fault of the amplifier is cleared first. The operator confirms that its cause was removed.
-    pub clear_fault: bool,
-    /// How the thermal state of the motor is treated.
-    pub motor: MotorHandling,
     /// The clock between runs.
     pub now: fn() -> Moment,
-    /// Folder for the recordings.
-    pub folder: PathBuf,
     /// Name, note and operator of the runs; those of each plan if they are not given here.
     pub description: Description,
     /// The process that owns the rig; `None` if this process opens it.
@@ -48,12 +42,14 @@ impl Setup {
     /// The configured devices at their own pace. A run waits until the motor is cool enough.
     pub fn on_devices(folder: PathBuf) -> Setup {
         Setup {
-            pace: Pace::Realtime,
+            conditions: RunConditions {
+                pace: Pace::Realtime,
+                clear_fault: false,
+                motor: MotorHandling::WaitUntilCool,
+                folder,
+            },
             simulate: false,
-            clear_fault: false,
-            motor: MotorHandling::WaitUntilCool,
             now: Moment::now,
-            folder,
             description: Description::default(),
             owner: None,
         }
@@ -62,12 +58,14 @@ impl Setup {
     /// The simulated stage as fast as possible.
     pub fn simulated(folder: PathBuf) -> Setup {
         Setup {
-            pace: Pace::Virtual,
+            conditions: RunConditions {
+                pace: Pace::Virtual,
+                clear_fault: false,
+                motor: MotorHandling::Simulated,
+                folder,
+            },
             simulate: true,
-            clear_fault: false,
-            motor: MotorHandling::Simulated,
             now: Moment::now,
-            folder,
             description: Description::default(),
             owner: None,
         }
@@ -82,22 +80,12 @@ impl Setup {
         }
     }
 
-    /// What a run needs besides its plan.
-    fn conditions(&self) -> RunConditions<'_> {
-        RunConditions {
-            pace: self.pace,
-            clear_fault: self.clear_fault,
-            motor: self.motor,
-            folder: &self.folder,
-        }
-    }
-
     /// How the rig of a run is opened.
     fn opening(&self, config: &Config) -> Opening {
         Opening {
             stage: self.stage(config),
-            pace: self.pace,
-            clear_fault: self.clear_fault,
+            pace: self.conditions.pace,
+            clear_fault: self.conditions.clear_fault,
         }
     }
 }
@@ -171,8 +159,8 @@ impl Runner {
         if let Some(owner) = &self.setup.owner {
             self.progress.begin(phase, 0);
             let calibration = calibration.as_ref();
-            let conditions = self.setup.conditions();
-            return run_elsewhere(&**owner, plan, &conditions, calibration, &self.progress);
+            let conditions = &self.setup.conditions;
+            return run_elsewhere(&**owner, plan, conditions, calibration, &self.progress);
         }
         let mut bench = self.opened(&plan.config)?;
         bench.rig.set_hooks(self.hooks.clone());
@@ -186,7 +174,7 @@ impl Runner {
             CheckedStage::Ended(run) => *run,
             CheckedStage::MayClose => self.run_on(plan, &mut bench, phase)?,
         };
-        if ended.ended.trip.is_none() {
+        if ended.end.outcome.trip.is_none() {
             self.open.replace(Some(bench));
         }
         Ok(ended)
@@ -210,7 +198,7 @@ impl Runner {
             return Ok(CheckedStage::MayClose);
         };
         let mut run = self.run_on(planned.plan.clone(), bench, "stage check")?;
-        if Ending::from(&run.ended) != Ending::Completed {
+        if Ending::from(&run.end.outcome) != Ending::Completed {
             return Ok(CheckedStage::Ended(Box::new(run)));
         }
         run.totals()?;
@@ -227,13 +215,13 @@ impl Runner {
         bench: &mut OpenBench,
         phase: &'static str,
     ) -> Result<Run, ExperimentError> {
-        let run = match self.setup.motor {
+        let run = match self.setup.conditions.motor {
             MotorHandling::Simulated => self.run_simulated_motor(plan, bench, phase),
             MotorHandling::Remembered | MotorHandling::WaitUntilCool => {
                 self.run_remembered_motor(plan, bench, phase)
             }
         }?;
-        self.motor_a2.set(Some(run.ended.thermal_a2));
+        self.motor_a2.set(Some(run.end.outcome.thermal_a2));
         Ok(run)
     }
 
@@ -273,7 +261,7 @@ impl Runner {
             stop: &self.hooks.stop,
         };
         let is_later = self.motor_a2.get().is_some();
-        let waits = is_later || self.setup.motor == MotorHandling::WaitUntilCool;
+        let waits = is_later || self.setup.conditions.motor == MotorHandling::WaitUntilCool;
         plan.motor = motor.ready(&plan, waits, &self.progress)?;
         motor.begin(&plan)?;
         let result = self.run_loop(&plan, &mut bench.rig, phase);
@@ -289,7 +277,7 @@ impl Runner {
     ) -> Result<Run, RunError> {
         self.progress.begin(phase, 0);
         let mut update = |done, total| self.progress.set(done, total);
-        rig.run(plan, &self.setup.folder, &mut update)
+        rig.run(plan, &self.setup.conditions.folder, &mut update)
     }
 }
 
