@@ -4,7 +4,7 @@ use core::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::run_options::exit;
 use super::table::wrap;
 use super::{linearity_output, loop_output, modal_output};
@@ -70,9 +70,9 @@ pub(super) fn shown_by(progress: &Progress) -> impl FnMut(AnalysisPhase, f64) ->
 }
 
 /// The outcome of a run with its analysis.
-pub(super) fn outcome(run: &RunSummary, outputs: &AnalysisOutputs) -> Outcome {
+pub(super) fn analysis_exit(run: &RunSummary, outputs: &AnalysisOutputs) -> Exit {
     if outputs.is_cancelled() {
-        Outcome::Failed
+        Exit::Failed
     } else {
         exit(run)
     }

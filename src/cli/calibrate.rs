@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_result, print_text, warn};
 use super::progress::ProgressLine;
 use super::run_options::{RunCommand, RunOptions, exit, run_text};
@@ -97,7 +97,7 @@ struct Report {
     why: Option<String>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = args.order.config()?;
     let plan = calibration::check(&config)?;
     check_target(args.order.write.as_deref())?;
@@ -106,7 +106,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         let report = PlanReport::new(&plan, &config, !args.order.no_delay);
         let text = plan_text(&plan, &config, !args.order.no_delay);
         print_result(args.order.bench.json, &report, |_| text)?;
-        return Ok(Outcome::Done);
+        return Ok(Exit::Done);
     }
     let setup = args.command().setup(&config)?;
     if !args.order.bench.json {
@@ -126,7 +126,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     })?;
     Ok(match report.calibration {
         Some(_) => exit(&report.run),
-        None => Outcome::Failed,
+        None => Exit::Failed,
     })
 }
 

@@ -8,8 +8,8 @@ use std::sync::atomic::AtomicBool;
 use super::campaign_output::Report;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
+use super::exit::Exit;
 use super::operator::TerminalOperator;
-use super::outcome::Outcome;
 use super::output::{print_note, print_result};
 use super::progress::ProgressLine;
 use bench_base::atomic_file::write_atomic;
@@ -39,7 +39,7 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = config(args)?;
     let grid = grid(args, &config)?;
     let tolerances = tolerances(args, &grid, &config)?;
@@ -57,10 +57,10 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     if !campaign.missing().is_empty() {
         print_note(&stopped(args, &campaign));
-        return Ok(Outcome::Failed);
+        return Ok(Exit::Failed);
     }
     show(args, &config, &campaign.evaluate(tolerances)?)?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 fn grid(args: &Args, config: &Config) -> Result<Grid, CliError> {

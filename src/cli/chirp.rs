@@ -4,10 +4,10 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{self, analysis_failed, open_analyse_and_write, outcome};
+use super::analysis_output::{self, analysis_exit, analysis_failed, open_analyse_and_write};
 use super::error::CliError;
+use super::exit::Exit;
 use super::figure_options::magnitude_axis;
-use super::outcome::Outcome;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::progress::ProgressLine;
@@ -69,7 +69,7 @@ struct Report {
     made: AnalysisOutputs,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let base = args.order.config()?;
     let max_motion_s = args.order.sequential.max_motion_s(&base)?;
     let config = match max_motion_s {
@@ -83,7 +83,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         let mut plan = ExcitationPlan::new(&config, expected);
         plan.motor = args.order.rig.motor_summary(&Plan::chirp(config))?;
         print_result(args.order.bench.json, &plan, plan_output::text)?;
-        return Ok(Outcome::Done);
+        return Ok(Exit::Done);
     }
     match max_motion_s {
         Some(max_motion_s) => args.sequence().measure(&base, max_motion_s),
@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
 }
 
 /// Runs the excitation and analyses its recording.
-fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, CliError> {
+fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Exit, CliError> {
     if !args.order.bench.json {
         print_text(&plan_text(config, &expected))?;
     }
@@ -112,7 +112,7 @@ fn measure(args: &Args, config: &Config, expected: Extremes) -> Result<Outcome, 
     };
     let text = run_text(&report.run, config) + &analysis_output::text(&report.made);
     close(run, &report, args.order.bench.json, &text)?;
-    Ok(outcome(&report.run, &report.made))
+    Ok(analysis_exit(&report.run, &report.made))
 }
 
 /// Analyses a run, if it is completed.

@@ -3,7 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 
 use super::error::{CliError, ErrorReport};
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_json, print_note};
 use super::run_options::RunCommand;
 use super::{
@@ -96,7 +96,7 @@ impl Command {
 
 /// Parses the arguments of the process, runs the command and reports an error: as text on standard error and, with
 /// `--json`, as an object on standard output.
-pub fn main() -> Outcome {
+pub fn main() -> Exit {
     // Without the handler a write beyond `ulimit -f` ends the process; the program works without it.
     let _ = survive_file_size_limit();
     let json = std::env::args_os().any(|argument| argument == "--json");
@@ -107,7 +107,7 @@ pub fn main() -> Outcome {
 }
 
 /// Runs a parsed command line in this process, or at the daemon that it names.
-fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
+fn run_here_or_there(cli: Cli) -> Result<Exit, CliError> {
     if let Some(command) = cli.command.run_command()
         && let Some(target) = command.remote()?
     {
@@ -116,28 +116,24 @@ fn run_here_or_there(cli: Cli) -> Result<Outcome, CliError> {
     run(cli)
 }
 
-fn failed(error: &CliError, json: bool) -> Outcome {
+fn failed(error: &CliError, json: bool) -> Exit {
     if json {
         print_report(&ErrorReport::of(error))
     } else {
         print_note(&error.to_string())
     }
-    error.outcome()
+    error.exit()
 }
 
 /// Help and version are requests, everything else is wrong usage.
-fn not_parsed(error: &clap::Error, json: bool) -> Outcome {
+fn not_parsed(error: &clap::Error, json: bool) -> Exit {
     let is_request = error.exit_code() == 0;
     if json && !is_request {
         print_report(&ErrorReport::of_usage(error))
     } else {
         drop(error.print())
     }
-    if is_request {
-        Outcome::Done
-    } else {
-        Outcome::Usage
-    }
+    if is_request { Exit::Done } else { Exit::Usage }
 }
 
 /// The message on standard error, the object on standard output.
@@ -148,7 +144,7 @@ fn print_report(report: &ErrorReport) {
 }
 
 /// Runs a parsed command line.
-pub fn run(cli: Cli) -> Result<Outcome, CliError> {
+pub fn run(cli: Cli) -> Result<Exit, CliError> {
     match cli.command {
         Command::Chirp(args) => chirp::run(&args),
         Command::Linearity(args) => linearity::run(&args),

@@ -7,8 +7,8 @@ use serde::Serialize;
 use super::analysis_output::shown_by;
 use super::compare_output::text;
 use super::error::CliError;
+use super::exit::Exit;
 use super::identify::warn_of_unchecked;
-use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
 use bench_base::atomic_file::write_atomic;
@@ -40,7 +40,7 @@ struct Report {
     page: Option<String>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let runs = results(&args.recordings)?;
     let comparison = Comparison::of(&runs).map_err(|error| CliError::Usage(error.to_string()))?;
     let page = args.out.as_deref();
@@ -55,9 +55,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         text(&report.comparison, report.page.as_deref())
     })?;
     Ok(if cautions.is_empty() {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Impaired
+        Exit::Impaired
     })
 }
 

@@ -6,7 +6,7 @@ use clap::Command;
 use clap_complete::Shell;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_text;
 
 /// Which shell.
@@ -28,20 +28,20 @@ pub(super) struct ManArgs {
 pub(super) fn run_completions(
     args: &CompletionArgs,
     mut program: Command,
-) -> Result<Outcome, CliError> {
+) -> Result<Exit, CliError> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut program, "bench", &mut script);
     print_text(&String::from_utf8_lossy(&script))?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 /// Writes the manual pages of `program`.
-pub(super) fn run_man(args: &ManArgs, program: Command) -> Result<Outcome, CliError> {
+pub(super) fn run_man(args: &ManArgs, program: Command) -> Result<Exit, CliError> {
     match &args.out {
         Some(folder) => write_pages(&program, folder)?,
         None => print_text(&page(program)?)?,
     }
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 fn write_pages(command: &Command, folder: &Path) -> Result<(), CliError> {

@@ -8,7 +8,7 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_json, print_result, print_text, warn};
 use super::table::labelled;
 use bench_config::{Config, Purpose, profiles};
@@ -109,7 +109,7 @@ impl Profile {
     }
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     match &args.what {
         ConfigCommand::Show(args) => show(args)?,
         ConfigCommand::Check(args) => check(args)?,
@@ -117,7 +117,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         ConfigCommand::Profiles { json } => list_profiles(*json)?,
         ConfigCommand::Init(args) => init(args)?,
     }
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 fn show(args: &ConfigArgs) -> Result<(), CliError> {

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::analysis_output::outcome;
+use super::analysis_output::analysis_exit;
 use super::chirp::outputs;
 use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{RunCommand, RunOptions, close, exit};
@@ -47,7 +47,7 @@ impl Args {
     }
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = args.order.config()?;
     let closed_loop = closed_loop(&config)?;
     let margins = closed_loop.margins();
@@ -74,7 +74,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let text = control_output::text(&report, &config);
     close(run, &report, args.order.bench.json, &text)?;
     Ok(match &report.made {
-        Some(made) => outcome(&report.run, made),
+        Some(made) => analysis_exit(&report.run, made),
         None => exit(&report.run),
     })
 }
@@ -103,7 +103,7 @@ fn print_plan(
     plan: &Plan,
     predicted: Predicted,
     evidence: Evidence,
-) -> Result<Outcome, CliError> {
+) -> Result<Exit, CliError> {
     let config = &plan.config;
     let report = PlanReport {
         reference: control_output::reference_text(config),
@@ -129,7 +129,7 @@ fn print_plan(
             + &control_output::evidence_text(&report.evidence)
             + &control_output::conditions_table(&report.evidence.conditions)
     })?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 /// The margins and the response to the reference by the model.

@@ -7,7 +7,7 @@ use clap::{Subcommand, ValueEnum};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_result;
 use super::table::labelled;
 use bench_base::atomic_file::write_atomic;
@@ -113,19 +113,19 @@ struct SectionReport {
     denominator: Vec<f64>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     match &args.what {
         ControllerCommand::Import(args) => run_import(args),
     }
 }
 
-fn run_import(args: &ImportArgs) -> Result<Outcome, CliError> {
+fn run_import(args: &ImportArgs) -> Result<Exit, CliError> {
     let title = args.title.clone().unwrap_or_else(|| stem(&args.file));
     let imported = import(&args.file, &title, &options(args))?;
     write_new(&args.out, &imported.text)?;
     let report = Report::of(&args.out, &imported);
     print_result(args.json, &report, text)?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 fn options(args: &ImportArgs) -> ImportOptions {

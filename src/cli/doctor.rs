@@ -4,7 +4,7 @@ use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_result;
 use super::table::wrap;
 use crate::doctor::{Finding, Report, RunChecks, Severity, examine};
@@ -23,16 +23,16 @@ pub(super) struct Args {
 
 const OUT: &str = "recordings";
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = args.bench.load(Purpose::Model, &[])?;
     let report = examine(&config, &run_checks(args), &args.out);
     print_result(args.bench.json, &report, |report| {
         text(report, &same_options(args))
     })?;
     Ok(if report.ready {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Failed
+        Exit::Failed
     })
 }
 

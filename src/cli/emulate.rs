@@ -10,7 +10,7 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_json, print_message, print_note};
 use bench_base::quantity::{Dimension, OfFrequency, OfTime, si};
 use bench_config::{Config, OptionSetting, Purpose};
@@ -153,7 +153,7 @@ fn require_positive(option: &str, value: Option<f64>) -> Result<(), CliError> {
     }
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     args.check()?;
     let config = args.bench.load(Purpose::Model, &args.settings())?;
     let log = args.log.as_deref().map(LogFile::create).transpose()?;
@@ -168,7 +168,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     if args.bench.json {
         print_json(&server.emulator.summary())?;
     }
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 struct Server<'a> {

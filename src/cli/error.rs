@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::outcome::Outcome;
+use super::exit::Exit;
 use bench_config::ConfigError;
 use bench_control::ControllerError;
 use bench_control::tuning::TuneError;
@@ -107,12 +107,12 @@ impl From<CampaignError> for CliError {
 }
 
 impl CliError {
-    /// The outcome of the command: wrong usage and refused settings are distinguished from failures at run time.
-    pub fn outcome(&self) -> Outcome {
+    /// The exit code of the command: wrong usage and refused settings are distinguished from failures at run time.
+    pub fn exit(&self) -> Exit {
         if self.is_failure() {
-            Outcome::Failed
+            Exit::Failed
         } else {
-            Outcome::Usage
+            Exit::Usage
         }
     }
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::CliError;
+use super::exit::Exit;
 use super::identify::warn_of_unchecked;
-use super::outcome::Outcome;
 use super::output::{print_result, warn};
 use bench_experiment::{Ending, Plan, open_with_signals, recorded_frf};
 use bench_export::{ExportError, Format, Response, Target, write_response, write_signals};
@@ -65,7 +65,7 @@ struct Exported {
     rows: u64,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let target = target(args);
     target.check()?;
     args.format.check()?;
@@ -83,9 +83,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         format!("file       {}\n", report.file)
     })?;
     Ok(if defects.is_empty() {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Impaired
+        Exit::Impaired
     })
 }
 

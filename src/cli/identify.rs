@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::analysis_output::{self, analyse_and_write, in_folder};
 use super::error::CliError;
+use super::exit::Exit;
 use super::figure_options::magnitude_axis;
 use super::identify_external;
-use super::outcome::Outcome;
 use super::output::print_result;
 use super::progress::ProgressLine;
 use super::run_options::{description_text, trip_text};
@@ -50,7 +50,7 @@ struct Report {
     made: AnalysisOutputs,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     if args.order.table.selects_csv(&args.order.recording) {
         return identify_external::run(
             &args.order.recording,
@@ -68,9 +68,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let report = Report::new(&recording, &args.order.recording, made);
     print_result(args.order.json, &report, |report| report.text(&plan.config))?;
     Ok(if report.is_whole() {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Impaired
+        Exit::Impaired
     })
 }
 

@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
+use super::exit::Exit;
 use super::linearity_output;
 use super::modal_output;
-use super::outcome::Outcome;
 use super::output::print_result;
 use bench_identify::external_csv;
 use bench_identify::frf_csv;
@@ -68,7 +68,7 @@ pub(super) fn run(
     options: &ExternalOptions,
     magnitude_axis: MagnitudeAxis,
     json: bool,
-) -> Result<Outcome, CliError> {
+) -> Result<Exit, CliError> {
     let columns = options.columns(path)?;
     let signals = external_csv::read(path, &columns)?;
     signals.check()?;
@@ -91,7 +91,7 @@ pub(super) fn run(
     };
     let report = Report::write(&record, path, results)?;
     print_result(json, &report, Report::text)?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 impl Report {

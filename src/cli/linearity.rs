@@ -5,12 +5,12 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::analysis_output;
-use super::analysis_output::outcome;
+use super::analysis_output::analysis_exit;
 use super::chirp::outputs;
 use super::error::CliError;
+use super::exit::Exit;
 use super::figure_options::magnitude_axis;
 use super::linearity_output;
-use super::outcome::Outcome;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunCommand, RunOptions, run_text};
@@ -77,12 +77,12 @@ struct AmplitudeRun {
 }
 
 impl AmplitudeRun {
-    fn outcome(&self) -> Outcome {
-        outcome(&self.run, &self.outputs)
+    fn exit(&self) -> Exit {
+        analysis_exit(&self.run, &self.outputs)
     }
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let planned = args.order.planned()?;
     let plans = plan_amplitudes(&planned, &args.order.amplitude_ratios()?)?;
     if !args.order.bench.json {
@@ -91,7 +91,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     let runs = measure(args, &plans)?;
     let outcome = overall(&runs);
     let band_hz = planned.chirp.band_hz();
-    let mut report = report(runs, band_hz, outcome != Outcome::Failed);
+    let mut report = report(runs, band_hz, outcome != Exit::Failed);
     report.overview = overview(&report, &plans)?;
     print_result(args.order.bench.json, &report, |report| {
         text(report, &plans)
@@ -130,7 +130,7 @@ fn measure(args: &Args, plans: &[AmplitudePlan]) -> Result<Vec<AmplitudeRun>, Cl
     let mut runs = Vec::new();
     linearity::run(&runner, plans, &mut |plan, run| {
         let finished = finish(plan, run, magnitude_axis(args.order.figures))?;
-        let is_failed = finished.outcome() == Outcome::Failed;
+        let is_failed = finished.exit() == Exit::Failed;
         runs.push(finished);
         Ok::<bool, CliError>(!is_failed)
     })?;
@@ -156,13 +156,13 @@ fn finish(
 }
 
 /// A failure of any run, or else the first outcome that is not `Done`.
-fn overall(runs: &[AmplitudeRun]) -> Outcome {
-    let mut outcomes = runs.iter().map(AmplitudeRun::outcome);
-    if outcomes.clone().any(|outcome| outcome == Outcome::Failed) {
-        return Outcome::Failed;
+fn overall(runs: &[AmplitudeRun]) -> Exit {
+    let mut outcomes = runs.iter().map(AmplitudeRun::exit);
+    if outcomes.clone().any(|outcome| outcome == Exit::Failed) {
+        return Exit::Failed;
     }
-    let impaired = outcomes.find(|outcome| *outcome != Outcome::Done);
-    impaired.unwrap_or(Outcome::Done)
+    let impaired = outcomes.find(|outcome| *outcome != Exit::Done);
+    impaired.unwrap_or(Exit::Done)
 }
 
 fn report(runs: Vec<AmplitudeRun>, band_hz: (f64, f64), all_completed: bool) -> Report {

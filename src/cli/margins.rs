@@ -6,9 +6,9 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::error::CliError;
+use super::exit::Exit;
 use super::figure_options::PictureOptions;
 use super::measured_margins::{self, Measured};
-use super::outcome::Outcome;
 use super::output::{no_json, print_result, warn};
 use super::table::{table, wrap};
 use bench_base::decimal::Decimal;
@@ -57,7 +57,7 @@ struct Report {
     measured: Option<Measured>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = args.bench.load(Purpose::Model, &args.choice.settings())?;
     warn(&check_calibration(&config, Stage::of(&config))?);
     let closed_loop = closed_loop(&config)?;
@@ -94,11 +94,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
             + &measured.unwrap_or_default()
             + &args.picture.files_text()
     })?;
-    Ok(if is_stable {
-        Outcome::Done
-    } else {
-        Outcome::Failed
-    })
+    Ok(if is_stable { Exit::Done } else { Exit::Failed })
 }
 
 /// The loop of the model: Bode plot, Nyquist plot and sensitivities.

@@ -20,7 +20,7 @@ use clap::Subcommand;
 use serde::Serialize;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use bench_order::{BenchOptions, GLOSSARY};
 use bench_thesis::veering::report::VeeringPoint;
 
@@ -58,7 +58,7 @@ enum ModelCommand {
     CriticalDamping(critical_damping::Args),
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     match &args.what {
         ModelCommand::Study(args) => return study::run(args),
         ModelCommand::Modes(options) => modes::run(options)?,
@@ -72,7 +72,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         ModelCommand::Step(args) => step::run(args)?,
         ModelCommand::CriticalDamping(args) => critical_damping::run(args)?,
     }
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 /// A report with the profile that it belongs to.

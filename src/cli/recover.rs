@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_result;
 use bench_recording::{Cut, DamagedRange, MissingTicks, Recovered, recover};
 
@@ -37,7 +37,7 @@ struct Report {
     unchecked_messages: u64,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let to = args
         .to
         .clone()
@@ -58,9 +58,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     print_result(args.json, &report, |report| text(report, &recovered))?;
     Ok(if recovered.is_complete() {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Impaired
+        Exit::Impaired
     })
 }
 

@@ -12,7 +12,7 @@ use tokio::time::{Duration, interval};
 
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_message, print_note, print_text};
 use bench_daemon::http_client::{Ask, HttpError, Target, json as answer, send};
 use bench_daemon::{Hold, OnDisconnect, OutputPiece, RunRequest};
@@ -61,7 +61,7 @@ pub(super) fn carry_out(
     target: &Target,
     order: &Order,
     description: &DescriptionOptions,
-) -> Result<Outcome, CliError> {
+) -> Result<Exit, CliError> {
     in_runtime(target, carried_out(target, order, description))
 }
 
@@ -81,7 +81,7 @@ async fn carried_out(
     target: &Target,
     order: &Order,
     description: &DescriptionOptions,
-) -> Result<Outcome, CliError> {
+) -> Result<Exit, CliError> {
     let lease = ask(
         target,
         Method::POST,
@@ -129,7 +129,7 @@ fn held_text(held: &Value) -> String {
 }
 
 /// Prints what the run prints, keeps the lease, and passes stop signals on, until the run has ended.
-async fn follow(target: &Target, lease: &str, run: u64) -> Result<Outcome, CliError> {
+async fn follow(target: &Target, lease: &str, run: u64) -> Result<Exit, CliError> {
     let path = format!("/api/v1/runs/{run}/output");
     let output = send(target, &Ask::get(&path))
         .await
@@ -147,7 +147,7 @@ async fn follow(target: &Target, lease: &str, run: u64) -> Result<Outcome, CliEr
             piece = lines.next() => match piece.map_err(|error| unreachable(target, &error.to_string()))? {
                 OutputPiece::Stdout(text) => print_text(&text)?,
                 OutputPiece::Stderr(text) => print_message(&text),
-                OutputPiece::Exit(code) => return Ok(outcome(code)),
+                OutputPiece::Exit(code) => return Ok(exit(code)),
             },
             _ = renewals.tick() => drop(ask(target, Method::PUT, "/api/v1/lease", Some(lease), None).await?),
             () = signals.received() => {
@@ -159,12 +159,12 @@ async fn follow(target: &Target, lease: &str, run: u64) -> Result<Outcome, CliEr
     }
 }
 
-fn outcome(code: i32) -> Outcome {
+fn exit(code: i32) -> Exit {
     match code {
-        0 => Outcome::Done,
-        2 => Outcome::Usage,
-        3 => Outcome::Impaired,
-        _ => Outcome::Failed,
+        0 => Exit::Done,
+        2 => Exit::Usage,
+        3 => Exit::Impaired,
+        _ => Exit::Failed,
     }
 }
 

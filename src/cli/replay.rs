@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::error::CliError;
+use super::exit::Exit;
 use super::identify::warn_of_unchecked;
-use super::outcome::Outcome;
 use super::output::print_result;
 use bench_experiment::{Difference, replay};
 use bench_recording::{Cut, Recording};
@@ -32,7 +32,7 @@ struct Report {
     first: Option<Difference>,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let recording = Recording::open(&args.recording)?;
     warn_of_unchecked(&recording);
     let replayed = replay(&recording)
@@ -47,9 +47,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     print_result(args.json, &report, |report| text(report, recording.cut()))?;
     Ok(if report.identical {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Failed
+        Exit::Failed
     })
 }
 

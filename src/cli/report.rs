@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::analysis_output::shown_by;
 use super::compare::results;
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use bench_base::atomic_file::write_atomic;
@@ -45,7 +45,7 @@ struct Report {
     page: String,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let page = page(&args.recordings)?;
     let path = args
         .out
@@ -53,7 +53,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         .unwrap_or_else(|| default_page(&args.recordings[0]));
     if path == Path::new(STANDARD_OUTPUT) {
         print_text(&page)?;
-        return Ok(Outcome::Done);
+        return Ok(Exit::Done);
     }
     write_atomic(&path, &page).map_err(|error| {
         let path = path.display();
@@ -69,7 +69,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.json, &report, |report| {
         format!("page       {}\n", report.page)
     })?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 /// The page of one run, or of several recordings in the same plots.

@@ -10,7 +10,7 @@ use tokio::time::{Duration, sleep};
 use super::connection::SCHEME;
 use super::description_options::user;
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_result;
 use super::remote::{ask, in_runtime, tcp_target};
 use super::table::wrap;
@@ -49,13 +49,13 @@ struct Resumed {
     trip: Value,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let target = daemon_target(args)?;
     let operator = args.operator.clone().or_else(user);
     let operator = operator.unwrap_or_else(|| "unknown".into());
     let resumed = in_runtime(&target, resume(&target, &operator))?;
     print_result(args.json, &resumed, text)?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 /// The daemon that is named, or that of this machine.

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::connection::ConnectOption;
 use super::description_options::DescriptionOptions;
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::table::{labelled, wrap};
@@ -117,11 +117,11 @@ pub(super) fn close(
 }
 
 /// The exit code of a run.
-pub(super) fn exit(summary: &RunSummary) -> Outcome {
+pub(super) fn exit(summary: &RunSummary) -> Exit {
     match (summary.is_completed(), summary.has_losses()) {
-        (false, _) => Outcome::Failed,
-        (true, true) => Outcome::Impaired,
-        (true, false) => Outcome::Done,
+        (false, _) => Exit::Failed,
+        (true, true) => Exit::Impaired,
+        (true, false) => Exit::Done,
     }
 }
 

@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_text;
 use super::table::labelled;
 use bench_config::{Purpose, Source};
@@ -46,7 +46,7 @@ pub(super) struct Args {
     demo: bool,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let configuration = configuration(args)?;
     if args.demo && !is_simulated(&configuration.config) {
         return Err(CliError::Usage(
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
         let _ = print_text(&started_text(started));
     });
     match served {
-        Ok(()) => Ok(Outcome::Done),
+        Ok(()) => Ok(Exit::Done),
         Err(error) => Err(CliError::Failed(error.to_string())),
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::{print_result, warn};
 use super::progress::ProgressLine;
 use super::tune_measured::{self, SourceOptions};
@@ -100,7 +100,7 @@ pub(super) struct Args {
     out: PathBuf,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     let config = args.configuration()?;
     let progress = Progress::new("tune");
     let line = ProgressLine::show(&progress);
@@ -145,9 +145,9 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     ));
     warn(&failures);
     Ok(if failures.is_empty() {
-        Outcome::Done
+        Exit::Done
     } else {
-        Outcome::Failed
+        Exit::Failed
     })
 }
 

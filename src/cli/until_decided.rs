@@ -4,9 +4,9 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{self, analysis_failed, outcome};
+use super::analysis_output::{self, analysis_exit, analysis_failed};
 use super::error::CliError;
-use super::outcome::Outcome;
+use super::exit::Exit;
 use super::output::print_text;
 use super::progress::ProgressLine;
 use super::run_options::{RunCommand, close, run_text};
@@ -42,7 +42,7 @@ pub(super) struct SequenceCommand<'a> {
 
 impl SequenceCommand<'_> {
     /// Makes the shots and writes the results of all of them beside the last recording.
-    pub(super) fn measure(&self, base: &Config, max_motion_s: f64) -> Result<Outcome, CliError> {
+    pub(super) fn measure(&self, base: &Config, max_motion_s: f64) -> Result<Exit, CliError> {
         let setup = self.command.setup(base)?;
         let json = self.command.bench.json;
         let sequence = stop_on_signal(|stop| {
@@ -53,7 +53,7 @@ impl SequenceCommand<'_> {
         self.report(sequence.map_err(failed)??)
     }
 
-    fn report(&self, mut sequence: Sequence) -> Result<Outcome, CliError> {
+    fn report(&self, mut sequence: Sequence) -> Result<Exit, CliError> {
         let summary = RunSummary::of(&mut sequence.last)?;
         let path = sequence.last.path.clone();
         let made = outputs(&sequence, &path, self.magnitude_axis);
@@ -69,8 +69,8 @@ impl SequenceCommand<'_> {
             + &wrap(&end_text(report.sequence, report.motion_s), 2)
             + &analysis_output::text(&report.made);
         close(sequence.last, &report, self.command.bench.json, &text)?;
-        let last = outcome(&report.run, &report.made);
-        Ok(sequence_outcome(report.sequence, &report.shots, last))
+        let last = analysis_exit(&report.run, &report.made);
+        Ok(sequence_exit(report.sequence, &report.shots, last))
     }
 }
 
@@ -98,10 +98,10 @@ fn shots(
 
 /// The outcome of a sequence, given that of its last run. Losses of earlier chirps count as well, because the verdict uses the data of
 /// all chirps.
-fn sequence_outcome(end: SequenceEnd, shots: &[ShotSummary], last: Outcome) -> Outcome {
+fn sequence_exit(end: SequenceEnd, shots: &[ShotSummary], last: Exit) -> Exit {
     match (end, last) {
-        (SequenceEnd::Interrupted, _) => Outcome::Failed,
-        (_, Outcome::Done) if shots.iter().any(ShotSummary::has_losses) => Outcome::Impaired,
+        (SequenceEnd::Interrupted, _) => Exit::Failed,
+        (_, Exit::Done) if shots.iter().any(ShotSummary::has_losses) => Exit::Impaired,
         _ => last,
     }
 }
@@ -198,22 +198,22 @@ mod tests {
         }
     }
 
-    fn exit_of(end: SequenceEnd, shots: &[ShotSummary]) -> Outcome {
-        sequence_outcome(end, shots, Outcome::Done)
+    fn exit_of(end: SequenceEnd, shots: &[ShotSummary]) -> Exit {
+        sequence_exit(end, shots, Exit::Done)
     }
 
     #[test]
     fn losses_of_an_earlier_chirp_make_the_result_impaired() {
         let end = SequenceEnd::Decided;
-        assert_eq!(exit_of(end, &[shot(0, 0), shot(0, 0)]), Outcome::Done);
-        assert_eq!(exit_of(end, &[shot(1, 0), shot(0, 0)]), Outcome::Impaired);
-        assert_eq!(exit_of(end, &[shot(0, 1), shot(0, 0)]), Outcome::Impaired);
+        assert_eq!(exit_of(end, &[shot(0, 0), shot(0, 0)]), Exit::Done);
+        assert_eq!(exit_of(end, &[shot(1, 0), shot(0, 0)]), Exit::Impaired);
+        assert_eq!(exit_of(end, &[shot(0, 1), shot(0, 0)]), Exit::Impaired);
     }
 
     #[test]
     fn interrupted_sequence_fails_also_with_losses() {
         let end = SequenceEnd::Interrupted;
-        assert_eq!(exit_of(end, &[shot(1, 0)]), Outcome::Failed);
+        assert_eq!(exit_of(end, &[shot(1, 0)]), Exit::Failed);
     }
 
     #[test]

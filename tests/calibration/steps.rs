@@ -30,7 +30,7 @@ fn recording_of(plan: &Plan, rig: Box<dyn Rig>, folder: &Path) -> Recording {
     let run =
         bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
     let path = run.path.clone();
-    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
+    assert!(run.end.servo.completed, "{:?}", run.end.servo);
     run.finish("{}").expect("a good disk");
     Recording::open(&path).expect("a recording")
 }

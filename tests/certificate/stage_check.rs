@@ -33,7 +33,7 @@ fn checked_of(plan: &Plan, rig: Box<dyn Rig>) -> StageCheck {
     );
     let run = run.expect("a run");
     let path = run.path.clone();
-    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
+    assert!(run.end.servo.completed, "{:?}", run.end.servo);
     run.finish("{}").expect("a good disk");
     planned
         .evaluated(&Recording::open(&path).expect("a recording"))

@@ -122,7 +122,7 @@ fn completes(plan: &Plan, what: &str) {
         folder.path(),
         &mut |_, _| {},
     );
-    let trip = ended.expect("a run").end.outcome.trip;
+    let trip = ended.expect("a run").end.servo.trip;
     assert_eq!(trip, None, "{what}");
 }
 

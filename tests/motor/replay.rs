@@ -16,7 +16,7 @@ fn warm_motor_trips_although_the_run_was_not_refused_and_replays_bit_for_bit() {
     let out = folder.path().join("recordings");
     let run = run(&plan, rig, Pace::Virtual, &out, &mut |_, _| ()).expect("a run");
     let path = run.path.clone();
-    let (trip, tick) = run.end.outcome.trip.expect("the motor is too warm");
+    let (trip, tick) = run.end.servo.trip.expect("the motor is too warm");
     run.finish("{}").expect("a recording");
     // i^2 heats by (3.708^2/2 - 5.4) A^2 in tau: the remaining 0.01 * 5.467 A^2 take about 0.4 s at 5 kHz after the quiet 0.1 s.
     assert!(matches!(trip, Trip::ContinuousCurrent { .. }), "{trip}");

@@ -14,7 +14,7 @@ use bench_rt::publisher::Publisher;
 use bench_rt::record::{LoopMessage, TickRecord, flag};
 use bench_rt::request::RequestSender;
 use bench_rt::servo::{Request, Servo};
-use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
+use bench_rt::servo_run::{Connections, Progress, ServoEnd, ServoRun};
 use rtrb::RingBuffer;
 
 use crate::safety::rig::{CurrentProgram, StillRig, interlocks, stage};
@@ -55,7 +55,7 @@ fn run(
     clock: impl Clock,
     overruns_per_s: u32,
     tail: u64,
-) -> (RunOutcome, Vec<TickRecord>) {
+) -> (ServoEnd, Vec<TickRecord>) {
     let mut config = stage();
     config.interlock.overruns_per_s = overruns_per_s;
     let (publisher, mut records) = RingBuffer::new(1 << 14);

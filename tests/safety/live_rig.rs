@@ -17,7 +17,7 @@ use bench_rt::program::Program;
 use bench_rt::publisher::Publisher;
 use bench_rt::record::{EventKind, LoopMessage, Refusal};
 use bench_rt::request::{Request, RequestSender};
-use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
+use bench_rt::servo_run::{Connections, Progress, ServoEnd, ServoRun};
 use bench_rt::thread::Pace;
 use rtrb::{Consumer, RingBuffer};
 
@@ -106,7 +106,7 @@ fn wait_for_end(live: &mut LiveLoop) -> Result<Box<ServoRun>, LoopPanicked> {
 }
 
 /// Serves a run; returns how it ended, and the refusals of its requests.
-fn serve(live: &mut LiveLoop, requests: Vec<Request>) -> (RunOutcome, Vec<Option<Refusal>>) {
+fn serve(live: &mut LiveLoop, requests: Vec<Request>) -> (ServoEnd, Vec<Option<Refusal>>) {
     let (run, mut messages) = servo_run(requests);
     assert!(live.begin(run).is_ok());
     let ended = wait_for_end(live).expect("no panic");
@@ -129,7 +129,7 @@ fn control(controller: &str) -> Plan {
 }
 
 fn finished(run: Run) -> Recording {
-    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
+    assert!(run.end.servo.completed, "{:?}", run.end.servo);
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     Recording::open(&path).expect("a recording")
@@ -278,16 +278,12 @@ fn runner_opens_the_rig_again_after_a_trip() {
     let mut tripping = control("slow");
     tripping.config.interlock.soft_limit_m = 1e-9;
     let tripped = runner.run(&tripping, "control").expect("a run");
-    assert!(
-        tripped.end.outcome.trip.is_some(),
-        "{:?}",
-        tripped.end.outcome
-    );
+    assert!(tripped.end.servo.trip.is_some(), "{:?}", tripped.end.servo);
     let again = runner.run(&tripping, "control").expect("a run");
     assert!(
-        again.end.outcome.trip.is_some(),
+        again.end.servo.trip.is_some(),
         "not refused: {:?}",
-        again.end.outcome
+        again.end.servo
     );
 }
 

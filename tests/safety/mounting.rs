@@ -80,7 +80,7 @@ fn trip_of(config: Config) -> Option<Trip> {
         folder.path(),
         &mut |_, _| {},
     );
-    ended.expect("a run").end.outcome.trip.map(|(trip, _)| trip)
+    ended.expect("a run").end.servo.trip.map(|(trip, _)| trip)
 }
 
 #[test]

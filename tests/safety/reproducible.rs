@@ -33,7 +33,7 @@ fn digest(plan: &Plan) -> u64 {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run = bench_experiment::run(plan, rig, Pace::Virtual, folder.path(), &mut |_, _| {})
         .expect("a run");
-    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
+    assert!(run.end.servo.completed, "{:?}", run.end.servo);
     run.finish("{}").expect("a good disk").loop_digest
 }
 

@@ -132,7 +132,7 @@ fn run_wired(plan: &Plan, wiring: Wiring) -> (Option<Trip>, Extremes) {
         &mut |_, _| {},
     );
     let ended = ended.expect("a run");
-    let (path, trip) = (ended.path.clone(), ended.end.outcome.trip);
+    let (path, trip) = (ended.path.clone(), ended.end.servo.trip);
     ended.finish("{}").expect("a good disk");
     let replayed = replay(&Recording::open(&path).expect("a recording")).expect("replayable");
     assert_eq!(replayed.different, 0, "{wiring:?}: {replayed:?}");

@@ -182,8 +182,8 @@ fn a_hanging_supervisor_leaves_no_run_unattended() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let run = run_with_hanging_supervisor(folder.path());
     assert_eq!(run.end.stop_cause, Some(StopCause::LeaseExpired));
-    assert!(!run.end.outcome.completed && run.end.outcome.trip.is_none());
-    assert_eq!(run.end.outcome.stopped_by, Some(Origin::Lease));
+    assert!(!run.end.servo.completed && run.end.servo.trip.is_none());
+    assert_eq!(run.end.servo.stopped_by, Some(Origin::Lease));
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     let recording = Recording::open(&path).expect("a recording");

@@ -126,7 +126,7 @@ fn losses_of_each_shot_are_counted() {
     let mut make_run = |plan: &Plan| {
         let mut run = runner.run(plan, "shot")?;
         made += 1;
-        run.end.outcome.lost_records = if made == 1 { 3 } else { 0 };
+        run.end.servo.lost_records = if made == 1 { 3 } else { 0 };
         Ok(run)
     };
     let sequence = until_decided(&config, limits, &mut make_run, &mut |_| {}).expect("shots");

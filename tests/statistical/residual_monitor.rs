@@ -121,7 +121,7 @@ fn never_trips_on_a_stage_that_differs_from_its_model() {
         let mut ended = ended.expect("a run");
         ticks += ended.totals().expect("a recording").ticks;
         runs += 1;
-        if let Some((trip @ Trip::ModelError { .. }, tick)) = ended.end.outcome.trip {
+        if let Some((trip @ Trip::ModelError { .. }, tick)) = ended.end.servo.trip {
             let label = plan.label();
             let control = &plan.config.control;
             false_trips.push(format!(

@@ -4,11 +4,12 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::output::RunOutput;
-use super::run_entry::{Carrier, Phase, RunOutcome};
+use super::run_entry::{Carrier, Phase};
 use super::schedule::Schedule;
 use super::secret::Secret;
 use super::shared::Daemon;
 use super::worker;
+use bench_experiment::EndKind;
 
 /// Longest time between two looks at the lease.
 const LEASE_CHECK: Duration = Duration::from_millis(200);
@@ -119,12 +120,12 @@ fn finish(daemon: &Daemon, id: u64, ended: &Result<i32, String>, output: &RunOut
         };
         let noted = entry.outcome.take();
         let (outcome, message) = match (ended, noted) {
-            (Ok(0 | 3), _) => (RunOutcome::Completed, None),
-            (Ok(_), Some(noted @ (RunOutcome::Tripped | RunOutcome::Stopped))) => (noted, None),
-            (Ok(_), None) if entry.is_stopped => (RunOutcome::Stopped, None),
-            (Ok(_), _) => (RunOutcome::Failed, Some(output.last_errors(3))),
+            (Ok(0 | 3), _) => (EndKind::Completed, None),
+            (Ok(_), Some(noted @ (EndKind::Tripped | EndKind::Stopped))) => (noted, None),
+            (Ok(_), None) if entry.is_stopped => (EndKind::Stopped, None),
+            (Ok(_), _) => (EndKind::Failed, Some(output.last_errors(3))),
             (Err(why), _) => (
-                RunOutcome::Failed,
+                EndKind::Failed,
                 Some(format!(
                     "its process cannot be started: {why}; look at the log of the daemon"
                 )),

@@ -11,7 +11,7 @@ use serde_json::{Map, Value};
 use super::hold::StopKind;
 use super::secret::Secret;
 use bench_base::progress::Progress;
-use bench_experiment::{Description, operator_name, run_name, run_note};
+use bench_experiment::{Description, EndKind, operator_name, run_name, run_note};
 use bench_order::{Order, order_schema};
 use bench_rt::supervision::StopFlags;
 
@@ -140,34 +140,6 @@ pub enum Phase {
     Finished,
 }
 
-/// How a command ended.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum RunOutcome {
-    /// It did what it was asked for.
-    Completed,
-    /// An interlock tripped.
-    Tripped,
-    /// It was stopped.
-    Stopped,
-    /// It was refused, or it failed.
-    Failed,
-}
-
-impl RunOutcome {
-    /// The name in the interface.
-    pub fn name(self) -> &'static str {
-        match self {
-            RunOutcome::Completed => "completed",
-            RunOutcome::Tripped => "tripped",
-            RunOutcome::Stopped => "stopped",
-            RunOutcome::Failed => "failed",
-        }
-    }
-}
-
 /// One command of the queue.
 #[derive(Clone, Debug)]
 pub struct RunEntry {
@@ -202,7 +174,7 @@ pub struct RunEntry {
     /// Whether its client has disappeared.
     pub is_orphan: bool,
     /// How it ended.
-    pub outcome: Option<RunOutcome>,
+    pub outcome: Option<EndKind>,
     /// Exit code of its process.
     pub exit_code: Option<i32>,
     /// The error, if it has one.

@@ -17,8 +17,9 @@ use std::time::{Duration, Instant};
 use super::hold::Hold;
 pub use super::hold::StopKind;
 use super::lease::{Keeper, LEASE, Lease};
-use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome, RunRequest};
+use super::run_entry::{Carrier, Phase, RunEntry, RunRequest};
 use super::secret::Secret;
+use bench_experiment::EndKind;
 use bench_order::Command;
 use bench_rt::supervision::StopFlags;
 
@@ -85,7 +86,7 @@ pub struct Schedule {
     /// Ended commands, newest first.
     finished: VecDeque<RunEntry>,
     /// Numbers of ended commands.
-    ended: BTreeMap<(Command, RunOutcome), u64>,
+    ended: BTreeMap<(Command, EndKind), u64>,
     last_id: u64,
     hold: Option<Hold>,
     is_shutting_down: bool,
@@ -142,7 +143,7 @@ impl Schedule {
     }
 
     /// Numbers of ended commands.
-    pub fn ended(&self) -> &BTreeMap<(Command, RunOutcome), u64> {
+    pub fn ended(&self) -> &BTreeMap<(Command, EndKind), u64> {
         &self.ended
     }
 
@@ -253,7 +254,7 @@ impl Schedule {
         let cancelled: Vec<u64> = self.queue().filter(|e| is_of(e)).map(|e| e.id).collect();
         for id in cancelled {
             let why = format!("the arm lease of {} ended before its turn", lease.operator);
-            self.finish(id, RunOutcome::Stopped, Some(why), now);
+            self.finish(id, EndKind::Stopped, Some(why), now);
         }
         let Some(current) = self.open.front_mut().filter(|e| e.is_current() && is_of(e)) else {
             return;
@@ -384,7 +385,7 @@ impl Schedule {
     }
 
     /// Ends a command. The lease of a run ends with it.
-    pub fn finish(&mut self, id: u64, outcome: RunOutcome, message: Option<String>, now: Now) {
+    pub fn finish(&mut self, id: u64, outcome: EndKind, message: Option<String>, now: Now) {
         let Some(at) = self.open.iter().position(|entry| entry.id == id) else {
             return;
         };
@@ -419,7 +420,7 @@ impl Schedule {
         };
         if !entry.is_current() {
             let why = "its process ended before its turn".into();
-            return self.finish(id, RunOutcome::Stopped, Some(why), now);
+            return self.finish(id, EndKind::Stopped, Some(why), now);
         }
         entry.is_orphan = true;
         if entry.request.ends_with_client() {
@@ -433,7 +434,7 @@ impl Schedule {
         let waiting: Vec<u64> = self.queue().map(|entry| entry.id).collect();
         for id in waiting {
             let why = "the daemon was shut down before its turn".into();
-            self.finish(id, RunOutcome::Stopped, Some(why), now);
+            self.finish(id, EndKind::Stopped, Some(why), now);
         }
         self.stop_current(StopKind::Settle, now);
     }
@@ -464,7 +465,7 @@ pub struct NewEntry {
 #[derive(Debug)]
 pub struct EndedRun {
     /// Its end.
-    pub outcome: RunOutcome,
+    pub outcome: EndKind,
     /// File name of its recording.
     pub recording: Option<String>,
     /// The error, if it failed.

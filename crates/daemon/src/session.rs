@@ -13,14 +13,14 @@ use super::hold::Hold;
 use super::live::hub::LiveRun;
 use super::owner::OwnerOrder;
 use super::peer::Peer;
-use super::run_entry::{Carrier, Phase, RunEntry, RunOutcome};
+use super::run_entry::{Carrier, Phase, RunEntry};
 use super::schedule::{EndedRun, NewEntry, Schedule, ScheduleError, StopKind};
 use super::session_messages::{FromCommand, FromDaemon, OpenCommand};
 use super::shared::Daemon;
 use bench_base::progress::Progress;
 use bench_experiment::{
-    Ending, ExperimentError, MotorError, PlannedRun, RemoteError, Run, RunError, RunReport,
-    RunSummary, close,
+    EndKind, Ending, ExperimentError, MotorError, PlannedRun, RemoteError, Run, RunError,
+    RunReport, RunSummary, close,
 };
 use bench_rt::record::Origin;
 use bench_rt::supervision::ArmLease;
@@ -50,7 +50,7 @@ pub async fn serve(daemon: Arc<Daemon>, socket: WebSocket, peer: Peer) {
         connection,
         is_own_user: peer.is_own_user(),
         open_run: None,
-        outcome: RunOutcome::Failed,
+        outcome: EndKind::Failed,
     };
     if session.wait_for_turn().await {
         session.serve_runs().await;
@@ -159,7 +159,7 @@ struct Session {
     /// The last run, whose recording is still open for results.
     open_run: Option<Run>,
     /// How the last run ended.
-    outcome: RunOutcome,
+    outcome: EndKind,
 }
 
 impl Session {
@@ -278,8 +278,8 @@ impl Session {
             })
         });
         if let Err(error) = begun {
-            if self.outcome != RunOutcome::Tripped {
-                self.outcome = RunOutcome::Stopped;
+            if self.outcome != EndKind::Tripped {
+                self.outcome = EndKind::Stopped;
             }
             return self.connection.send(&refused(error.to_string())).await;
         }
@@ -348,7 +348,7 @@ impl Session {
                 FromDaemon::Ended(Box::new(report))
             }
             Err(error) => {
-                self.outcome = RunOutcome::Failed;
+                self.outcome = EndKind::Failed;
                 self.note_failure(&error);
                 FromDaemon::Refused(RemoteError::from(&error))
             }
@@ -366,7 +366,7 @@ impl Session {
             message: result.as_ref().err().map(ToString::to_string),
             tripped_by: trip.map(|reason| format!("the interlock {reason}")),
         };
-        let is_hung = run.is_some_and(|run| run.end.outcome.stopped_by == Some(Origin::Lease));
+        let is_hung = run.is_some_and(|run| run.end.servo.stopped_by == Some(Origin::Lease));
         self.daemon.change(|schedule, now| {
             schedule.end_run(self.id, ended, now);
             if is_hung {
@@ -381,7 +381,7 @@ impl Session {
         self.daemon.change(|schedule, _| {
             // An entry that has ended needs no notes.
             if let Ok(entry) = schedule.open_entry(self.id) {
-                entry.outcome = Some(RunOutcome::Failed);
+                entry.outcome = Some(EndKind::Failed);
                 entry.message = Some(message);
             }
         });
@@ -439,7 +439,7 @@ impl Session {
             operator: run.end.description.operator.clone().unwrap_or_default(),
             name: run.end.description.name.clone().unwrap_or_default(),
             note: run.end.description.note.clone().unwrap_or_default(),
-            outcome: Some(Ending::from(&run.end.outcome).name().into()),
+            outcome: Some(Ending::from(&run.end.servo).name().into()),
             verdict: verdict(results),
         };
         Some(KnownInfo {
@@ -546,18 +546,14 @@ fn reported(mut run: Run) -> Result<(Run, RunReport), ExperimentError> {
     Ok((run, report))
 }
 
-fn outcome(result: &Result<Run, ExperimentError>) -> RunOutcome {
+fn outcome(result: &Result<Run, ExperimentError>) -> EndKind {
     match result {
-        Ok(run) => match Ending::from(&run.end.outcome) {
-            Ending::Completed => RunOutcome::Completed,
-            Ending::Tripped(..) => RunOutcome::Tripped,
-            Ending::Stopped | Ending::CutOff => RunOutcome::Stopped,
-        },
+        Ok(run) => Ending::from(&run.end.servo).kind(),
         Err(
             ExperimentError::Run(RunError::StoppedBefore)
             | ExperimentError::Motor(MotorError::Stopped),
-        ) => RunOutcome::Stopped,
-        Err(_) => RunOutcome::Failed,
+        ) => EndKind::Stopped,
+        Err(_) => EndKind::Failed,
     }
 }
 

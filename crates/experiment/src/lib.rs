@@ -52,7 +52,7 @@ pub mod tuning;
 
 pub use analysis::{
     Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError, ClosedResponses,
-    Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
+    EndKind, Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
     analyse_with_progress, open_with_signals, recorded_frf,
 };
 pub use errors::{

@@ -84,7 +84,7 @@ pub(super) struct Enabling {
 
 /// How a run ended.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct RunOutcome {
+pub struct ServoEnd {
     /// The trip, if there was one, and its tick.
     pub trip: Option<(Trip, u64)>,
     /// Whether the program ran to its end.
@@ -166,8 +166,8 @@ impl ServoRun {
     }
 
     /// How the run ended.
-    pub fn outcome(&self) -> RunOutcome {
-        RunOutcome {
+    pub fn outcome(&self) -> ServoEnd {
+        ServoEnd {
             trip: self.trip,
             completed: self.completed,
             stopped_by: self.stopped_by,

@@ -101,12 +101,12 @@ impl Runs {
             bench_experiment::run(plan, rig, Pace::Virtual, &self.folder, &mut |_, _| {})?;
         run.totals()?;
         let path = run.path.clone();
-        if let Some((trip, tick)) = run.end.outcome.trip {
+        if let Some((trip, tick)) = run.end.servo.trip {
             return Err(FigureError::Run(format!(
                 "`bench {what}` tripped at tick {tick}: {trip}"
             )));
         }
-        if !run.end.outcome.completed {
+        if !run.end.servo.completed {
             return Err(FigureError::Run(format!("`bench {what}` was stopped")));
         }
         run.finish("{}")?;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::super::columns::{Column, TableOptions};
 use super::super::error::CliError;
+use super::super::exit::Exit;
 use super::super::figure_options::PictureOptions;
-use super::super::outcome::Outcome;
 use super::super::output::{print_note, print_result};
 use super::super::progress::ProgressLine;
 use super::study_text::text;
@@ -61,7 +61,7 @@ pub(super) struct Args {
     picture: PictureOptions,
 }
 
-pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
+pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     args.table.check()?;
     let results = if args.join.is_empty() {
         drawn(args)?
@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     };
     if !results.is_done() {
         print_note(&stopped(args, &results));
-        return Ok(Outcome::Failed);
+        return Ok(Exit::Failed);
     }
     args.table.write(|| columns(&results))?;
     let answer = Answer::of(&results);
@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Result<Outcome, CliError> {
     print_result(args.bench.json, &answer, |answer| {
         text(answer) + &args.table.files_text("draws") + &args.picture.files_text()
     })?;
-    Ok(Outcome::Done)
+    Ok(Exit::Done)
 }
 
 fn picture(answer: &Answer, results: &Results) -> Result<Picture, ReportError> {

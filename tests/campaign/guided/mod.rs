@@ -117,7 +117,7 @@ impl LoadedRig for Simulated<'_> {
             &mut |_, _| {},
         )
         .expect("a run");
-        assert!(run.end.outcome.trip.is_none());
+        assert!(run.end.servo.trip.is_none());
         let path = run.path.clone();
         run.finish("{}").expect("a file");
         Ok(Some(RestPosition::of(

@@ -19,7 +19,7 @@ use bench_rt::publisher::Publisher;
 use bench_rt::record::{Event, EventKind, LoopMessage, TickRecord};
 use bench_rt::request::RequestSender;
 use bench_rt::servo::{Request, Servo};
-use bench_rt::servo_run::{Connections, Progress, RunOutcome, ServoRun};
+use bench_rt::servo_run::{Connections, Progress, ServoEnd, ServoRun};
 use bench_rt::supervision::{ArmLease, LeaseWatch, StopFlags};
 use rtrb::{Consumer, RingBuffer};
 
@@ -448,7 +448,7 @@ impl Bench {
         );
     }
 
-    pub fn outcome(&self) -> RunOutcome {
+    pub fn outcome(&self) -> ServoEnd {
         self.servo
             .as_ref()
             .expect("after the first tick")

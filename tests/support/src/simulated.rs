@@ -5,15 +5,15 @@ use bench_config::Config;
 use bench_experiment::{Analysis, AnalysisError, Plan, analyse};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
-use bench_rt::servo_run::RunOutcome;
+use bench_rt::servo_run::ServoEnd;
 use bench_rt::thread::Pace;
 
 /// The recording of a run by `plan`, and how the run ended.
-pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, RunOutcome) {
+pub fn ended(plan: &Plan, folder: &Path) -> (PathBuf, ServoEnd) {
     let rig = Box::new(SimulatedRig::new(&plan.config).expect("a rig"));
     let run =
         bench_experiment::run(plan, rig, Pace::Virtual, folder, &mut |_, _| {}).expect("a run");
-    let ended = (run.path.clone(), run.end.outcome.clone());
+    let ended = (run.path.clone(), run.end.servo.clone());
     run.finish("{}").expect("a good disk");
     ended
 }

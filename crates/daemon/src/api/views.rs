@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use crate::hold::Hold;
 use crate::lease::Lease;
 use crate::live::hub::{LoopView, Share, TripView};
-use crate::run_entry::{OnDisconnect, Phase, RunEntry, RunOutcome};
+use crate::run_entry::{OnDisconnect, Phase, RunEntry};
 use crate::schedule::Now;
 use crate::shared::{Daemon, now};
 use bench_base::progress::Snapshot;
+use bench_experiment::EndKind;
 use bench_order::{Command, Order};
 use bench_rig::devices::is_simulated;
 
@@ -103,7 +104,7 @@ pub struct RunView {
     /// Progress of its run.
     pub progress: Option<ProgressView>,
     /// How it ended.
-    pub outcome: Option<RunOutcome>,
+    pub outcome: Option<EndKind>,
     /// Exit code of its process.
     pub exit_code: Option<i32>,
     /// Whether its process still works; it may do so for some time after a stop has ended its turn.

@@ -175,9 +175,9 @@ impl Expected {
             .is_some_and(|entry| entry.stop.was_raised());
         let ended = EndedRun {
             outcome: if trips {
-                RunOutcome::Tripped
+                EndKind::Tripped
             } else {
-                RunOutcome::Stopped
+                EndKind::Stopped
             },
             recording: None,
             message: None,
@@ -228,8 +228,7 @@ impl Expected {
             .turn()
             .is_some_and(|(turn, phase)| turn == id && phase != Phase::Running);
         if is_idle && random.coin() {
-            self.schedule
-                .finish(id, RunOutcome::Stopped, None, self.now);
+            self.schedule.finish(id, EndKind::Stopped, None, self.now);
         }
     }
 
@@ -276,8 +275,7 @@ impl Expected {
             // The process of a command ends by itself.
             _ => {
                 if let Some((id, Phase::Starting | Phase::Analysing)) = self.turn() {
-                    self.schedule
-                        .finish(id, RunOutcome::Completed, None, self.now);
+                    self.schedule.finish(id, EndKind::Completed, None, self.now);
                 }
             }
         }

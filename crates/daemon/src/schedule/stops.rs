@@ -2,7 +2,8 @@
 
 use super::{GRACE, Now, Schedule, ScheduleError};
 use crate::hold::{Hold, HoldCause, StopKind};
-use crate::run_entry::{Phase, RunEntry, RunOutcome};
+use crate::run_entry::{Phase, RunEntry};
+use bench_experiment::EndKind;
 
 impl Schedule {
     /// Stops a command: one that waits is removed; for the one that has its turn the bench is stopped and held. `by` says who stops.
@@ -21,7 +22,7 @@ impl Schedule {
             entry if entry.is_current() => drop(self.stop_bench(kind, by, now)),
             _ => {
                 let why = "it was cancelled before its turn".into();
-                self.finish(id, RunOutcome::Stopped, Some(why), now);
+                self.finish(id, EndKind::Stopped, Some(why), now);
             }
         }
         Ok(())
@@ -100,8 +101,8 @@ impl Schedule {
             return;
         };
         let outcome = match entry.outcome {
-            Some(RunOutcome::Tripped) => RunOutcome::Tripped,
-            _ => RunOutcome::Stopped,
+            Some(EndKind::Tripped) => EndKind::Tripped,
+            _ => EndKind::Stopped,
         };
         self.finish(entry.id, outcome, None, now);
     }

@@ -166,7 +166,7 @@ impl Bench {
             }
             Step::Finish(which) => {
                 if let Some(id) = self.open_id(*which) {
-                    self.schedule.finish(id, RunOutcome::Completed, None, now);
+                    self.schedule.finish(id, EndKind::Completed, None, now);
                 }
             }
             Step::Stop(which, cut) => {
@@ -206,9 +206,9 @@ impl Bench {
         let id = running.id;
         let ended = EndedRun {
             outcome: if trips {
-                RunOutcome::Tripped
+                EndKind::Tripped
             } else {
-                RunOutcome::Completed
+                EndKind::Completed
             },
             recording: None,
             message: None,
@@ -355,7 +355,7 @@ fn queued_commands_are_cancelled_with_their_lease() {
     bench.take(&Step::Release(0));
     assert_eq!(bench.schedule.open().count(), 0);
     let ended = bench.schedule.finished().next().expect("an ended command");
-    assert_eq!(ended.outcome, Some(RunOutcome::Stopped));
+    assert_eq!(ended.outcome, Some(EndKind::Stopped));
     bench.take(&Step::Queue(0, Command::Chirp, OnDisconnect::Continue));
     assert_eq!(
         bench.schedule.open().count(),

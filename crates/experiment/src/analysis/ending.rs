@@ -1,11 +1,12 @@
 //! How a run ended, by its loop or by its recording.
 
-use serde::{Serialize, Serializer};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize, Serializer};
 
 use bench_recording::Recording;
 use bench_rt::arming::Trip;
 use bench_rt::record::{Event, EventKind, RequestKind};
-use bench_rt::servo_run::RunOutcome;
+use bench_rt::servo_run::ServoEnd;
 
 /// The end of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,6 +21,37 @@ pub enum Ending {
     CutOff,
 }
 
+/// How a run or a command ended, as one word. The same words stand in results, in the answers of a daemon and in its metrics.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum EndKind {
+    /// It did what it was asked for.
+    Completed,
+    /// An interlock tripped.
+    Tripped,
+    /// It was stopped.
+    Stopped,
+    /// The recording ends before the run.
+    CutOff,
+    /// It was refused, or it failed.
+    Failed,
+}
+
+impl EndKind {
+    /// The word.
+    pub fn name(self) -> &'static str {
+        match self {
+            EndKind::Completed => "completed",
+            EndKind::Tripped => "tripped",
+            EndKind::Stopped => "stopped",
+            EndKind::CutOff => "cut_off",
+            EndKind::Failed => "failed",
+        }
+    }
+}
+
 /// Serialised as its [`name`](Ending::name).
 impl Serialize for Ending {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
@@ -27,8 +59,8 @@ impl Serialize for Ending {
     }
 }
 
-impl From<&RunOutcome> for Ending {
-    fn from(ended: &RunOutcome) -> Ending {
+impl From<&ServoEnd> for Ending {
+    fn from(ended: &ServoEnd) -> Ending {
         Ending::by(ended.trip, ended.completed)
     }
 }
@@ -70,11 +102,16 @@ impl Ending {
 
     /// The name used in JSON.
     pub fn name(&self) -> &'static str {
+        self.kind().name()
+    }
+
+    /// The ending without the trip.
+    pub fn kind(&self) -> EndKind {
         match self {
-            Ending::Completed => "completed",
-            Ending::Tripped(..) => "tripped",
-            Ending::Stopped => "stopped",
-            Ending::CutOff => "cut_off",
+            Ending::Completed => EndKind::Completed,
+            Ending::Tripped(..) => EndKind::Tripped,
+            Ending::Stopped => EndKind::Stopped,
+            Ending::CutOff => EndKind::CutOff,
         }
     }
 

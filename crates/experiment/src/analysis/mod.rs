@@ -17,7 +17,7 @@ mod segments;
 mod signal_builder;
 
 pub use analysis_error::{AnalysisError, ClosedLoopError};
-pub use ending::Ending;
+pub use ending::{EndKind, Ending};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub(crate) use measured_frf::{check_frf, check_rate, judge_excess};
 pub use model_response::ModelResponse;

@@ -89,7 +89,7 @@ impl PointMeasurement<'_> {
             stop: self.stop,
         };
         let mut sequence = until_decided(self.config, limits, make_run, &mut |_| {})?;
-        let tripped = sequence.last.end.outcome.trip.is_some();
+        let tripped = sequence.last.end.servo.trip.is_some();
         if sequence.end == SequenceEnd::Interrupted && !tripped {
             return Ok(None);
         }

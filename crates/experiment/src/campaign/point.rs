@@ -76,7 +76,7 @@ pub(super) fn sequence_result(sequence: &mut Sequence) -> Result<PointResult, Re
 
 /// Why a run that tripped has no result.
 fn trip_reason(run: &Run) -> Option<String> {
-    let (trip, tick) = run.end.outcome.trip?;
+    let (trip, tick) = run.end.servo.trip?;
     let remedy = trip.remedy();
     Some(format!("the run tripped at tick {tick}: {trip}; {remedy}"))
 }

@@ -183,7 +183,7 @@ impl LoadedRig for DeviceRig<'_, '_, '_> {
         let setup = self.campaign.on_devices(folder);
         let plan = Plan::quiet(self.campaign.config.clone());
         let run = (self.run)(setup, &plan, "rest")?;
-        if let Some((trip, tick)) = run.end.outcome.trip {
+        if let Some((trip, tick)) = run.end.servo.trip {
             return Err(tripped_at_rest(trip, tick).into());
         }
         if run.end.stop_cause.is_some() {

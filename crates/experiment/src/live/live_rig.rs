@@ -240,7 +240,7 @@ impl PreparedRun<'_> {
                     .recording_defect
                     .get()
                     .filter(|_| on_recording_failure == OnRecordingFailure::Continue),
-                outcome: ended,
+                servo: ended,
                 motor: self.plan.motor.clone(),
             },
             file: RunFile::Own(Box::new(recorder)),

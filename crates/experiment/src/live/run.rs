@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::plan::{Description, MotorStart};
 use bench_recording::{Recorder, RecordingError, Shortage, Totals};
 use bench_rt::record::Origin;
-use bench_rt::servo_run::RunOutcome;
+use bench_rt::servo_run::ServoEnd;
 use bench_rt::thread::{Pace, Scheduling};
 
 /// A run that has ended; results can still be added to its recording.
@@ -26,7 +26,7 @@ pub struct RunEnd {
     #[serde(default)]
     pub description: Description,
     /// How it ended.
-    pub outcome: RunOutcome,
+    pub servo: ServoEnd,
     /// Pace of the loop.
     pub pace: Pace,
     /// How the loop was scheduled.

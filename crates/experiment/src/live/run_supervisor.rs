@@ -14,7 +14,7 @@ use bench_recording::Health;
 use bench_rt::live_loop::{LiveLoop, LoopPanicked};
 use bench_rt::record::Origin;
 use bench_rt::request::{Request, RequestSender};
-use bench_rt::servo_run::{Progress, RunOutcome, ServoRun};
+use bench_rt::servo_run::{Progress, ServoEnd, ServoRun};
 use bench_rt::supervision::{ArmLease, StopFlags};
 
 /// Period of the supervisor.
@@ -46,7 +46,7 @@ impl Supervisor<'_> {
         run: Box<ServoRun>,
         stop_flags: &StopFlags,
         mut watch: impl FnMut(),
-    ) -> Result<Result<RunOutcome, LoopPanicked>, RunError> {
+    ) -> Result<Result<ServoEnd, LoopPanicked>, RunError> {
         let signals = self.hooks.has_signals.then(|| SignalFlags::set(stop_flags));
         let _signals = signals
             .transpose()
@@ -121,7 +121,7 @@ impl Supervisor<'_> {
 }
 
 /// How a run ended; warns if the loop ended it by itself.
-fn outcome(run: &ServoRun) -> RunOutcome {
+fn outcome(run: &ServoRun) -> ServoEnd {
     let outcome = run.outcome();
     if outcome.stopped_by == Some(Origin::Lease) {
         tracing::warn!(

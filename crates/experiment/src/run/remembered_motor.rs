@@ -109,7 +109,7 @@ impl RememberedMotor<'_> {
     /// run that failed in its middle leaves the entry of its beginning.
     pub fn end(&self, plan: &Plan, result: &Result<Run, RunError>) {
         let thermal_a2 = match result {
-            Ok(run) => run.end.outcome.thermal_a2,
+            Ok(run) => run.end.servo.thermal_a2,
             Err(
                 RunError::Plan(_)
                 | RunError::Create(_)

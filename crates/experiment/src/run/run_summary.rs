@@ -99,7 +99,7 @@ impl RunSummary {
     /// Summarises a run; its recording then contains every tick.
     pub fn of(run: &mut Run) -> Result<RunSummary, RecordingError> {
         let totals = run.totals()?;
-        let ending = Ending::from(&run.end.outcome);
+        let ending = Ending::from(&run.end.servo);
         Ok(RunSummary {
             description: run.end.description.clone(),
             outcome: ending,
@@ -109,12 +109,12 @@ impl RunSummary {
             ticks: totals.ticks,
             overruns: totals.overruns,
             // Records lost at the very end leave no gap in the file; only the loop counts them.
-            lost_records: totals.lost_records.max(run.end.outcome.lost_records),
+            lost_records: totals.lost_records.max(run.end.servo.lost_records),
             recording: run.path.display().to_string(),
             loop_digest: format!("{:016x}", totals.loop_digest),
             motor: MotorRun {
                 thermal_start_a: run.end.motor.thermal_a2.sqrt(),
-                thermal_end_a: run.end.outcome.thermal_a2.sqrt(),
+                thermal_end_a: run.end.servo.thermal_a2.sqrt(),
                 known_from: run.end.motor.known_from.clone(),
             },
             timing: TimingSummary {

@@ -174,7 +174,7 @@ impl Runner {
             CheckedStage::Ended(run) => *run,
             CheckedStage::MayClose => self.run_on(plan, &mut bench, phase)?,
         };
-        if ended.end.outcome.trip.is_none() {
+        if ended.end.servo.trip.is_none() {
             self.open.replace(Some(bench));
         }
         Ok(ended)
@@ -198,7 +198,7 @@ impl Runner {
             return Ok(CheckedStage::MayClose);
         };
         let mut run = self.run_on(planned.plan.clone(), bench, "stage check")?;
-        if Ending::from(&run.end.outcome) != Ending::Completed {
+        if Ending::from(&run.end.servo) != Ending::Completed {
             return Ok(CheckedStage::Ended(Box::new(run)));
         }
         run.totals()?;
@@ -221,7 +221,7 @@ impl Runner {
                 self.run_remembered_motor(plan, bench, phase)
             }
         }?;
-        self.motor_a2.set(Some(run.end.outcome.thermal_a2));
+        self.motor_a2.set(Some(run.end.servo.thermal_a2));
         Ok(run)
     }
 

@@ -104,7 +104,7 @@ fn made(
 }
 
 fn is_complete(run: &Run) -> bool {
-    Ending::from(&run.end.outcome) == Ending::Completed
+    Ending::from(&run.end.servo) == Ending::Completed
 }
 
 fn ended(

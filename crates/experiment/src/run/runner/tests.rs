@@ -143,7 +143,7 @@ fn closes_the_loop_on_devices_after_the_check_of_their_stage() {
     let runner = runner_on(&config, folder.path());
     let run = runner.run(&certified_plan(config, |json| json), "control");
     let run = run.expect("a run");
-    assert!(run.end.outcome.completed, "{:?}", run.end.outcome);
+    assert!(run.end.servo.completed, "{:?}", run.end.servo);
     let names = names(folder.path());
     assert!(
         names.len() == 2 && names.iter().any(|name| name.ends_with("_stage-check.mcap")),
@@ -182,7 +182,7 @@ fn refuses_another_stage_on_devices_before_the_loop_closes() {
         match result {
             Err(ExperimentError::StageCheck(StageCheckError::Compliance(_))) => assert!(is_refused),
             Err(other) => panic!("{other}"),
-            Ok(run) => assert!(!is_refused, "{names:?}: {:?}", run.end.outcome),
+            Ok(run) => assert!(!is_refused, "{names:?}: {:?}", run.end.servo),
         }
         let closed = names.iter().filter(|name| name.contains("_control-"));
         assert_eq!(closed.count(), usize::from(!is_refused), "{names:?}");
@@ -198,7 +198,7 @@ fn loop_does_not_close_after_a_stage_check_that_tripped() {
     let runner = runner_on(&soft, folder.path());
     let run = runner.run(&certified_plan(config, |json| json), "control");
     let run = run.expect("a run that tripped");
-    assert!(run.end.outcome.trip.is_some(), "{:?}", run.end.outcome);
+    assert!(run.end.servo.trip.is_some(), "{:?}", run.end.servo);
     let names = names(folder.path());
     assert!(
         names.iter().all(|name| name.ends_with("_stage-check.mcap")),

@@ -1,10 +1,10 @@
-//! How a command ended, and its exit code.
+//! How a command of this process ended: its exit code.
 
 use std::process::ExitCode;
 
-/// How a command ended.
+/// The exit code of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum Exit {
     /// The command is done.
     Done,
     /// The command failed, or the run was tripped or stopped, or a replay differs.
@@ -15,13 +15,13 @@ pub enum Outcome {
     Impaired,
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> ExitCode {
-        ExitCode::from(match outcome {
-            Outcome::Done => 0,
-            Outcome::Failed => 1,
-            Outcome::Usage => 2,
-            Outcome::Impaired => 3,
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> ExitCode {
+        ExitCode::from(match exit {
+            Exit::Done => 0,
+            Exit::Failed => 1,
+            Exit::Usage => 2,
+            Exit::Impaired => 3,
         })
     }
 }
