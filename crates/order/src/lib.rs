@@ -6,7 +6,8 @@
 //! | module | for |
 //! |---|---|
 //! | `order` | the commands, and an order of each |
-//! | `arguments` | an order from JSON, and its words on a command line |
+//! | `from_json` | an order from JSON, and the JSON schema |
+//! | `words` | the words of a command line for options in JSON |
 //! | `chirp`, `control`, `calibrate`, `linearity`, `campaign`, `identify` | the options of each command, and the configuration that they select |
 //! | `bench_options`, `rig_options`, `excitation_options`, `figure_options`, `controller_choice` | options that several commands share |
 //! | `value_range` | a grid as typed |
@@ -14,7 +15,6 @@
 
 #![deny(unsafe_code)]
 
-mod arguments;
 mod bench_options;
 mod calibrate;
 mod campaign;
@@ -23,6 +23,7 @@ mod control;
 mod controller_choice;
 mod excitation_options;
 mod figure_options;
+mod from_json;
 mod help;
 mod identify;
 mod linearity;
@@ -32,8 +33,8 @@ mod rig_options;
 #[cfg(test)]
 mod tests;
 mod value_range;
+mod words;
 
-pub use arguments::{OrderError, order_schema, refused_option, usage_message};
 pub use bench_options::{BenchOptions, SeedOption, given};
 pub use calibrate::CalibrateOrder;
 pub use campaign::CampaignOrder;
@@ -42,6 +43,7 @@ pub use control::{ControlOrder, Reference, ReferenceKind, Shaper, defaults_help}
 pub use controller_choice::ControllerChoice;
 pub use excitation_options::ExcitationOptions;
 pub use figure_options::ResponseFigureOptions;
+pub use from_json::{OrderError, order_schema, refused_option, usage_message};
 pub use help::{GLOSSARY, default_value, with_setting};
 pub use identify::{ColumnsError, ExternalOptions, Hold, IdentifyOrder};
 pub use linearity::LinearityOrder;

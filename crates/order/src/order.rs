@@ -12,6 +12,7 @@ use super::chirp::ChirpOrder;
 use super::control::ControlOrder;
 use super::identify::IdentifyOrder;
 use super::linearity::LinearityOrder;
+use super::words::words_of;
 
 /// Commands that may be ordered.
 #[derive(
@@ -193,7 +194,7 @@ impl Order {
     pub fn arguments(&self) -> Vec<String> {
         // The types of all options have a JSON form.
         let fields = self.fields().unwrap_or_default();
-        super::arguments::arguments(&fields)
+        words_of(&fields)
     }
 
     /// The options that are given, by their names in JSON.

@@ -1,4 +1,4 @@
-//! Options in JSON, and the words of a command line that they stand for.
+//! An order from JSON.
 //!
 //! An order is read in one way only, that of the command line: the options of a JSON object are checked against the schema, written as
 //! words, and parsed. What a command line refuses (two options that exclude each other, a number out of its range) JSON refuses with the
@@ -14,6 +14,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
 use super::order::{Command, Order};
+use super::words::{POSITIONAL, words_of};
 use bench_base::nearest::nearest;
 use bench_base::remedy;
 
@@ -21,8 +22,6 @@ use bench_base::remedy;
 const MAX_WORDS: usize = 200;
 /// Longest words of an order together, in bytes.
 const MAX_BYTES: usize = 16 << 10;
-/// The argument without an option.
-const POSITIONAL: &str = "recording";
 
 /// A JSON value that is no order.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -122,7 +121,7 @@ impl Order {
         };
         let command = command(fields.shift_remove("command"))?;
         check_fields(command, &fields)?;
-        let words = arguments(&fields);
+        let words = words_of(&fields);
         check_length(&words)?;
         Ok(parse(command, &words)?)
     }
@@ -152,33 +151,6 @@ fn options<T: Args + FromArgMatches>(words: &[String]) -> Result<T, clap::Error>
     let parser = T::augment_args(clap::Command::new("order"));
     let parser = parser.no_binary_name(true).disable_help_flag(true);
     T::from_arg_matches(&parser.try_get_matches_from(words)?)
-}
-
-/// The words of options in JSON.
-pub(crate) fn arguments(fields: &Map<String, Value>) -> Vec<String> {
-    let options = fields.iter().filter(|(field, _)| *field != POSITIONAL);
-    let mut words: Vec<String> = options
-        .flat_map(|(field, value)| option_words(&field.replace('_', "-"), value))
-        .collect();
-    if let Some(Value::String(file)) = fields.get(POSITIONAL) {
-        words.extend(["--".to_string(), file.clone()]);
-    }
-    words
-}
-
-fn option_words(option: &str, value: &Value) -> Vec<String> {
-    match value {
-        Value::Null | Value::Bool(false) | Value::Object(_) => Vec::new(),
-        Value::Bool(true) => vec![format!("--{option}")],
-        Value::Number(number) => vec![format!("--{option}={number}")],
-        Value::String(text) => vec![format!("--{option}={text}")],
-        Value::Array(values) => {
-            let words = values.iter();
-            words
-                .flat_map(|value| option_words(option, value))
-                .collect()
-        }
-    }
 }
 
 fn check_length(words: &[String]) -> Result<(), OrderError> {
