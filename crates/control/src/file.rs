@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Section;
 use super::error::ControllerError;
 use super::law::ControlDesign;
-use super::laws::Law;
+use super::laws::{self, LawSettings};
 use super::section_settings::{SectionSettings, checked_sections};
 use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
@@ -36,7 +36,9 @@ struct LawFile {
     #[serde(rename = "title")]
     _title: String,
     /// The law.
-    law: Law,
+    #[serde(deserialize_with = "laws::deserialize")]
+    #[schemars(schema_with = "laws::schema")]
+    law: LawSettings,
 }
 
 /// The form of a controller file.
@@ -105,14 +107,12 @@ impl ControllerText {
 
     fn law(&self, rate_hz: f64) -> Result<Box<dyn ControlDesign>, ControllerError> {
         let file: LawFile = bench_settings::typed(&self.name, &self.text)?;
-        let Law(settings) = file.law;
-        settings
-            .check(rate_hz)
-            .map_err(|why| ControllerError::Law {
-                name: self.name.clone(),
-                why,
-            })?;
-        Ok(settings)
+        let checked = file.law.check(rate_hz);
+        checked.map_err(|why| ControllerError::Law {
+            name: self.name.clone(),
+            why,
+        })?;
+        Ok(Box::new(file.law))
     }
 
     fn listed_sections(&self, rate_hz: f64) -> Result<Vec<Section>, ControllerError> {

@@ -8,28 +8,29 @@ mod repetitive;
 pub use matrices::StateSpaceLaw;
 pub use repetitive::RepetitiveLaw;
 
-use std::borrow::Cow;
+use std::sync::Arc;
 
-use bench_base::kinds::{Kind, KindExists, Kinds, Table};
+use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
 use serde_json::Value;
 
-use super::law::ControlDesign;
+use super::Section;
+use super::law::{ControlDesign, ControlLaw};
 
 /// The laws by the `kind` of their table.
-static LAWS: Kinds<LawKind> = Kinds::new(
+static LAWS: Kinds<AddedKind<dyn ControlLawSettings>> = Kinds::new(
     "kind",
     const {
         &[
-            LawKind::of::<StateSpaceLaw>("state_space"),
-            LawKind::of::<RepetitiveLaw>("repetitive"),
+            law::<StateSpaceLaw>("state_space"),
+            law::<RepetitiveLaw>("repetitive"),
         ]
     },
 );
 
 /// Settings of a control law in a controller file.
-pub trait ControlLawSettings: ControlDesign {
+pub trait ControlLawSettings: ControlDesign + Sync {
     /// Refuses settings that are inconsistent with each other or with the servo rate; the text follows "`law`", for example "has
     /// lead_ticks = 8, which must be below period_ticks = 8". Ranges of single settings are in their schema.
     fn check(&self, rate_hz: f64) -> Result<(), String> {
@@ -82,65 +83,40 @@ pub fn register_law<L>(kind: &'static str) -> Result<(), KindExists>
 where
     L: ControlLawSettings + DeserializeOwned + JsonSchema + 'static,
 {
-    LAWS.add(LawKind::of::<L>(kind))
+    LAWS.add(law::<L>(kind))
 }
 
 /// A law that a file may name.
-#[derive(Clone, Copy)]
-struct LawKind {
-    name: &'static str,
-    schema: fn(&mut SchemaGenerator) -> Schema,
-    read: fn(Table) -> Result<Law, serde_json::Error>,
-}
-
-impl LawKind {
-    const fn of<L>(name: &'static str) -> LawKind
-    where
-        L: ControlLawSettings + DeserializeOwned + JsonSchema + 'static,
-    {
-        LawKind {
-            name,
-            schema: L::json_schema,
-            read: |table| {
-                let settings: L = serde_json::from_value(Value::Object(table))?;
-                Ok(Law(Box::new(settings)))
-            },
-        }
-    }
-}
-
-impl Kind for LawKind {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
-        (self.schema)(generator)
-    }
+const fn law<L>(name: &'static str) -> AddedKind<dyn ControlLawSettings>
+where
+    L: ControlLawSettings + DeserializeOwned + JsonSchema + 'static,
+{
+    AddedKind::new(name, L::json_schema, |table| {
+        let settings: L = serde_json::from_value(Value::Object(table))?;
+        Ok(Arc::new(settings))
+    })
 }
 
 /// The settings of a law of any kind.
-pub(super) struct Law(pub Box<dyn ControlLawSettings>);
+pub(super) type LawSettings = Added<dyn ControlLawSettings>;
 
-impl<'de> Deserialize<'de> for Law {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let mut table = Table::deserialize(from)?;
-        let kind = LAWS.take(&mut table).map_err(D::Error::custom)?;
-        (kind.read)(table).map_err(D::Error::custom)
+impl ControlDesign for LawSettings {
+    fn law(&self, period_s: f64) -> Box<dyn ControlLaw> {
+        (**self).law(period_s)
+    }
+
+    fn sections(&self) -> Option<&[Section]> {
+        (**self).sections()
     }
 }
 
-impl JsonSchema for Law {
-    fn schema_name() -> Cow<'static, str> {
-        "Law".into()
-    }
+/// Reads the table `[law]`.
+pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<LawSettings, D::Error> {
+    let table = Table::deserialize(from)?;
+    LAWS.read(table).map_err(D::Error::custom)
+}
 
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        LAWS.schema(generator)
-    }
-
-    /// The kinds may change between two schemas.
-    fn inline_schema() -> bool {
-        true
-    }
+/// The schema of the table `[law]`.
+pub(super) fn schema(generator: &mut SchemaGenerator) -> Schema {
+    LAWS.schema(generator)
 }
