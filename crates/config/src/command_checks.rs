@@ -30,7 +30,7 @@ fn minimum_time(config: &Config) -> Vec<Finding> {
     let control = &config.control;
     let mut findings = Vec::new();
     if control.reference.design().step().is_none() {
-        let kind = control.reference.design().name();
+        let kind = control.reference.kind();
         let what = format!(
             "is \"minimum_time\", which plans a step, but the reference is a {kind}; choose zv, zvd or ei, or a step"
         );

@@ -34,10 +34,6 @@ struct Pulse {
 }
 
 impl ReferenceDesign for Pulse {
-    fn name(&self) -> &'static str {
-        "pulse"
-    }
-
     fn describe(&self) -> String {
         format!("a pulse of {} m", self.height_m)
     }
@@ -92,6 +88,7 @@ fn own_plant_and_reference_are_loaded_checked_and_recorded() {
 
     let config = loaded(CONFIGURATION).expect("valid");
     assert_eq!(config.plant.model(), "oscillator");
+    assert_eq!(config.control.reference.kind(), "pulse");
     assert_eq!(
         config.control.reference.design().describe(),
         "a pulse of 0.00001 m"

@@ -37,9 +37,6 @@ pub struct StepOfReference {
 
 /// The settings of one kind of reference. This trait provides all properties in which the kinds differ.
 pub trait ReferenceDesign {
-    /// Name of the kind, as in `control.reference.kind`.
-    fn name(&self) -> &'static str;
-
     /// Kind and values as text.
     fn describe(&self) -> String;
 

@@ -16,10 +16,6 @@ pub struct FileReference {
 }
 
 impl ReferenceDesign for FileReference {
-    fn name(&self) -> &'static str {
-        "file"
-    }
-
     fn describe(&self) -> String {
         format!("the file {}", self.path)
     }

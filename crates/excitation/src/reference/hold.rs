@@ -12,10 +12,6 @@ use crate::waveform::Reference;
 pub struct HoldReference {}
 
 impl ReferenceDesign for HoldReference {
-    fn name(&self) -> &'static str {
-        "hold"
-    }
-
     fn describe(&self) -> String {
         "the position at rest".into()
     }

@@ -38,10 +38,14 @@ macro_rules! references {
     ($($(#[$doc:meta])* $kind:ident($settings:ty) = $name:literal),* $(,)?) => {
         /// A reference, relative to the rest position at which the loop closes; zero before its start.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(tag = "kind", rename_all = "snake_case")]
+        #[serde(tag = "kind")]
         #[schemars(transform = own::add_to_schema)]
         pub enum ReferenceSettings {
-            $($(#[$doc])* $kind($settings),)*
+            $(
+                $(#[$doc])*
+                #[serde(rename = $name)]
+                $kind($settings),
+            )*
             /// A reference of another crate.
             #[serde(untagged)]
             #[schemars(skip)]
@@ -52,6 +56,14 @@ macro_rules! references {
         const KINDS: &[&str] = &[$($name,)*];
 
         impl ReferenceSettings {
+            /// The name of the kind, as in `control.reference.kind`.
+            pub fn kind(&self) -> &'static str {
+                match self {
+                    $(ReferenceSettings::$kind(_) => $name,)*
+                    ReferenceSettings::Own(own) => own.kind(),
+                }
+            }
+
             /// Whether it is the sweep of `[chirp]`, whose amplitudes are planned with the model.
             pub fn is_swept(&self) -> bool {
                 matches!(self, ReferenceSettings::Chirp(_))

@@ -21,6 +21,11 @@ static REFERENCES: Kinds<AddedKind<Design>> = Kinds::beside("kind", KINDS);
 pub struct OwnReference(Added<Design>);
 
 impl OwnReference {
+    /// The name of the kind.
+    pub fn kind(&self) -> &'static str {
+        self.0.kind()
+    }
+
     /// The settings.
     pub fn design(&self) -> &dyn ReferenceDesign {
         &*self.0
@@ -46,9 +51,6 @@ impl OwnReference {
 /// }
 ///
 /// impl ReferenceDesign for Pulse {
-///     fn name(&self) -> &'static str {
-///         "pulse"
-///     }
 ///     fn describe(&self) -> String {
 ///         format!("a pulse of {} m", self.height_m)
 ///     }
@@ -66,6 +68,7 @@ impl OwnReference {
 /// bench_excitation::register_reference::<Pulse>("pulse")?;
 /// let text = "kind = 'pulse'\nheight_m = 1e-6\nticks = 10";
 /// let reference: ReferenceSettings = toml::from_str(text)?;
+/// assert_eq!(reference.kind(), "pulse");
 /// assert_eq!(reference.design().describe(), "a pulse of 0.000001 m");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -23,10 +23,6 @@ pub struct RampReference {
 }
 
 impl ReferenceDesign for RampReference {
-    fn name(&self) -> &'static str {
-        "ramp"
-    }
-
     fn describe(&self) -> String {
         let (height, speed) = (um(self.amplitude_m), um(self.speed_m_per_s));
         format!("ramp to {height} at {speed}/s from {} s", self.at_s)

@@ -66,10 +66,6 @@ impl RandomReference {
 }
 
 impl ReferenceDesign for RandomReference {
-    fn name(&self) -> &'static str {
-        "random"
-    }
-
     fn describe(&self) -> String {
         let (peak, frequency_hz) = (um(self.amplitude_m.abs()), self.frequency_hz);
         format!("random up to {frequency_hz} Hz, within +-{peak}")

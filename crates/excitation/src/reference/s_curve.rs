@@ -42,10 +42,6 @@ pub struct SCurveReference {
 }
 
 impl ReferenceDesign for SCurveReference {
-    fn name(&self) -> &'static str {
-        "s_curve"
-    }
-
     fn describe(&self) -> String {
         let move_s = Profile::of(self).duration_s();
         format!(

@@ -23,10 +23,6 @@ pub struct SineReference {
 }
 
 impl ReferenceDesign for SineReference {
-    fn name(&self) -> &'static str {
-        "sine"
-    }
-
     fn describe(&self) -> String {
         format!(
             "sine of {} at {} Hz",

@@ -31,10 +31,6 @@ pub struct SquareReference {
 }
 
 impl ReferenceDesign for SquareReference {
-    fn name(&self) -> &'static str {
-        "square"
-    }
-
     fn describe(&self) -> String {
         let (height, frequency_hz) = (um(self.amplitude_m), self.frequency_hz);
         format!(

@@ -22,10 +22,6 @@ pub struct StepReference {
 }
 
 impl ReferenceDesign for StepReference {
-    fn name(&self) -> &'static str {
-        "step"
-    }
-
     fn describe(&self) -> String {
         format!("step of {} at {} s", um(self.amplitude_m), self.at_s)
     }

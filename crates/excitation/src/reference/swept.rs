@@ -49,10 +49,6 @@ impl SweptReference {
 }
 
 impl ReferenceDesign for SweptReference {
-    fn name(&self) -> &'static str {
-        "chirp"
-    }
-
     fn describe(&self) -> String {
         "reference swept over the band of the chirp".into()
     }

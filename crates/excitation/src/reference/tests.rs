@@ -319,3 +319,36 @@ fn rejects_references_beyond_their_limits() {
     };
     assert_eq!(keys(long.check(1e-3, 1000.0)), [period], "too many ticks");
 }
+
+#[test]
+fn each_kind_is_read_under_the_name_that_it_gives() {
+    let hold = ReferenceSettings::Hold(HoldReference {});
+    let sine = ReferenceSettings::Sine(SineReference {
+        amplitude_m: 1e-6,
+        frequency_hz: 10.0,
+    });
+    let s_curve = ReferenceSettings::SCurve(SCurveReference {
+        amplitude_m: 1e-6,
+        speed_m_per_s: 1e-4,
+        acceleration_m_per_s2: 1e-2,
+        jerk_m_per_s3: 1.0,
+        at_s: 0.0,
+    });
+    let swept = ReferenceSettings::Chirp(SweptReference {
+        amplitude: Vec::new(),
+        travel_m: 1e-6,
+    });
+    for (settings, name) in [
+        (hold, "hold"),
+        (sine, "sine"),
+        (s_curve, "s_curve"),
+        (swept, "chirp"),
+    ] {
+        let table = serde_json::to_value(&settings).unwrap();
+        assert_eq!((settings.kind(), &table["kind"]), (name, &name.into()));
+        assert_eq!(
+            serde_json::from_value::<ReferenceSettings>(table).unwrap(),
+            settings
+        );
+    }
+}

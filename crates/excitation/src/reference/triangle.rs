@@ -34,10 +34,6 @@ impl TriangleReference {
 }
 
 impl ReferenceDesign for TriangleReference {
-    fn name(&self) -> &'static str {
-        "triangle"
-    }
-
     fn describe(&self) -> String {
         let (height, speed) = (um(self.amplitude_m), um(self.speed_m_per_s()));
         let frequency_hz = self.frequency_hz;

@@ -48,12 +48,12 @@ fn with_margins(
 
 /// Refuses a reference that does not sweep the band. A reference from a file may sweep it.
 fn require_swept(reference: &ReferenceSettings) -> Result<(), ClosedLoopError> {
-    let reference = reference.design();
-    let kind = reference.name();
-    if reference.can_identify() {
+    if reference.design().can_identify() {
         Ok(())
     } else {
-        Err(ClosedLoopError::Reference { kind })
+        Err(ClosedLoopError::Reference {
+            kind: reference.kind(),
+        })
     }
 }
 

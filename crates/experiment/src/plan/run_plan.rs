@@ -297,7 +297,7 @@ impl Plan {
             RunKind::Chirp => config.excitation.kind.name().into(),
             RunKind::Control => {
                 let controller = file_stem(&config.control.controller);
-                let reference = config.control.reference.design().name();
+                let reference = config.control.reference.kind();
                 format!("control-{controller}-{reference}")
             }
             RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => self.kind.name().into(),
