@@ -4,7 +4,6 @@ use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use schemars::generate::SchemaSettings;
 use schemars::{Schema, SchemaGenerator};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, Value, json};
@@ -91,19 +90,6 @@ impl<K: Kind> Kinds<K> {
         })
     }
 
-    /// Adds the tables of the kinds to the schema of an enum, which lists its tables as `anyOf` because one variant has no tag: the
-    /// added kinds.
-    pub fn add_to(&self, schema: &mut Schema) {
-        // Without references to definitions, which stand in another place of the schema.
-        let settings =
-            SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
-        let added = self.tables(&mut settings.into_generator());
-        if let Some(Value::Array(mut tables)) = schema.remove("anyOf") {
-            tables.extend(added);
-            schema.insert("oneOf".into(), tables.into());
-        }
-    }
-
     /// The schema of a table of any of the kinds.
     pub fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
         let tables = self.tables(generator);
@@ -117,6 +103,28 @@ impl<K: Kind> Kinds<K> {
             .map(|kind| schema_with_key(self.key, kind, generator));
         tables.collect()
     }
+}
+
+/// Transforms the schema of an enum whose last variant has no tag and holds added kinds, with [`Kinds::schema`] as its schema:
+/// the tables of the other variants and those of the added kinds become one list, `oneOf`.
+///
+/// # Panics
+/// When the schema is not that of such an enum: without the added kinds in it, each table that names one would be refused.
+pub fn list_added_kinds(schema: &mut Schema) {
+    // schemars writes `anyOf` because one variant has no tag.
+    let variants = schema.remove("anyOf");
+    let tables = variants.as_ref().and_then(listed_tables);
+    let Some(tables) = tables else {
+        panic!("not an enum with added kinds in its last variant: {variants:?}");
+    };
+    schema.insert("oneOf".into(), tables.into());
+}
+
+/// The tables of the variants, with those of the last one in its place.
+fn listed_tables(variants: &Value) -> Option<Vec<Value>> {
+    let (last, others) = variants.as_array()?.split_last()?;
+    let added = last.get("oneOf")?.as_array()?;
+    Some([others, added].concat())
 }
 
 /// The schema of a table of this kind, in which the key that names the kind is required.
@@ -237,6 +245,8 @@ impl<S: ?Sized> Serialize for Added<S> {
 
 #[cfg(test)]
 mod tests {
+    use std::borrow::Cow;
+
     use schemars::JsonSchema;
 
     use super::*;
@@ -256,6 +266,23 @@ mod tests {
             self.side_m * self.side_m
         }
     }
+
+    #[derive(serde::Deserialize, JsonSchema)]
+    struct Pair {
+        left: Square,
+        right: Square,
+    }
+
+    impl Shape for Pair {
+        fn area_m2(&self) -> f64 {
+            self.left.area_m2() + self.right.area_m2()
+        }
+    }
+
+    const PAIR: AddedKind<dyn Shape> = AddedKind::new("pair", Pair::json_schema, |table| {
+        let settings: Pair = serde_json::from_value(Value::Object(table))?;
+        Ok(Arc::new(settings))
+    });
 
     const fn square(name: &'static str) -> AddedKind<dyn Shape> {
         AddedKind::new(name, Square::json_schema, |table| {
@@ -308,12 +335,57 @@ mod tests {
         assert_eq!(of_kind(1)["properties"]["kind"]["const"], "tile");
         assert_eq!(of_kind(1)["properties"]["side_m"]["maximum"], 1.0);
         assert_eq!(of_kind(0)["required"], json!(["kind", "side_m"]));
-        let mut of_enum = schemars::json_schema!({ "anyOf": [{ "title": "circle" }] });
-        kinds.add_to(&mut of_enum);
-        let tables = of_enum
-            .get("oneOf")
-            .and_then(Value::as_array)
-            .expect("tables");
-        assert_eq!(tables.len(), 3);
+    }
+
+    static SHAPES: Kinds<AddedKind<dyn Shape>> = Kinds::beside("kind", &["circle"]);
+
+    #[derive(JsonSchema)]
+    #[schemars(tag = "kind", rename_all = "snake_case", transform = list_added_kinds)]
+    #[expect(dead_code, reason = "only its schema is of interest")]
+    enum AnyShape {
+        Circle {
+            radius_m: f64,
+        },
+        #[schemars(untagged)]
+        Added(AddedShape),
+    }
+
+    struct AddedShape;
+
+    impl JsonSchema for AddedShape {
+        fn schema_name() -> Cow<'static, str> {
+            "AddedShape".into()
+        }
+
+        fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+            SHAPES.schema(generator)
+        }
+
+        fn inline_schema() -> bool {
+            true
+        }
+    }
+
+    #[test]
+    fn schema_of_enum_lists_variants_and_added_kinds() {
+        let schema = schemars::schema_for!(AnyShape).to_value();
+        assert_eq!(schema["oneOf"].as_array().map(Vec::len), Some(1));
+        SHAPES.add(PAIR).expect("new");
+        let schema = schemars::schema_for!(AnyShape).to_value();
+        let name = |index: usize| &schema["oneOf"][index]["properties"]["kind"]["const"];
+        assert_eq!((name(0), name(1)), (&json!("circle"), &json!("pair")));
+        let left = &schema["oneOf"][1]["properties"]["left"]["$ref"];
+        assert_eq!(left, "#/$defs/Square");
+        assert_eq!(
+            schema["$defs"]["Square"]["properties"]["side_m"]["maximum"],
+            1.0
+        );
+        assert_eq!(schema.get("anyOf"), None);
+    }
+
+    #[test]
+    #[should_panic(expected = "not an enum with added kinds")]
+    fn refuses_schema_without_place_for_added_kinds() {
+        list_added_kinds(&mut schemars::json_schema!({ "oneOf": [{ "title": "circle" }] }));
     }
 }

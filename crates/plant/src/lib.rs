@@ -122,12 +122,11 @@ macro_rules! plant_models {
         /// The settings of a model of the mechanics.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(tag = "model", rename_all = "snake_case")]
-        #[schemars(transform = own::add_to_schema)]
+        #[schemars(transform = bench_base::kinds::list_added_kinds)]
         pub enum PlantSettings {
             $($(#[$doc])* $variant($settings),)*
             /// A model of another crate.
             #[serde(untagged)]
-            #[schemars(skip)]
             Own(OwnPlant),
         }
 

@@ -1,9 +1,10 @@
 //! Models of other crates.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -85,7 +86,17 @@ impl OwnPlant {
     }
 }
 
-/// Adds the tables of these models to the schema of all models.
-pub(super) fn add_to_schema(schema: &mut Schema) {
-    PLANTS.add_to(schema);
+impl JsonSchema for OwnPlant {
+    fn schema_name() -> Cow<'static, str> {
+        "OwnPlant".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        PLANTS.schema(generator)
+    }
+
+    /// [`list_added_kinds`](bench_base::kinds::list_added_kinds) needs the list itself.
+    fn inline_schema() -> bool {
+        true
+    }
 }

@@ -39,7 +39,7 @@ macro_rules! references {
         /// A reference, relative to the rest position at which the loop closes; zero before its start.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         #[serde(tag = "kind")]
-        #[schemars(transform = own::add_to_schema)]
+        #[schemars(transform = bench_base::kinds::list_added_kinds)]
         pub enum ReferenceSettings {
             $(
                 $(#[$doc])*
@@ -48,7 +48,6 @@ macro_rules! references {
             )*
             /// A reference of another crate.
             #[serde(untagged)]
-            #[schemars(skip)]
             Own(OwnReference),
         }
 

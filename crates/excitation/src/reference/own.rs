@@ -1,9 +1,10 @@
 //! References of other crates.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
@@ -92,7 +93,17 @@ impl<'de> Deserialize<'de> for OwnReference {
     }
 }
 
-/// Adds the tables of these references to the schema of all references.
-pub(super) fn add_to_schema(schema: &mut Schema) {
-    REFERENCES.add_to(schema);
+impl JsonSchema for OwnReference {
+    fn schema_name() -> Cow<'static, str> {
+        "OwnReference".into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        REFERENCES.schema(generator)
+    }
+
+    /// [`list_added_kinds`](bench_base::kinds::list_added_kinds) needs the list itself.
+    fn inline_schema() -> bool {
+        true
+    }
 }
