@@ -8,7 +8,7 @@ use super::run_hooks::RunHooks;
 use crate::errors::ExperimentError;
 use crate::plan::Stage;
 use bench_config::Config;
-use bench_rig::devices::{self, Reservation};
+use bench_rig::devices::{self, OpenRig, Reservation};
 use bench_rt::device_defect::DeviceDefect;
 use bench_rt::thread::{Pace, Scheduling};
 
@@ -65,6 +65,23 @@ impl OpenBench {
                 ExperimentError::Failed(format!("amplifier: {error}; nothing was moved"))
             })?;
         }
+        OpenBench::with_loop(opened, config, opening, hooks)
+    }
+
+    /// The simulated stage in place of the devices of a configuration, for tests of what happens on devices.
+    #[cfg(test)]
+    pub(crate) fn emulated(config: &Config, opening: Opening) -> OpenBench {
+        let opened = devices::simulate(config).expect("a simulated stage");
+        OpenBench::with_loop(opened, config, opening, RunHooks::default()).expect("a thread")
+    }
+
+    /// Starts the loop of opened devices.
+    fn with_loop(
+        opened: OpenRig,
+        config: &Config,
+        opening: Opening,
+        hooks: RunHooks,
+    ) -> Result<OpenBench, ExperimentError> {
         Ok(OpenBench {
             rig: LiveRig::with_hooks(opened.rig, config, opening.pace, hooks)?,
             names: DeviceNames {
@@ -76,24 +93,6 @@ impl OpenBench {
             opening,
             _reservation: opened.reservation,
         })
-    }
-
-    /// The simulated stage in place of the devices of a configuration, for tests of what happens on devices.
-    #[cfg(test)]
-    pub(crate) fn emulated(config: &Config, opening: Opening) -> OpenBench {
-        let opened = devices::simulate(config).expect("a simulated stage");
-        let hooks = RunHooks::default();
-        OpenBench {
-            rig: LiveRig::with_hooks(opened.rig, config, opening.pace, hooks).expect("a thread"),
-            names: DeviceNames {
-                amplifier: opened.amplifier,
-                probe: opened.probe,
-            },
-            serial: opened.watch,
-            config: config.clone(),
-            opening,
-            _reservation: opened.reservation,
-        }
     }
 
     /// Whether it is the rig of `config`, opened in the same way. Excitation, controller, calibration and analysis do not belong to
