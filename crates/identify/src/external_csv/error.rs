@@ -1,0 +1,243 @@
+//! Why an external record cannot be read.
+
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+/// Why a file cannot be read as a record. Messages state file, line, value and remedy.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExternalCsvError {
+    /// The file cannot be read.
+    #[error("cannot read {path}: {1}; check that it is a file and that you may read it", path = .0.display())]
+    File(PathBuf, std::io::Error),
+    /// The selected columns are missing, ambiguous or identical.
+    #[error(transparent)]
+    Columns(#[from] ColumnsError),
+    /// The file is not a table of numbers with regular times.
+    #[error(transparent)]
+    Data(#[from] DataError),
+}
+
+/// Why columns cannot be selected.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ColumnsError {
+    /// The same column for two purposes.
+    #[error("`{name}` is selected twice; give different columns for input, output and time")]
+    SelectedTwice {
+        /// Name of the column.
+        name: String,
+    },
+    /// Several columns have this name.
+    #[error(
+        "{path} has more than one column `{name}`; give each a name of its own",
+        path = .path.display()
+    )]
+    Ambiguous {
+        /// The file.
+        path: PathBuf,
+        /// Name of the columns.
+        name: String,
+    },
+    /// No column has this name.
+    #[error(
+        "{path} has no column `{name}`; choose one of {}",
+        .available.join(", "),
+        path = .path.display()
+    )]
+    Missing {
+        /// The file.
+        path: PathBuf,
+        /// The given name.
+        name: String,
+        /// Names of the columns of the file.
+        available: Vec<String>,
+    },
+}
+
+/// Why a file is not a table of numbers with regular times. Lines are those of the file, from 1.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// The text is not a table.
+    #[error(
+        "{path} is not a table with one sample per line: {source}; repair the file",
+        path = .path.display()
+    )]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// Why, with the line.
+        source: csv::Error,
+    },
+    /// Commas between the columns, and also in the numbers.
+    #[error(
+        "{path}, line {line}: has twice the columns of the header, \
+         so the numbers seem to have a comma in place of the decimal point; write them as in 0.5",
+        path = .path.display()
+    )]
+    DecimalCommas {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+    },
+    /// A cell is not a finite number.
+    #[error(
+        "{path}, line {line}: {text:?} in column `{column}` {}",
+        number_remedy(.text),
+        path = .path.display()
+    )]
+    Cell {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Name of the column.
+        column: String,
+        /// Text of the cell.
+        text: String,
+    },
+    /// Too few times for a rate.
+    #[error(
+        "{path} has {lines} lines of samples, a rate needs at least 2 and an estimate 64; record for longer",
+        path = .path.display()
+    )]
+    TooFewLines {
+        /// The file.
+        path: PathBuf,
+        /// Lines after the header.
+        lines: usize,
+    },
+    /// A time is not after the one before.
+    #[error(
+        "{path}, line {line}: the time {time_s} s in column `{column}` is not after \
+         the previous time of {previous_s} s; sort the lines, or cut the file there",
+        path = .path.display()
+    )]
+    NotRising {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Name of the column of times.
+        column: String,
+        /// The time.
+        time_s: f64,
+        /// The time of the line before.
+        previous_s: f64,
+    },
+    /// A time step differs from the others.
+    #[error(
+        "{path}, line {line}: {step_s:.9} s after the line before, where the median step is {median_s:.9} s; \
+         fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
+        path = .path.display()
+    )]
+    Irregular {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// Time since the line before.
+        step_s: f64,
+        /// Median of all such times.
+        median_s: f64,
+    },
+}
+
+/// What is wrong with a cell that is not a finite number.
+fn number_remedy(text: &str) -> &'static str {
+    if text.contains(',') {
+        "has a comma in place of the decimal point; write the numbers as in 0.5"
+    } else {
+        "is not a finite number; repair the cell, or cut the file there"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::super::{Numbers, Table};
+    use super::*;
+
+    /// The error of a table with the columns t, u and y.
+    fn error_of(rows: &str) -> ExternalCsvError {
+        let table = Table {
+            path: Path::new("data.csv"),
+            text: format!("t,u,y\n{rows}").into_bytes(),
+        };
+        let rate_hz = |Numbers { lines, values }: Numbers| table.rate_hz("t", &values[2], &lines);
+        let numbers = table.numbers(&["u", "y", "t"]);
+        let rate_hz = numbers.and_then(|numbers| Ok(rate_hz(numbers)?));
+        rate_hz.expect_err("an invalid table")
+    }
+
+    #[test]
+    fn error_of_a_cell_holds_line_column_and_text() {
+        let error = error_of("0,1,2\n1,1,off\n");
+        let ExternalCsvError::Data(DataError::Cell {
+            path,
+            line,
+            column,
+            text,
+        }) = &error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((path.as_path(), *line), (Path::new("data.csv"), 3));
+        assert_eq!((column.as_str(), text.as_str()), ("y", "off"));
+        assert_eq!(
+            error.to_string(),
+            "data.csv, line 3: \"off\" in column `y` is not a finite number; repair the cell, or cut the file there"
+        );
+    }
+
+    #[test]
+    fn error_of_an_irregular_time_holds_line_and_steps() {
+        let error = error_of("0,1,2\n1,1,2\n2,1,2\n4.5,1,2\n");
+        let ExternalCsvError::Data(DataError::Irregular {
+            line,
+            step_s,
+            median_s,
+            ..
+        }) = error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((line, step_s, median_s), (5, 2.5, 1.0));
+    }
+
+    #[test]
+    fn error_of_a_time_that_does_not_rise_holds_both_times() {
+        let error = error_of("0,1,2\n1,1,2\n0.5,1,2\n");
+        let ExternalCsvError::Data(DataError::NotRising {
+            line,
+            time_s,
+            previous_s,
+            ..
+        }) = error
+        else {
+            panic!("{error:?}");
+        };
+        assert_eq!((line, time_s, previous_s), (4, 0.5, 1.0));
+    }
+
+    #[test]
+    fn error_of_an_unknown_column_holds_the_available_ones() {
+        let table = Table {
+            path: Path::new("data.csv"),
+            text: b"t,u,y\n0,1,2\n".to_vec(),
+        };
+        let error = table.numbers(&["u", "v"]).err().expect("no column v");
+        assert_eq!(
+            error.to_string(),
+            "data.csv has no column `v`; choose one of t, u, y"
+        );
+        let ExternalCsvError::Columns(ColumnsError::Missing { available, .. }) = error else {
+            panic!("{error:?}");
+        };
+        assert_eq!(available, ["t", "u", "y"]);
+    }
+}
