@@ -165,7 +165,7 @@ fn rejects_invalid_data_with_line_and_column() {
         ),
         (
             with_line(20, |_| "0.018,1\n".into()),
-            &["line: 20", "2 fields"],
+            &["line 20", "2 in place of 3 columns"],
         ),
         (
             gap,

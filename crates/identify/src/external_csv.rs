@@ -129,29 +129,32 @@ impl Table<'_> {
 
     fn header(&self, reader: &mut csv::Reader<&[u8]>) -> Result<csv::StringRecord, DataError> {
         let header = reader.headers().cloned();
-        header.map_err(|error| self.not_a_table(error))
+        header.map_err(|error| self.not_a_table(&error))
     }
 
-    fn not_a_table(&self, source: csv::Error) -> DataError {
+    fn not_a_table(&self, error: &csv::Error) -> DataError {
         let path = self.path.to_owned();
-        match self.line_of_decimal_commas(&source) {
-            Some(line) => DataError::DecimalCommas { path, line },
-            None => DataError::Table { path, source },
-        }
-    }
-
-    /// The line with an error, if it has two columns, between commas, for each of the header.
-    fn line_of_decimal_commas(&self, error: &csv::Error) -> Option<u64> {
+        let line = error.position().map(csv::Position::line);
         let csv::ErrorKind::UnequalLengths {
-            pos,
-            expected_len,
-            len,
+            expected_len: header,
+            len: columns,
+            ..
         } = error.kind()
         else {
-            return None;
+            let reason = error.to_string();
+            return DataError::Table { path, line, reason };
         };
-        let is_doubled = separator(&self.text) == b',' && *len == 2 * expected_len;
-        is_doubled.then(|| pos.as_ref().map_or(0, csv::Position::line))
+        // Commas in the numbers make two columns of one.
+        match line {
+            Some(line) if separator(&self.text) == b',' && *columns == 2 * header => {
+                DataError::DecimalCommas { path, line }
+            }
+            _ => DataError::Table {
+                path,
+                line,
+                reason: format!("has {columns} in place of {header} columns"),
+            },
+        }
     }
 
     fn numbers(&self, names: &[&str]) -> Result<Numbers, ExternalCsvError> {
@@ -164,7 +167,7 @@ impl Table<'_> {
             values: vec![Vec::new(); names.len()],
         };
         for record in reader.records() {
-            let record = record.map_err(|error| self.not_a_table(error))?;
+            let record = record.map_err(|error| self.not_a_table(&error))?;
             self.push_row(&record, &selection, &mut numbers)?;
         }
         Ok(numbers)

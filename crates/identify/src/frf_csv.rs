@@ -60,8 +60,11 @@ pub enum FrfCsvError {
         text: String,
     },
     /// The text is not a table.
-    #[error("{0}; {REPAIR}")]
-    Table(#[source] csv::Error),
+    #[error("{reason}; {REPAIR}")]
+    Table {
+        /// Why not, with the line if it is known.
+        reason: String,
+    },
 }
 
 /// Name of the magnitude column of an external record, with the names of its columns in place of units.
@@ -139,7 +142,7 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
         .from_reader(text.as_bytes());
     let mut frf = Frf::default();
     for record in reader.records() {
-        let record = record.map_err(FrfCsvError::Table)?;
+        let record = record.map_err(|error| not_a_table(&error))?;
         finite_numbers(&record)
             .and_then(|numbers| push_row(numbers, &mut frf))
             .ok_or_else(|| invalid_row(&record))?;
@@ -156,6 +159,12 @@ fn wrong_header(found: &str) -> FrfCsvError {
         FrfCsvError::Header {
             found: found.into(),
         }
+    }
+}
+
+fn not_a_table(error: &csv::Error) -> FrfCsvError {
+    FrfCsvError::Table {
+        reason: error.to_string(),
     }
 }
 

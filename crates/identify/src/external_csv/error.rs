@@ -62,14 +62,17 @@ pub enum ColumnsError {
 pub enum DataError {
     /// The text is not a table.
     #[error(
-        "{path} is not a table with one sample per line: {source}; repair the file",
+        "{path}{}: {reason}; repair the file: a record is a table with one sample per line",
+        place(*.line),
         path = .path.display()
     )]
     Table {
         /// The file.
         path: PathBuf,
-        /// Why, with the line.
-        source: csv::Error,
+        /// The line, if it is known.
+        line: Option<u64>,
+        /// What is wrong with it.
+        reason: String,
     },
     /// Commas between the columns, and also in the numbers.
     #[error(
@@ -146,6 +149,11 @@ pub enum DataError {
     },
 }
 
+/// The line after the name of the file, if it is known.
+fn place(line: Option<u64>) -> String {
+    line.map_or_else(String::new, |line| format!(", line {line}"))
+}
+
 /// What is wrong with a cell that is not a finite number.
 fn number_remedy(text: &str) -> &'static str {
     if text.contains(',') {
@@ -192,6 +200,29 @@ mod tests {
             error.to_string(),
             "data.csv, line 3: \"off\" in column `y` is not a finite number; repair the cell, or cut the file there"
         );
+    }
+
+    #[test]
+    fn error_of_a_row_without_a_cell_holds_line_and_numbers_of_columns() {
+        let error = error_of("0,1,2\n1,1\n");
+        assert_eq!(
+            error.to_string(),
+            "data.csv, line 3: has 2 in place of 3 columns; repair the file: a record is a table with one sample per line"
+        );
+        let ExternalCsvError::Data(DataError::Table { line, reason, .. }) = error else {
+            panic!("{error:?}");
+        };
+        assert_eq!(line, Some(3));
+        assert_eq!(reason, "has 2 in place of 3 columns");
+    }
+
+    #[test]
+    fn error_of_a_row_with_decimal_commas_holds_the_line() {
+        let error = error_of("0,1,2\n0,5,1,0,2,0\n");
+        let ExternalCsvError::Data(DataError::DecimalCommas { line, .. }) = error else {
+            panic!("{error:?}");
+        };
+        assert_eq!(line, 3);
     }
 
     #[test]
