@@ -8,9 +8,9 @@
 //! The supervisor cannot delay the loop: it watches counters and the state of the recorder, and sends requests to the loop through a
 //! ring. Signals reach the loop directly. The rig stays open for several runs.
 //!
-//! Each room (folder) imports only from rooms above it:
+//! Each module imports only from modules above it:
 //!
-//! | room | for |
+//! | module | for |
 //! |---|---|
 //! | `certificate` | what a chirp showed about a rig, as the text that a plan contains |
 //! | `stage_check` | the short run in open loop that compares a stage with its certificate |

@@ -1,6 +1,6 @@
 //! The errors of the crate: why an experiment was refused or failed, and which kind of error that is.
 //!
-//! Each step of an experiment has its own error, in its room; a run and a motor have theirs here (`run_error`, `motor_error`).
+//! Each step of an experiment has its own error, in its module; a run and a motor have theirs here (`run_error`, `motor_error`).
 //! [`ExperimentError`] holds all of them, and `error_kind` carries them to another process.
 
 mod error_kind;
