@@ -3,7 +3,7 @@ use std::process::Command;
 
 use bench_experiment::certificate::{SignAgreement, SignCheck};
 use bench_experiment::evidence::{ResponseFile, certify};
-use bench_experiment::{Plan, analyse};
+use bench_experiment::{AnalysedRun, Plan, analyse};
 use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, SIGMAS_95};
 use bench_plant::{ModalModel, build};
@@ -148,14 +148,17 @@ fn only_a_completed_chirp_leaves_a_certificate() {
     let config = config(&[]);
     let complete = Recording::open(&chirp().file("recording")).expect("a recording");
     let analysis = analyse(&complete, &config).expect("an analysis");
-    let certificate = |recording: &Recording| {
+    let certificate = |run: AnalysedRun<'_>| {
         let response = ResponseFile {
             name: "frf.csv",
             csv: "",
         };
-        certify(recording, &analysis, &config, response).expect("TOML")
+        certify(&run, response).expect("TOML")
     };
-    assert!(certificate(&complete).is_some());
+    let run = |recording| AnalysedRun::new(recording, &analysis, &config);
+    assert!(certificate(run(&complete)).is_some());
+    let last_of_shots = AnalysedRun::of_shots(&complete, &analysis, &config);
+    assert_eq!(certificate(last_of_shots), None);
     // 5 um of travel: the chirp trips.
     let tripped = recorded(
         Plan::chirp,
@@ -163,6 +166,6 @@ fn only_a_completed_chirp_leaves_a_certificate() {
     );
     let other = recorded(Plan::quiet, &[]);
     for recording in [&tripped, &other] {
-        assert_eq!(certificate(recording), None);
+        assert_eq!(certificate(run(recording)), None);
     }
 }

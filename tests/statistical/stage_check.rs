@@ -6,7 +6,7 @@ use bench_config::{Config, Purpose, Source, load};
 use bench_experiment::certificate::CertificateText;
 use bench_experiment::evidence::{ResponseFile, certify};
 use bench_experiment::stage_check::StageCheck;
-use bench_experiment::{Plan, PlannedStageCheck, Run, analyse};
+use bench_experiment::{AnalysedRun, Plan, PlannedStageCheck, Run, analyse};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
@@ -43,7 +43,7 @@ fn certified_plan() -> Plan {
         name: "frf.csv",
         csv: &csv,
     };
-    let certificate = certify(&recording, &analysis, &config, response);
+    let certificate = certify(&AnalysedRun::new(&recording, &analysis, &config), response);
     let certificate = certificate.expect("TOML").expect("a completed chirp");
     let mut plan = Plan::control(config).expect("a plan");
     plan.certificate = Some(CertificateText {

@@ -51,9 +51,9 @@ pub mod stage_check;
 pub mod tuning;
 
 pub use analysis::{
-    Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError, ClosedResponses,
-    EndKind, Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse, analyse_opened,
-    analyse_with_progress, open_with_signals, recorded_frf,
+    AnalysedRun, Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError,
+    ClosedResponses, EndKind, Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse,
+    analyse_opened, analyse_with_progress, open_with_signals, recorded_frf,
 };
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,

@@ -4,6 +4,7 @@
 //! (`response_estimate`, `closed_responses`); `recorded_excitation` does all of this and fits the modes. `measured_frf` reads a
 //! response from a file, for a loop around a measured plant (`response_points`).
 
+mod analysed_run;
 mod analysis_error;
 mod closed_responses;
 mod ending;
@@ -16,6 +17,7 @@ mod response_points;
 mod segments;
 mod signal_builder;
 
+pub use analysed_run::AnalysedRun;
 pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub use ending::{EndKind, Ending};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};

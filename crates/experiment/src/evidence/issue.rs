@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::analysis::{Analysis, Ending};
+use crate::analysis::{AnalysedRun, Analysis, Ending};
 use crate::certificate::{
     Certificate, CertifiedDevices, CertifiedLoad, CertifiedLoop, CertifiedMode, CertifiedResponse,
     CertifiedVerdict, Digests, FORMAT, sha256,
@@ -22,21 +22,25 @@ pub struct ResponseFile<'a> {
     pub csv: &'a str,
 }
 
-/// The certificate of a completed chirp; `None` for another run, for one that did not come to its end, and for a response without
-/// modes.
+/// The certificate of a completed chirp; `None` for another run, for one that did not come to its end, for one whose analysis uses other
+/// recordings as well, and for a response without modes.
 ///
 /// # Errors
 /// When the settings cannot be written as TOML.
 pub fn certify(
-    recording: &Recording,
-    analysis: &Analysis,
-    config: &Config,
+    run: &AnalysedRun<'_>,
     response: ResponseFile<'_>,
 ) -> Result<Option<Certificate>, PlanError> {
+    let AnalysedRun {
+        recording,
+        analysis,
+        config,
+        is_one_recording,
+    } = *run;
     let (Ok(fit), Some(signs)) = (&analysis.fit, &analysis.signs) else {
         return Ok(None);
     };
-    if !is_completed_chirp(recording) {
+    if !(is_one_recording && is_completed_chirp(recording)) {
         return Ok(None);
     }
     let modes: Vec<CertifiedMode> = fit.modes().iter().map(CertifiedMode::from).collect();

@@ -9,7 +9,7 @@ use super::page_files::PageFiles;
 use super::result_files::{OutputError, ResultFiles};
 use bench_experiment::certificate::SignCheck;
 use bench_experiment::evidence::{ResponseFile, certify};
-use bench_experiment::{Analysis, ClosedResponses};
+use bench_experiment::{AnalysedRun, Analysis, ClosedResponses};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::{FittedMode, ModalFit, ModelOrder};
@@ -254,15 +254,18 @@ fn write_certificate(
     frf_path: &str,
     csv: &str,
 ) -> Result<Option<String>, OutputError> {
-    if !run.is_one_recording {
-        return Ok(None);
-    }
+    let analysed = AnalysedRun {
+        recording: run.recording,
+        analysis: run.analysis,
+        config: run.config,
+        is_one_recording: run.is_one_recording,
+    };
     let name = Path::new(frf_path).file_name().unwrap_or_default();
     let response = ResponseFile {
         name: &name.to_string_lossy(),
         csv,
     };
-    let certificate = certify(run.recording, run.analysis, run.config, response)?;
+    let certificate = certify(&analysed, response)?;
     let written = certificate.map(|made| results.write("certificate", "json", &made.to_json()));
     written.transpose()
 }

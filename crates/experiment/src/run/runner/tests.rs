@@ -3,10 +3,10 @@ use std::sync::OnceLock;
 
 use super::*;
 use crate::MarginError;
-use crate::analyse;
 use crate::certificate::{CertificateError, CertificateText};
 use crate::evidence::{ResponseFile, certify};
 use crate::stage_check::StageCheckError;
+use crate::{AnalysedRun, analyse};
 use bench_config::{Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
@@ -108,7 +108,7 @@ fn chirped() -> CertificateText {
         name: "frf.csv",
         csv: &csv,
     };
-    let certificate = certify(&recording, &analysis, &config, response);
+    let certificate = certify(&AnalysedRun::new(&recording, &analysis, &config), response);
     let certificate = certificate.expect("TOML").expect("a completed chirp");
     CertificateText {
         name: "certificate.json".into(),
