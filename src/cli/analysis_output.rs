@@ -12,13 +12,23 @@ use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::certificate::{SIGNS_DIFFER, SignCheck};
-use bench_experiment::{AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals};
+use bench_experiment::{
+    AnalysedRun, AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
+};
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
-use bench_report::run_pages::{AnalysisOutputs, BenchRun, OutputError, PageFiles, ResultFiles};
+use bench_report::run_pages::{
+    AnalysisOutputs, BenchRun, OutputError, PageError, PageFiles, ResultFiles, write_page,
+};
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {
+        CliError::Failed(error.to_string())
+    }
+}
+
+impl From<PageError> for CliError {
+    fn from(error: PageError) -> Self {
         CliError::Failed(error.to_string())
     }
 }
@@ -37,8 +47,20 @@ pub(super) fn analyse_and_write(
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
     let analysis = analyse_opened(recording, signals, config, &mut shown_by(progress))?;
-    let run = BenchRun::new(recording, &analysis, config).with_magnitude_axis(magnitude_axis);
-    Ok(AnalysisOutputs::write(&run, results)?)
+    let run = AnalysedRun::new(recording, &analysis, config);
+    let page = BenchRun::new(recording, &analysis, config).with_magnitude_axis(magnitude_axis);
+    write_results(&run, &page, results)
+}
+
+/// Writes the results of an analysed run, and its plots and page.
+pub(super) fn write_results(
+    run: &AnalysedRun<'_>,
+    page: &BenchRun<'_>,
+    results: ResultFiles<'_>,
+) -> Result<AnalysisOutputs, CliError> {
+    let outputs = AnalysisOutputs::write(run, results)?;
+    let report = page.report().map_err(PageError::from)?;
+    Ok(outputs.with_pages(write_page(&report, results)?))
 }
 
 /// As [`analyse_and_write`], of a recording that is not open yet.

@@ -25,7 +25,7 @@ use bench_experiment::{
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
 use bench_report::run_pages::{
-    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles,
+    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles, write_control_page,
 };
 
 /// The JSON object of the command.
@@ -130,7 +130,7 @@ fn analysed(path: &Path) -> Result<ControlResult, CliError> {
 
 /// Writes plots and page. If this fails, for example on a full disk, the results of the run are still stored and printed.
 fn written(report: &ControlReport<'_>, results: ResultFiles<'_>) -> Option<ControlFiles> {
-    let files = ControlFiles::write(report, results);
+    let files = write_control_page(report, results);
     files
         .inspect_err(|error| warn(&[format!("no report: {error}")]))
         .ok()

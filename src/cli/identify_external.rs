@@ -17,7 +17,7 @@ use bench_identify::{Distortion, DistortionSource};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{
-    ExistingFile, ExternalRecord, ModalSummary, OutputError, PageFiles, ResultFiles,
+    ExistingFile, ExternalRecord, ModalSummary, PageError, PageFiles, ResultFiles, write_page,
 };
 
 /// The JSON object of the command: as for a recording, with fields of a CSV.
@@ -126,7 +126,7 @@ impl Report {
             distortion,
             linearity: periodic.and_then(|part| part.linearity.clone()),
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
-            pages: PageFiles::write(&record.report().map_err(OutputError::from)?, results)?,
+            pages: write_page(&record.report().map_err(PageError::from)?, results)?,
             frequencies: analysis.frf.len(),
             coherence_median: analysis.frf.median_coherence(),
             summary: ModalSummary::new(analysis.fit.as_ref().ok(), &analysis.verdict),

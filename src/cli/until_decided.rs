@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::analysis_output::{self, analysis_exit, analysis_failed};
+use super::analysis_output::{self, analysis_exit, analysis_failed, write_results};
 use super::error::CliError;
 use super::exit::Exit;
 use super::output::print_text;
@@ -16,7 +16,7 @@ use bench_config::Config;
 use bench_experiment::sequential::{
     Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, until_decided,
 };
-use bench_experiment::{Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
+use bench_experiment::{AnalysedRun, Plan, RunError, RunSummary, Runner, Setup, stop_on_signal};
 use bench_identify::verdict::MAX_LOOKS;
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
@@ -117,15 +117,15 @@ fn outputs(
     };
     let recording = Recording::open(path)?;
     let shots: Vec<Shot> = sequence.shots.iter().map(|shot| shot.shot).collect();
-    let run = BenchRun::new(&recording, analysis, &sequence.config);
-    let run = run
+    let run = AnalysedRun::of_shots(&recording, analysis, &sequence.config);
+    let page = BenchRun::new(&recording, analysis, &sequence.config)
         .of_shots(excitation_text(&shots))
         .with_magnitude_axis(magnitude_axis);
     let results = ResultFiles {
         beside: path,
         existing: ExistingFile::Replace,
     };
-    Ok(AnalysisOutputs::write(&run, results)?)
+    write_results(&run, &page, results)
 }
 
 /// `2 chirps (11.5 to 116 Hz, 3.1 s; 71 to 92 Hz, 1.5 s)`.

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::outputs::{AnalysisOutputs, AnalysisStatus};
-use super::result_files::{OutputError, ResultFiles};
+use super::page_error::PageError;
+use super::result_files::ResultFiles;
 use crate::{AmplitudeOverview, Picture, amplitudes_svg, joined, plant_conditions};
 use bench_config::Config;
 use bench_experiment::linearity::ModeOverAmplitude;
@@ -33,7 +34,7 @@ impl AmplitudeFiles {
         modes: &[ModeOverAmplitude],
         config: &Config,
         results: ResultFiles<'_>,
-    ) -> Result<Option<AmplitudeFiles>, OutputError> {
+    ) -> Result<Option<AmplitudeFiles>, PageError> {
         // No run follows one that was not analysed.
         let is_analysed = |outputs: &AnalysisOutputs| outputs.status == AnalysisStatus::Analysed;
         let analysed = runs.iter().take_while(|(_, outputs)| is_analysed(outputs));

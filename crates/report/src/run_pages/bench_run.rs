@@ -33,10 +33,10 @@ const DIGITS: usize = 3;
 #[derive(Clone, Debug)]
 pub struct BenchRun<'a> {
     /// Its analysis.
-    pub(super) analysis: &'a Analysis,
-    pub(super) recording: &'a Recording,
+    analysis: &'a Analysis,
+    recording: &'a Recording,
     /// The configuration with which it ran.
-    pub(super) config: &'a Config,
+    config: &'a Config,
     /// The signal path between set-point and reading, without the mechanics.
     chain: MeasurementChain,
     /// Title of the configuration.
@@ -45,8 +45,6 @@ pub struct BenchRun<'a> {
     excitation: String,
     /// Ticks per second.
     rate_hz: f64,
-    /// Whether the analysis is that of this recording alone, so that it can certify the stage.
-    pub(super) is_one_recording: bool,
     magnitude_axis: MagnitudeAxis,
 }
 
@@ -68,18 +66,13 @@ impl<'a> BenchRun<'a> {
                 None => config.chosen_excitation().describe(),
             },
             rate_hz: config.servo.rate_hz,
-            is_one_recording: true,
             magnitude_axis: MagnitudeAxis::default(),
         }
     }
 
     /// The run of the last of several shots, with the analysis of all of them. `excitation` describes the shots.
     pub fn of_shots(self, excitation: String) -> BenchRun<'a> {
-        BenchRun {
-            excitation,
-            is_one_recording: false,
-            ..self
-        }
+        BenchRun { excitation, ..self }
     }
 
     /// The same run, with this axis for the magnitudes of its responses.

@@ -1,6 +1,7 @@
 //! The plot of distortion and noise of a periodic record.
 
-use super::plots::{Plot, PlotKind};
+use super::plot_kind::PlotKind;
+use super::plots::Plot;
 use crate::{DistortionLevels, ReportError, distortion_svg};
 use bench_identify::linearity::Linearity;
 

@@ -6,7 +6,8 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::loop_pictures::MeasuredLoop;
-use super::result_files::{OutputError, ResultFiles};
+use super::page_error::PageError;
+use super::result_files::ResultFiles;
 use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredMargins;
 use bench_experiment::LoopCurves;
@@ -58,7 +59,7 @@ impl MeasuredLoopFiles {
     pub fn write(
         report: &MeasuredLoopReport<'_>,
         results: ResultFiles<'_>,
-    ) -> Result<MeasuredLoopFiles, OutputError> {
+    ) -> Result<MeasuredLoopFiles, PageError> {
         let curves = report.curves;
         let frequencies = curves.loop_gain.frequency_hz.iter();
         let model: Vec<Complex<f64>> = frequencies

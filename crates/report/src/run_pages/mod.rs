@@ -20,11 +20,14 @@ mod loop_pictures;
 mod measured_loop;
 mod outputs;
 mod page;
+mod page_error;
 mod page_files;
+mod plot_kind;
 mod plots;
 mod result_files;
 mod run_differences;
 mod run_facts;
+mod write_page;
 
 use crate::MagnitudeAxis;
 use bench_experiment::ModelResponse;
@@ -42,9 +45,12 @@ pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
 pub use outputs::{AnalysisOutputs, AnalysisStatus, LoopOutputs, ModalSummary};
 pub use page::page;
+pub use page_error::PageError;
 pub use page_files::{ControlFiles, PageFiles};
-pub use plots::{Plot, PlotKind, plots};
+pub use plot_kind::PlotKind;
+pub use plots::{Plot, plots};
 pub use result_files::{ExistingFile, OutputError, ResultFiles};
+pub use write_page::{write_control_page, write_page};
 
 /// The content of a report on an analysed record.
 #[derive(Clone, Debug)]

@@ -1,10 +1,9 @@
-//! The files and the numbers of an analysed record: FRFs as CSV, plots, the page, modes, zeros and verdict.
+//! The files and the numbers of an analysed run as stable JSON: FRFs as CSV, the certificate, modes, zeros and verdict.
 
 use std::path::Path;
 
 use serde::Serialize;
 
-use super::bench_run::BenchRun;
 use super::page_files::PageFiles;
 use super::result_files::{OutputError, ResultFiles};
 use bench_experiment::certificate::SignCheck;
@@ -165,12 +164,13 @@ pub struct AnalysisOutputs {
 }
 
 impl AnalysisOutputs {
-    /// Writes the files of an analysed run.
+    /// Writes the files of an analysed run, with the certificate of a completed chirp; plots and page are added by
+    /// [`with_pages`](Self::with_pages).
     ///
     /// # Errors
-    /// When a plot cannot be drawn, or a file cannot be written.
+    /// When the certificate cannot be made, or a file cannot be written.
     pub fn write(
-        run: &BenchRun<'_>,
+        run: &AnalysedRun<'_>,
         results: ResultFiles<'_>,
     ) -> Result<AnalysisOutputs, OutputError> {
         let analysis = run.analysis;
@@ -180,18 +180,21 @@ impl AnalysisOutputs {
         let certificate = write_certificate(run, results, &frf_csv, &csv)?;
         let frf_without_delay_csv =
             results.write_frf("frf_without_delay", &without_delay, METRES_PER_AMPERE)?;
-        let pages = PageFiles::write(&run.report()?, results)?;
         let closed = analysis.closed.as_ref();
         Ok(AnalysisOutputs {
             frf_csv: Some(frf_csv),
             certificate,
             frf_without_delay_csv: Some(frf_without_delay_csv),
-            pages,
             closed: closed
                 .map(|closed| LoopOutputs::write(closed, results))
                 .transpose()?,
             ..AnalysisOutputs::numbers(analysis)
         })
+    }
+
+    /// The same outputs with the plots and the page of the run.
+    pub fn with_pages(self, pages: PageFiles) -> AnalysisOutputs {
+        AnalysisOutputs { pages, ..self }
     }
 
     fn numbers(analysis: &Analysis) -> AnalysisOutputs {
@@ -249,23 +252,17 @@ impl AnalysisOutputs {
 
 /// Writes the certificate of a completed chirp beside its frequency response; returns its path.
 fn write_certificate(
-    run: &BenchRun<'_>,
+    run: &AnalysedRun<'_>,
     results: ResultFiles<'_>,
     frf_path: &str,
     csv: &str,
 ) -> Result<Option<String>, OutputError> {
-    let analysed = AnalysedRun {
-        recording: run.recording,
-        analysis: run.analysis,
-        config: run.config,
-        is_one_recording: run.is_one_recording,
-    };
     let name = Path::new(frf_path).file_name().unwrap_or_default();
     let response = ResponseFile {
         name: &name.to_string_lossy(),
         csv,
     };
-    let certificate = certify(&analysed, response)?;
+    let certificate = certify(run, response)?;
     let written = certificate.map(|made| results.write("certificate", "json", &made.to_json()));
     written.transpose()
 }

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use nalgebra::Complex;
-use serde::Serialize;
 
 use super::RecordReport;
+use super::plot_kind::PlotKind;
 use crate::html::{picture, section};
 use crate::{
     Identification, OrderedMode, PoleZeroMap, ReportError, StabilityChart, Trace, UncertainPoint,
@@ -28,98 +28,6 @@ const NYQUIST_CAPTION: &str = "The response in the complex plane, where its magn
     closest modes. Arrows point to rising frequency; some frequencies are given. Circles are 95 % confidence regions. Delay, hold and amplifier turn the curve clockwise with frequency.";
 const STABILITY_CAPTION: &str = "The modes at each model order that the fit visited. A mode of the stage persists from one \
     order to the next; a mode of noise or of the search moves. Behind them: the measured magnitude. The first orders are fitted with larger tolerances.";
-
-/// The kinds of plots of an analysed record and of a closed-loop run. Pole-zero map and stability chart need modes, loop and sensitivity a closed loop, and the
-/// distortion needs a multisine with lines that are not excited.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum PlotKind {
-    /// Bode plot.
-    Bode,
-    /// Coherence.
-    Coherence,
-    /// Nyquist plot.
-    Nyquist,
-    /// Map of poles and zeros.
-    PoleZero,
-    /// Stability chart.
-    Stability,
-    /// Bode plot of L.
-    Loop,
-    /// Bode plot of S and T.
-    Sensitivity,
-    /// Output, noise and distortion of a multisine.
-    Linearity,
-    /// Reference, position, error and current of a closed-loop run.
-    Signals,
-    /// Step response of a closed-loop run.
-    Step,
-    /// Spectrum of the error of a closed-loop run.
-    Spectrum,
-    /// Nyquist plot of L.
-    LoopNyquist,
-}
-
-impl PlotKind {
-    /// The kinds of a closed-loop run.
-    pub const CONTROL: [PlotKind; 6] = [
-        PlotKind::Signals,
-        PlotKind::Step,
-        PlotKind::Spectrum,
-        PlotKind::Loop,
-        PlotKind::LoopNyquist,
-        PlotKind::Sensitivity,
-    ];
-
-    /// The kinds of an analysed record.
-    pub const ALL: [PlotKind; 9] = [
-        PlotKind::Bode,
-        PlotKind::Coherence,
-        PlotKind::Nyquist,
-        PlotKind::PoleZero,
-        PlotKind::Stability,
-        PlotKind::Loop,
-        PlotKind::LoopNyquist,
-        PlotKind::Sensitivity,
-        PlotKind::Linearity,
-    ];
-
-    /// The heading on the page.
-    pub fn heading(self) -> &'static str {
-        match self {
-            PlotKind::Bode => "Frequency response",
-            PlotKind::Coherence => "Coherence",
-            PlotKind::Nyquist => "Nyquist plot",
-            PlotKind::PoleZero => "Poles and zeros",
-            PlotKind::Stability => "Stability chart",
-            PlotKind::Loop => "Loop",
-            PlotKind::LoopNyquist => "Nyquist plot of the loop",
-            PlotKind::Sensitivity => "Sensitivities",
-            PlotKind::Linearity => "Distortion and noise",
-            PlotKind::Signals => "Signals",
-            PlotKind::Step => "Step response",
-            PlotKind::Spectrum => "Spectrum of the error",
-        }
-    }
-
-    /// The name in files and JSON.
-    pub fn name(self) -> &'static str {
-        match self {
-            PlotKind::Bode => "bode",
-            PlotKind::Coherence => "coherence",
-            PlotKind::Nyquist => "nyquist",
-            PlotKind::PoleZero => "pole_zero",
-            PlotKind::Stability => "stability",
-            PlotKind::Loop => "loop",
-            PlotKind::Sensitivity => "sensitivity",
-            PlotKind::Linearity => "linearity",
-            PlotKind::Signals => "signals",
-            PlotKind::Step => "step",
-            PlotKind::Spectrum => "spectrum",
-            PlotKind::LoopNyquist => "loop_nyquist",
-        }
-    }
-}
 
 /// A plot of a record.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,8 +52,26 @@ impl Plot {
 
     /// The section of the plot on a page, as HTML.
     pub(super) fn section(&self) -> String {
-        let heading = self.kind.heading();
+        let heading = heading(self.kind);
         section(heading, &picture(&self.svg, heading, &self.caption))
+    }
+}
+
+/// The heading of a plot on the page.
+fn heading(kind: PlotKind) -> &'static str {
+    match kind {
+        PlotKind::Bode => "Frequency response",
+        PlotKind::Coherence => "Coherence",
+        PlotKind::Nyquist => "Nyquist plot",
+        PlotKind::PoleZero => "Poles and zeros",
+        PlotKind::Stability => "Stability chart",
+        PlotKind::Loop => "Loop",
+        PlotKind::LoopNyquist => "Nyquist plot of the loop",
+        PlotKind::Sensitivity => "Sensitivities",
+        PlotKind::Linearity => "Distortion and noise",
+        PlotKind::Signals => "Signals",
+        PlotKind::Step => "Step response",
+        PlotKind::Spectrum => "Spectrum of the error",
     }
 }
 

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::ReportError;
 use bench_base::atomic_file::{write_atomic, write_new};
 use bench_experiment::PlanError;
 use bench_identify::Frf;
@@ -11,9 +10,6 @@ use bench_identify::frf_csv;
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum OutputError {
-    /// A plot cannot be drawn.
-    #[error(transparent)]
-    Plot(#[from] ReportError),
     /// The certificate cannot be made.
     #[error(transparent)]
     Certificate(#[from] PlanError),
@@ -50,12 +46,10 @@ impl ResultFiles<'_> {
     }
 
     /// Writes a file and returns its path.
-    pub(super) fn write(
-        &self,
-        what: &str,
-        extension: &str,
-        text: &str,
-    ) -> Result<String, OutputError> {
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, what: &str, extension: &str, text: &str) -> Result<String, OutputError> {
         let stem = self.beside.file_stem().unwrap_or_default();
         let name = format!("{}_{what}.{extension}", stem.to_string_lossy());
         let path = self.beside.with_file_name(name);

@@ -1,0 +1,15 @@
+//! Why the pages of a run cannot be written.
+
+use super::result_files::OutputError;
+use crate::ReportError;
+
+/// Why plots and pages cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum PageError {
+    /// A plot cannot be drawn.
+    #[error(transparent)]
+    Plot(#[from] ReportError),
+    /// A file cannot be written.
+    #[error(transparent)]
+    File(#[from] OutputError),
+}
