@@ -12,14 +12,13 @@ use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_experiment::certificate::{SIGNS_DIFFER, SignCheck};
+use bench_experiment::outputs::{AnalysisOutputs, OutputError, PageFiles, ResultFiles};
 use bench_experiment::{
     AnalysedRun, AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
 };
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
-use bench_report::run_pages::{
-    AnalysisOutputs, BenchRun, OutputError, PageError, PageFiles, ResultFiles, write_page,
-};
+use bench_report::run_pages::{BenchRun, PageError, write_page};
 
 impl From<OutputError> for CliError {
     fn from(error: OutputError) -> Self {

@@ -17,13 +17,13 @@ use super::until_decided::SequenceCommand;
 use bench_base::progress::Progress;
 use bench_config::{Config, warnings};
 use bench_excitation::Extremes;
+use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_experiment::sequential::first_shot_config;
 use bench_experiment::{
     ExcitationPlan, Plan, RunSummary, abandon_on_signal, check_calibration, predicted_extremes,
 };
 use bench_order::{ChirpOrder, Order};
 use bench_report::MagnitudeAxis;
-use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_rig::devices;
 
 /// The order, and where its recording goes.

@@ -17,6 +17,7 @@ use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
 use bench_excitation::Extremes;
 use bench_experiment::evidence::{Agreement, Condition, Evidence};
+use bench_experiment::outputs::{AnalysisOutputs, ControlFiles, ExistingFile, ResultFiles};
 use bench_experiment::stage_check::RestAfterCheck;
 use bench_experiment::{
     CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
@@ -24,9 +25,7 @@ use bench_experiment::{
 };
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
-use bench_report::run_pages::{
-    AnalysisOutputs, ControlFiles, ControlReport, ExistingFile, ResultFiles, write_control_page,
-};
+use bench_report::run_pages::{ControlReport, write_control_page};
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

@@ -14,12 +14,12 @@ use super::progress::ProgressLine;
 use super::run_options::{description_text, trip_text};
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_experiment::{
     Description, Ending, Plan, ReadSignals, RunKind, TripSummary, open_with_signals,
 };
 use bench_order::{GLOSSARY, IdentifyOrder};
 use bench_recording::Recording;
-use bench_report::run_pages::{AnalysisOutputs, ExistingFile, ResultFiles};
 
 /// The order, and where the results go.
 #[derive(Clone, Debug, clap::Args)]

@@ -10,15 +10,14 @@ use super::exit::Exit;
 use super::linearity_output;
 use super::modal_output;
 use super::output::print_result;
+use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFiles};
 use bench_identify::external_csv;
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::{Distortion, DistortionSource};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
-use bench_report::run_pages::{
-    ExistingFile, ExternalRecord, ModalSummary, PageError, PageFiles, ResultFiles, write_page,
-};
+use bench_report::run_pages::{ExternalRecord, PageError, write_page};
 
 /// The JSON object of the command: as for a recording, with fields of a CSV.
 #[derive(Debug, Serialize)]

@@ -21,12 +21,13 @@ use bench_excitation::Extremes;
 use bench_experiment::linearity::{
     self, AmplitudePlan, ModeComparison, ModeOverAmplitude, compare_modes, plan_amplitudes,
 };
+use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_experiment::{Run, RunSummary, Runner};
 use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
 use bench_order::{LinearityOrder, Order};
 use bench_report::MagnitudeAxis;
 use bench_report::number::interval;
-use bench_report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
+use bench_report::run_pages::AmplitudeFiles;
 
 /// The order, and where its recordings go.
 #[derive(Clone, Debug, clap::Args)]

@@ -1,8 +1,8 @@
 //! Responses and margins of a closed loop, as text.
 
 use bench_base::decimal::Decimal;
+use bench_experiment::outputs::LoopOutputs;
 use bench_report::number::angular_frequency;
-use bench_report::run_pages::LoopOutputs;
 use bench_report::{crossing_count, place};
 
 /// The files of the responses, and the measured margins beside those of the model.

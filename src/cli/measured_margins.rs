@@ -14,10 +14,11 @@ use bench_control::ClosedLoop;
 use bench_control::measured::{
     LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
 };
+use bench_experiment::outputs::{ExistingFile, ResultFiles};
 use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
 use bench_identify::Estimate;
 use bench_report::number::interval;
-use bench_report::run_pages::{ExistingFile, MeasuredLoopFiles, MeasuredLoopReport, ResultFiles};
+use bench_report::run_pages::{MeasuredLoopFiles, MeasuredLoopReport};
 use bench_report::{crossing_count, place};
 
 /// The margins with a measured plant, and the files of the loop.

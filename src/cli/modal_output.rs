@@ -2,9 +2,9 @@
 
 use super::table::{table, wrap};
 use bench_base::decimal::Decimal;
+use bench_experiment::outputs::ModalSummary;
 use bench_identify::modal::FittedMode;
 use bench_identify::verdict::UncertainZero;
-use bench_report::run_pages::ModalSummary;
 
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary) -> String {

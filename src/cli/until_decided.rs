@@ -13,6 +13,7 @@ use super::run_options::{RunCommand, close, run_text};
 use super::table::wrap;
 use bench_base::progress::Progress;
 use bench_config::Config;
+use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_experiment::sequential::{
     Sequence, SequenceEnd, SequenceLimits, Shot, ShotSummary, until_decided,
 };
@@ -20,7 +21,7 @@ use bench_experiment::{AnalysedRun, Plan, RunError, RunSummary, Runner, Setup, s
 use bench_identify::verdict::MAX_LOOKS;
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
-use bench_report::run_pages::{AnalysisOutputs, BenchRun, ExistingFile, ResultFiles};
+use bench_report::run_pages::BenchRun;
 
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]

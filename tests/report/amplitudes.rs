@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use bench_config::{Source, load};
 use bench_experiment::linearity::{ModeOverAmplitude, compare_modes};
+use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_identify::modal::{Estimate, FittedMode};
-use bench_report::run_pages::{AmplitudeFiles, AnalysisOutputs, ExistingFile, ResultFiles};
+use bench_report::run_pages::AmplitudeFiles;
 use bench_report::{AmplitudeOverview, ReportError, amplitudes_svg};
 
 use crate::report::svg;

@@ -26,6 +26,7 @@
 //! | `sequential` | short chirps until the verdict is certain |
 //! | `campaign` | chirps over a grid of operating points and asymmetries, and their evaluation |
 //! | `results` | the figures of recorded runs for reports: closed loops, steps, rest positions |
+//! | `outputs` | the result files of an analysis, with its certificate, and the stable JSON |
 //! | `run_comparison` | differences between recordings and their significance |
 //! | `tuning` | plants of a controller design from measured responses |
 //! | `linearity` | the same multisine at several amplitudes |
@@ -41,6 +42,7 @@ pub mod evidence;
 mod forecast;
 pub mod linearity;
 mod live;
+pub mod outputs;
 mod plan;
 mod replay;
 mod results;

@@ -2,12 +2,11 @@
 
 use serde::Serialize;
 
-use super::outputs::{AnalysisOutputs, AnalysisStatus};
 use super::page_error::PageError;
-use super::result_files::ResultFiles;
 use crate::{AmplitudeOverview, Picture, amplitudes_svg, joined, plant_conditions};
 use bench_config::Config;
 use bench_experiment::linearity::ModeOverAmplitude;
+use bench_experiment::outputs::{AnalysisOutputs, AnalysisStatus, ResultFiles};
 
 const CAPTION: &str = "Frequency and compliance of the modes in the excited band relative to the smallest amplitude, and their \
     damping ratios, each with its 95 % confidence interval: those of a linear stage do not depend on the amplitude. Noise of one \

@@ -3,13 +3,14 @@
 use super::distortion_plot::distortion_plot;
 use super::loop_pictures::MeasuredLoop;
 use super::page::{delay_ms, named, table_section, with_interval};
-use super::{Plot, PlotKind, RecordReport, run_facts};
+use super::{Plot, RecordReport, run_facts};
 use crate::conditions::lines;
 use crate::html::row;
 use crate::number::{angular_frequency, significant};
 use crate::{MagnitudeAxis, ReportError, crossing_count, place};
 use bench_config::Config;
 use bench_excitation::AmplitudeCurve;
+use bench_experiment::outputs::PlotKind;
 use bench_experiment::{Analysis, ClosedResponses, Description};
 use bench_identify::Unit;
 use bench_identify::modal::MeasurementChain;

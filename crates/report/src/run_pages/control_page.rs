@@ -2,7 +2,7 @@
 
 use super::comparison::step_picture;
 use super::page::{named, table_section};
-use super::{Plot, PlotKind, run_facts};
+use super::{Plot, run_facts};
 use crate::conditions::{joined, lines};
 use crate::html::{facts, note, row, section};
 use crate::number::{interval, plain};
@@ -11,6 +11,7 @@ use crate::{
     loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
 };
 use bench_config::Config;
+use bench_experiment::outputs::PlotKind;
 use bench_experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
 use bench_identify::SIGMAS_95;
 use bench_recording::Recording;

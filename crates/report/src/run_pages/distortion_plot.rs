@@ -1,8 +1,8 @@
 //! The plot of distortion and noise of a periodic record.
 
-use super::plot_kind::PlotKind;
 use super::plots::Plot;
 use crate::{DistortionLevels, ReportError, distortion_svg};
+use bench_experiment::outputs::PlotKind;
 use bench_identify::linearity::Linearity;
 
 /// The plot of the levels of a quantity, such as `Displacement (m)`.

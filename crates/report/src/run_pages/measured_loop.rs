@@ -7,10 +7,10 @@ use serde::Serialize;
 
 use super::loop_pictures::MeasuredLoop;
 use super::page_error::PageError;
-use super::result_files::ResultFiles;
 use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredMargins;
 use bench_experiment::LoopCurves;
+use bench_experiment::outputs::ResultFiles;
 use bench_identify::frf_csv::{AMPERES_PER_METRE, METRES_PER_AMPERE, RATIO};
 
 /// A loop with a measured plant.

@@ -18,13 +18,9 @@ mod distortion_plot;
 mod external;
 mod loop_pictures;
 mod measured_loop;
-mod outputs;
 mod page;
 mod page_error;
-mod page_files;
-mod plot_kind;
 mod plots;
-mod result_files;
 mod run_differences;
 mod run_facts;
 mod write_page;
@@ -43,13 +39,9 @@ pub use comparison::{MAX_COMPARED, comparison_page};
 pub use control_page::ControlReport;
 pub use external::ExternalRecord;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
-pub use outputs::{AnalysisOutputs, AnalysisStatus, LoopOutputs, ModalSummary};
 pub use page::page;
 pub use page_error::PageError;
-pub use page_files::{ControlFiles, PageFiles};
-pub use plot_kind::PlotKind;
 pub use plots::{Plot, plots};
-pub use result_files::{ExistingFile, OutputError, ResultFiles};
 pub use write_page::{write_control_page, write_page};
 
 /// The content of a report on an analysed record.

@@ -1,7 +1,7 @@
 //! Why the pages of a run cannot be written.
 
-use super::result_files::OutputError;
 use crate::ReportError;
+use bench_experiment::outputs::OutputError;
 
 /// Why plots and pages cannot be written.
 #[derive(Debug, thiserror::Error)]

@@ -5,12 +5,12 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::RecordReport;
-use super::plot_kind::PlotKind;
 use crate::html::{picture, section};
 use crate::{
     Identification, OrderedMode, PoleZeroMap, ReportError, StabilityChart, Trace, UncertainPoint,
     coherence_svg, identification_svg, nyquist_svg, pole_zero_svg, stability_svg,
 };
+use bench_experiment::outputs::PlotKind;
 use bench_identify::modal::{ModalFit, ModelOrder, UncertainPole};
 use bench_identify::verdict::{self, UncertainZero};
 use bench_plant::zeros::ModalTerm;

@@ -4,10 +4,10 @@ use super::RecordReport;
 use super::control_page::ControlReport;
 use super::page::page;
 use super::page_error::PageError;
-use super::page_files::{ControlFiles, PageFiles, Plots, no_plots};
-use super::plot_kind::PlotKind;
 use super::plots::{Plot, plots};
-use super::result_files::{OutputError, ResultFiles};
+use bench_experiment::outputs::{
+    ControlFiles, OutputError, PageFiles, PlotKind, Plots, ResultFiles, no_plots,
+};
 
 /// Draws a record and writes its plots and its page.
 ///

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::plan::PlanError;
 use bench_base::atomic_file::{write_atomic, write_new};
-use bench_experiment::PlanError;
 use bench_identify::Frf;
 use bench_identify::frf_csv;
 

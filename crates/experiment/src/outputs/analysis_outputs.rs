@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::page_files::PageFiles;
 use super::result_files::{OutputError, ResultFiles};
-use bench_experiment::certificate::SignCheck;
-use bench_experiment::evidence::{ResponseFile, certify};
-use bench_experiment::{AnalysedRun, Analysis, ClosedResponses};
+use crate::analysis::{AnalysedRun, Analysis, ClosedResponses};
+use crate::certificate::SignCheck;
+use crate::evidence::{ResponseFile, certify};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE, RATIO};
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::{FittedMode, ModalFit, ModelOrder};
