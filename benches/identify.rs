@@ -58,9 +58,9 @@ fn identify(c: &mut Criterion) {
     });
     group.bench_function("local, modes and verdict", |b| {
         b.iter(|| {
-            let (frf, data) =
-                local::estimate_with_data(&signals, BAND_HZ, &settings).expect("excited");
-            (frf, judged(&data, &config))
+            let frf = local::estimate(&signals, BAND_HZ, &settings).expect("excited");
+            let verdict = judged(&frf.data, &config);
+            (frf, verdict)
         })
     });
     group.finish();

@@ -127,7 +127,7 @@ fn errors_match_their_standard_deviations() {
             repetition(1),
         )
         .unwrap();
-        for datum in &periods.frf_data {
+        for datum in &periods.frf.data {
             ratio += (datum.response - response(datum.frequency_hz)).norm_sqr() / datum.variance;
             count += 1.0;
         }
@@ -159,7 +159,7 @@ fn response_and_variance_equal_numpy() {
     let Some(reference) = python::numbers("periodic.py", &arguments, &rows) else {
         return;
     };
-    let ours = estimate(&signals, BAND_HZ, repetition(2)).unwrap().frf_data;
+    let ours = estimate(&signals, BAND_HZ, repetition(2)).unwrap().frf.data;
     assert_eq!(reference.len(), ours.len());
     for (row, datum) in reference.iter().zip(&ours) {
         let off =

@@ -55,6 +55,7 @@ pub fn flat() -> Frf {
         magnitude_sigma: vec![0.0; count],
         phase_sigma_rad: vec![0.0; count],
         resolution_hz: vec![10.0; count],
+        data: Vec::new(),
     }
 }
 

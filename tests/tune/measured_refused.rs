@@ -60,7 +60,9 @@ fn changed(
             });
         }
     }
-    changed.data = source
+    changed.measured.frf.data = source
+        .measured
+        .frf
         .data
         .iter()
         .filter_map(|datum| {

@@ -18,7 +18,8 @@ pub enum Unit {
 
 /// A measured frequency response. All columns have one entry per frequency; frequencies rise; every entry is finite.
 ///
-/// A frequency at which the input had no energy is omitted.
+/// A frequency at which the input had no energy is omitted. The errors of neighbouring points are correlated where the points are closer
+/// than the resolution; those of [`Frf::data`] are independent.
 ///
 /// ```
 /// use bench_identify::{Frf, FrfPoint};
@@ -51,6 +52,9 @@ pub struct Frf {
     /// Equivalent noise bandwidth of the estimator in hertz: the width of the rectangular average with the same noise
     /// reduction. Features of the plant that are narrower are smeared.
     pub resolution_hz: Vec<f64>,
+    /// The same response without smoothing, for a fit; frequencies rise. Empty if it was not estimated from samples, as that of a CSV
+    /// file, or if the record has no noise.
+    pub data: Vec<FrfDatum>,
 }
 
 /// One frequency of an [`Frf`].
@@ -68,7 +72,7 @@ pub struct FrfPoint {
     pub resolution_hz: f64,
 }
 
-/// One datum of a parametric fit: the mean response over a few neighbouring bins. The errors of different data are
+/// One datum of a response for a parametric fit: the mean response over a few neighbouring bins. The errors of different data are
 /// independent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrfDatum {
@@ -82,7 +86,8 @@ pub struct FrfDatum {
     pub variance: f64,
 }
 
-/// The points of several responses of the same plant, each where its standard deviation is the smallest; frequencies rise.
+/// The points of several responses of the same plant, each where its standard deviation is the smallest, and the data of all;
+/// frequencies rise.
 pub fn best_of(frfs: &[Frf]) -> Frf {
     let mut points: Vec<(usize, usize)> = Vec::new();
     for (which, frf) in frfs.iter().enumerate() {
@@ -96,6 +101,9 @@ pub fn best_of(frfs: &[Frf]) -> Frf {
     for (which, index) in points {
         best.take_from(&frfs[which], index);
     }
+    best.data = frfs.iter().flat_map(|frf| &frf.data).copied().collect();
+    best.data
+        .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
     best
 }
 
@@ -144,14 +152,16 @@ impl Frf {
 
     /// The response with a delay removed from its phases: H exp(j w delay).
     pub fn without_delay(&self, delay_s: f64) -> Frf {
-        let response = self
-            .frequency_hz
-            .iter()
-            .zip(&self.response)
-            .map(|(f, h)| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s))
-            .collect();
+        let advanced =
+            |f: f64, h: Complex<f64>| h * Complex::from_polar(1.0, 2.0 * PI * f * delay_s);
+        let points = self.frequency_hz.iter().zip(&self.response);
+        let data = self.data.iter().map(|datum| FrfDatum {
+            response: advanced(datum.frequency_hz, datum.response),
+            ..*datum
+        });
         Frf {
-            response,
+            response: points.map(|(f, h)| advanced(*f, *h)).collect(),
+            data: data.collect(),
             ..self.clone()
         }
     }
@@ -163,6 +173,17 @@ impl Frf {
         let is_within = after < self.len() || is_last;
         let before = after.checked_sub(1).filter(|_| is_within)?;
         self.magnitude_sigma.get(before).copied()
+    }
+
+    /// Appends another response, of higher frequencies.
+    pub fn append(&mut self, other: Frf) {
+        self.frequency_hz.extend(other.frequency_hz);
+        self.response.extend(other.response);
+        self.coherence.extend(other.coherence);
+        self.magnitude_sigma.extend(other.magnitude_sigma);
+        self.phase_sigma_rad.extend(other.phase_sigma_rad);
+        self.resolution_hz.extend(other.resolution_hz);
+        self.data.extend(other.data);
     }
 
     /// Appends a point of another response.
@@ -214,6 +235,15 @@ impl Frf {
             Ok(self)
         }
     }
+
+    /// The response, or an error if it has no data for a fit.
+    pub(super) fn with_data(self, band_hz: (f64, f64)) -> Result<Frf, super::IdentifyError> {
+        if self.data.is_empty() {
+            Err(super::IdentifyError::not_excited(band_hz))
+        } else {
+            Ok(self)
+        }
+    }
 }
 
 /// arg H in (-pi, pi]: -pi, which atan2 returns for a negative zero, becomes pi.
@@ -228,5 +258,37 @@ fn phase_sigma_rad(sigma: f64, magnitude: f64) -> f64 {
         sigma / magnitude
     } else {
         PHASE_SIGMA_LIMIT_RAD
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_data(frequencies_hz: &[f64]) -> Frf {
+        let data = frequencies_hz.iter().map(|hz| FrfDatum {
+            frequency_hz: *hz,
+            spread_hz: 0.0,
+            response: Complex::new(1.0, 0.0),
+            variance: 1e-6,
+        });
+        Frf {
+            data: data.collect(),
+            ..Frf::default()
+        }
+    }
+
+    #[test]
+    fn best_of_several_responses_has_the_data_of_all_in_rising_order() {
+        let best = best_of(&[of_data(&[1.0, 3.0]), of_data(&[2.0, 3.0])]);
+        let frequencies: Vec<f64> = best.data.iter().map(|datum| datum.frequency_hz).collect();
+        assert_eq!(frequencies, [1.0, 2.0, 3.0, 3.0]);
+    }
+
+    #[test]
+    fn data_without_a_delay_are_advanced_by_it() {
+        // 50 ms at 5 Hz are a quarter of a turn.
+        let without = of_data(&[5.0]).without_delay(0.05);
+        assert!((without.data[0].response - Complex::new(0.0, 1.0)).norm() < 1e-12);
     }
 }

@@ -9,8 +9,8 @@ use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{describes, hint, implausible};
 use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
-    EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, excited_band_hz,
-    frf_data, local, record_check, with_distortion,
+    EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
+    excited_band_hz, record_check, with_distortion,
 };
 use bench_plant::PlantError;
 
@@ -235,7 +235,7 @@ fn analyse(
     };
     let signals: &Signals = &record_check::without(signals, &stray_lines);
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
-    let (frf, data, periodic) = response(signals, requested_hz, repetition)?;
+    let (frf, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
     let band_hz = if band_hz.is_none() && periodic.is_some() {
         frf.band_hz()
@@ -243,17 +243,17 @@ fn analyse(
         requested_hz
     };
     let fit = match &periodic {
-        Some(periodic) => fit_of_periods(&data, periodic.linearity.as_ref(), &chain),
-        None => modal::fit(&data, &chain),
+        Some(periodic) => fit_of_periods(&frf.data, periodic.linearity.as_ref(), &chain),
+        None => modal::fit(&frf.data, &chain),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let why = defective(signals, repetition.is_some())
-        .or_else(|| implausible(signals.rate_hz, &frf, &data, &fit, &chain));
+        .or_else(|| implausible(signals.rate_hz, &frf, &fit, &chain));
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => {
             let scope = VerdictScope::up_to(judged_up_to_rad_s);
-            let verdict = judge(&fit, &data, &chain, scope)?;
+            let verdict = judge(&fit, &frf.data, &chain, scope)?;
             let hint = hint(&verdict, signals, repetition.is_some(), &fit);
             verdict.with(hint)
         }
@@ -283,27 +283,21 @@ fn response(
     signals: &Signals,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
-) -> Result<(Frf, Vec<FrfDatum>, Option<PeriodicPart>), IdentificationError> {
+) -> Result<(Frf, Option<PeriodicPart>), IdentificationError> {
     if let Some(repetition) = repetition {
-        let Periods {
-            frf,
-            frf_data,
-            count,
-            ..
-        } = periodic::estimate(signals, band_hz, repetition)?;
+        let Periods { frf, count, .. } = periodic::estimate(signals, band_hz, repetition)?;
         let lines = harmonics(signals, band_hz, repetition, InputSignal::Measured)?;
         let linearity = lines.map(Linearity::new);
         let part = PeriodicPart {
             periods: count,
             skipped: repetition.skip,
-            distortion: Distortion::of(linearity.as_ref(), &frf_data),
+            distortion: Distortion::of(linearity.as_ref(), &frf.data),
             linearity,
         };
-        return Ok((frf, frf_data, Some(part)));
+        return Ok((frf, Some(part)));
     }
-    let settings = EstimatorSettings::default();
-    let frf = local::estimate(signals, band_hz, &settings)?;
-    Ok((frf, frf_data(signals, band_hz, &settings)?, None))
+    let settings = IdentifySettings::Local(EstimatorSettings::default());
+    Ok((crate::response(signals, band_hz, &settings)?, None))
 }
 
 /// The defects of the record, which modes would be fitted to.

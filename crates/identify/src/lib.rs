@@ -2,14 +2,14 @@
 //!
 //! ```text
 //! Signals -> drift removed -> FFT of the whole record -> local models of neighbouring bins -> Frf -> CSV, plots
-//!                                                                                    '--> FrfDatum -> modal -> verdict
+//!                                                                                    '--> its data -> modal -> verdict
 //! ```
 //!
 //! | to find | look in |
 //! |---|---|
 //! | two signals, all steps with the default settings | [`Identification`] |
 //! | the default estimator, for records that begin and end at rest | [`local`] |
-//! | the same without smoothing, for a fit | [`frf_data()`] |
+//! | the same without smoothing, for a fit | [`Frf::data`] |
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
 //! | the estimator that the configuration selects | [`response`] |
 //! | the response while a run goes on | [`GrowingResponse`] |
@@ -62,7 +62,6 @@ pub use identification::{
     Distortion, DistortionSource, ExternalAnalysis, Identification, IdentificationError,
     PeriodicPart,
 };
-pub use local_model::frf_data::frf_data;
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
@@ -71,41 +70,27 @@ pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, R
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};
 
-/// The frequency response as by [`response`], and the data for a fit as by [`frf_data()`].
+/// The frequency response by the estimator that the configuration selects, with its data for a fit.
 ///
 /// # Errors
-/// Those of the two.
-pub fn response_and_data(
-    signals: &Signals,
-    band_hz: (f64, f64),
-    settings: &IdentifySettings,
-) -> Result<(Frf, Vec<FrfDatum>), IdentifyError> {
-    match settings {
-        IdentifySettings::Local(local) => local::estimate_with_data(signals, band_hz, local),
-        IdentifySettings::Welch { .. } => Ok((
-            response(signals, band_hz, settings)?,
-            frf_data(signals, band_hz, &settings.local())?,
-        )),
-    }
-}
-
-/// The frequency response by the estimator that the configuration selects.
-///
-/// # Errors
-/// Those of the estimator.
+/// Those of the estimator, and [`IdentifyError::NotExcited`] if there are no data for a fit.
 pub fn response(
     signals: &Signals,
     band_hz: (f64, f64),
     settings: &IdentifySettings,
 ) -> Result<Frf, IdentifyError> {
     match settings {
-        IdentifySettings::Local(local) => local::estimate(signals, band_hz, local),
+        IdentifySettings::Local(local) => {
+            local::estimate(signals, band_hz, local)?.with_data(band_hz)
+        }
         IdentifySettings::Welch {
             segment_s,
             estimator,
         } => {
             let segment = libm::round(segment_s * signals.rate_hz) as usize;
-            welch::estimate(signals, band_hz, segment, *estimator)
+            let frf = welch::estimate(signals, band_hz, segment, *estimator)?;
+            let data = local_model::frf_data::frf_data(signals, band_hz, &settings.local())?;
+            Frf { data, ..frf }.with_data(band_hz)
         }
     }
 }

@@ -25,13 +25,12 @@ const SWAPPED: &str = "modes describe the response from output to input, but not
 pub(super) fn implausible(
     rate_hz: f64,
     frf: &Frf,
-    data: &[FrfDatum],
     fit: &Result<ModalFit, FitError>,
     chain: &MeasurementChain,
 ) -> Option<String> {
     incoherent(frf, fit)
         .or_else(|| growing(frf, fit))
-        .or_else(|| inverse_fits(data, fit, chain))
+        .or_else(|| inverse_fits(&frf.data, fit, chain))
         .or_else(|| early(rate_hz, fit.as_ref().ok()?))
 }
 

@@ -4,7 +4,7 @@ use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
 use bench_experiment::MeasuredFrf;
 use bench_experiment::tuning::FrfSource;
-use bench_identify::{Frf, FrfDatum, FrfPoint, frf_data, response};
+use bench_identify::{Frf, FrfDatum, FrfPoint, response};
 use bench_plant::{LoopPlant, Mode};
 use bench_rig::simulated;
 use nalgebra::Complex;
@@ -35,7 +35,6 @@ pub fn measured(name: &str, config: &Config) -> FrfSource {
     FrfSource {
         file: name.into(),
         sha256: name.into(),
-        data: frf_data(&signals, band_hz, &config.identify.local()).expect("data"),
         measured: MeasuredFrf {
             frf,
             recorded: None,
@@ -58,7 +57,7 @@ pub fn sampled(
 ) -> FrfSource {
     let plant = LoopPlant::new(config, modes);
     let mut dice = Dice::new(config.sim.seed);
-    let (mut frf, mut data) = (Frf::default(), Vec::new());
+    let mut frf = Frf::default();
     let count = ((high_hz / low_hz).ln() / SPACING) as i32;
     let variance = 2.0 * sigma_m_per_a * sigma_m_per_a;
     for k in 0..=count {
@@ -72,7 +71,7 @@ pub fn sampled(
             variance,
             resolution_hz: SPACING * frequency_hz,
         });
-        data.push(FrfDatum {
+        frf.data.push(FrfDatum {
             frequency_hz,
             spread_hz: 0.0,
             response,
@@ -87,7 +86,6 @@ pub fn sampled(
             recorded: None,
             cautions: Vec::new(),
         },
-        data,
     }
 }
 

@@ -40,7 +40,6 @@ fn with_margins(
     };
     Ok(ResponseEstimate {
         frf: estimate.plant,
-        frf_data: estimate.frf_data,
         closed: Some(closed),
         linearity: None,
     })

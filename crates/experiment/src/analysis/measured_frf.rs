@@ -9,7 +9,7 @@ use std::path::Path;
 
 use super::analysis_error::AnalysisError;
 use super::read_run::{ReadSignals, open_with_signals};
-use super::recorded_excitation::{cautions, measured_data};
+use super::recorded_excitation::{cautions, measured_response};
 use crate::plan::{Plan, PlanError, RunKind};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
@@ -17,7 +17,7 @@ use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredLoopError;
 use bench_identify::delay::excess_delay;
 use bench_identify::frf_csv::{self, FrfCsvError};
-use bench_identify::{Estimate, Frf, FrfDatum};
+use bench_identify::{Estimate, Frf};
 use bench_plant::LoopPlant;
 use bench_recording::{Recording, RecordingError};
 
@@ -138,26 +138,15 @@ impl FrfError {
 }
 
 impl MeasuredFrf {
-    /// The FRF of a CSV file, or of a recording, which ends in `.mcap`.
+    /// The FRF of a CSV file, or of a recording, which ends in `.mcap`, with its data for a fit.
     ///
     /// # Errors
     /// When the file cannot be read, or has no response from current to displacement.
     pub fn read(path: &Path) -> Result<MeasuredFrf, FrfError> {
         if path.extension() == Some(OsStr::new("mcap")) {
-            MeasuredFrf::of_recording(path).map(|(measured, _)| measured)
+            MeasuredFrf::of_recording(path)
         } else {
             MeasuredFrf::of_csv(path)
-        }
-    }
-
-    /// As [`MeasuredFrf::read`], and of a recording the data for a fit.
-    pub(crate) fn read_with_data(
-        path: &Path,
-    ) -> Result<(MeasuredFrf, Option<Vec<FrfDatum>>), FrfError> {
-        if path.extension() == Some(OsStr::new("mcap")) {
-            MeasuredFrf::of_recording(path).map(|(frf, data)| (frf, Some(data)))
-        } else {
-            MeasuredFrf::of_csv(path).map(|frf| (frf, None))
         }
     }
 
@@ -173,16 +162,14 @@ impl MeasuredFrf {
         })
     }
 
-    fn of_recording(path: &Path) -> Result<(MeasuredFrf, Vec<FrfDatum>), FrfError> {
+    fn of_recording(path: &Path) -> Result<MeasuredFrf, FrfError> {
         let (recording, signals) = open_with_signals(path)?;
         let plan = Plan::of(&recording)?;
-        let (frf, data) = recorded_data(&recording, signals, &plan)?;
-        let measured = MeasuredFrf {
-            frf,
+        Ok(MeasuredFrf {
+            frf: recorded_frf(&recording, signals, &plan)?,
             recorded: Some(Box::new(plan.config)),
             cautions: cautions(&recording),
-        };
-        Ok((measured, data))
+        })
     }
 
     /// Settings of the recorded run that differ from a configuration and affect the plant, as warnings.
@@ -212,16 +199,10 @@ pub fn recorded_frf(
     signals: ReadSignals,
     plan: &Plan,
 ) -> Result<Frf, FrfError> {
-    recorded_data(recording, signals, plan).map(|(frf, _)| frf)
-}
-
-fn recorded_data(
-    recording: &Recording,
-    signals: ReadSignals,
-    plan: &Plan,
-) -> Result<(Frf, Vec<FrfDatum>), FrfError> {
     match plan.kind {
-        RunKind::Chirp | RunKind::Control => Ok(measured_data(recording, signals, &plan.config)?),
+        RunKind::Chirp | RunKind::Control => {
+            Ok(measured_response(recording, signals, &plan.config)?)
+        }
         RunKind::Calibrate | RunKind::Quiet | RunKind::StageCheck => {
             Err(FrfError::Kind(recording.path().display().to_string()))
         }

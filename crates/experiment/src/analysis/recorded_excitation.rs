@@ -19,7 +19,7 @@ use bench_identify::delay::excess_delay;
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use bench_identify::verdict::{Certainty, Verdict, VerdictScope, judge};
-use bench_identify::{Estimate, Frf, FrfDatum, Signals, response_and_data};
+use bench_identify::{Estimate, Frf, Signals, response};
 use bench_plant::{ModalModel, Mode, Sign};
 use bench_recording::Recording;
 
@@ -158,17 +158,15 @@ fn analyse_signals(
     })
 }
 
-/// The frequency response of a recording, from the commanded current to the measured position, [`Analysis::frf`], and the data for a
-/// fit.
-pub(super) fn measured_data(
+/// The frequency response of a recording, from the commanded current to the measured position: [`Analysis::frf`].
+pub(super) fn measured_response(
     recording: &Recording,
     signals: ReadSignals,
     config: &Config,
-) -> Result<(Frf, Vec<FrfDatum>), AnalysisError> {
+) -> Result<Frf, AnalysisError> {
     let mut no_progress = |_, _| ControlFlow::Continue(());
     let signals = run_signals_of(recording, signals, config, &mut no_progress)?;
-    let estimate = estimated(recording, signals, config, &mut no_progress)?;
-    Ok((estimate.frf, estimate.frf_data))
+    Ok(estimated(recording, signals, config, &mut no_progress)?.frf)
 }
 
 /// Defects of a run that affect its results.
@@ -218,16 +216,12 @@ fn open_loop(
     config: &Config,
 ) -> Result<ResponseEstimate, AnalysisError> {
     let pattern = config.chosen_excitation().pattern();
-    let (frf, frf_data, linearity) = match segments(signals, &pattern, band_hz)? {
-        Segments::Lines(frf, data, linearity) => (frf, data, linearity.map(|boxed| *boxed)),
-        Segments::Record(signals) => {
-            let (frf, data) = response_and_data(&signals, band_hz, &config.identify)?;
-            (frf, data, None)
-        }
+    let (frf, linearity) = match segments(signals, &pattern, band_hz)? {
+        Segments::Lines(frf, linearity) => (frf, linearity.map(|boxed| *boxed)),
+        Segments::Record(signals) => (response(&signals, band_hz, &config.identify)?, None),
     };
     Ok(ResponseEstimate {
         frf,
-        frf_data,
         closed: None,
         linearity,
     })
@@ -252,9 +246,9 @@ impl ModalStep<'_> {
         let config = self.config;
         let modal = ModalModel::of(&bench_plant::build(&config.plant)?)?;
         let chain = MeasurementChain::bench(config);
-        let fit = fit_modes(&estimate.frf_data, &chain, progress)?;
+        let fit = fit_modes(&estimate.frf, &chain, progress)?;
         let scope = scope_of_model(&modal, self.certainty);
-        let verdict = judge(&fit, &estimate.frf_data, &chain, scope)?;
+        let verdict = judge(&fit, &estimate.frf.data, &chain, scope)?;
         let model_response = ModelResponse::new(config, &modal);
         let frf = estimate.frf;
         let fitted = fit.as_ref().ok();
@@ -279,12 +273,12 @@ impl ModalStep<'_> {
 
 /// The fitted modes, or why none can be fitted. Fails only if the receiver of the progress cancels.
 fn fit_modes(
-    data: &[FrfDatum],
+    frf: &Frf,
     chain: &MeasurementChain,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Result<ModalFit, FitError>, AnalysisError> {
     let mut report = |fraction| progress(AnalysisPhase::Modes, fraction);
-    match modal::fit_with_progress(data, chain, &mut report) {
+    match modal::fit_with_progress(&frf.data, chain, &mut report) {
         Err(FitError::Cancelled) => Err(AnalysisError::Cancelled),
         fit => Ok(fit),
     }

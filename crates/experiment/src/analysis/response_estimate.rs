@@ -4,8 +4,8 @@ use nalgebra::Complex;
 
 use bench_control::Margins;
 use bench_control::measured::MeasuredMargins;
+use bench_identify::Frf;
 use bench_identify::linearity::Linearity;
-use bench_identify::{Frf, FrfDatum};
 
 /// The measured responses of a closed loop, and those of the model at the same frequencies.
 #[derive(Clone, Debug)]
@@ -24,10 +24,9 @@ pub struct ClosedResponses {
     pub margins: MeasuredMargins,
 }
 
-/// A response: for display, and as data for the fit.
+/// A response with its data for the fit.
 pub(crate) struct ResponseEstimate {
     pub(crate) frf: Frf,
-    pub(crate) frf_data: Vec<FrfDatum>,
     pub(crate) closed: Option<ClosedResponses>,
     pub(crate) linearity: Option<Linearity>,
 }

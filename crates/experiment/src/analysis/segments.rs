@@ -21,7 +21,7 @@ pub(super) enum Segments {
     /// A record from rest to rest.
     Record(Signals),
     /// A response at single frequencies, and its linearity if lines are omitted between them.
-    Lines(Frf, Vec<FrfDatum>, Option<Box<Linearity>>),
+    Lines(Frf, Option<Box<Linearity>>),
 }
 
 /// Divides a run by the pattern of its excitation.
@@ -58,18 +58,17 @@ fn periodic_lines(
     repetition: Repetition,
 ) -> Result<Segments, IdentifyError> {
     let Periods {
-        frf,
-        frf_data,
-        input_powers,
-        ..
+        frf, input_powers, ..
     } = periodic::estimate(signals, band_hz, repetition)?;
     let Some(lines) = harmonics(signals, band_hz, repetition, InputSignal::Commanded)? else {
-        let data = with_mean_variance(&frf_data, &input_powers);
-        return Ok(Segments::Lines(frf, data, None));
+        let data = with_mean_variance(&frf.data, &input_powers);
+        return Ok(Segments::Lines(Frf { data, ..frf }, None));
     };
     let linearity = Linearity::new(lines);
-    let data = with_mean_variance(&linearity.with_odd_distortion(&frf_data), &input_powers);
-    Ok(Segments::Lines(frf, data, Some(Box::new(linearity))))
+    let distorted = linearity.with_odd_distortion(&frf.data);
+    let data = with_mean_variance(&distorted, &input_powers);
+    let frf = Frf { data, ..frf };
+    Ok(Segments::Lines(frf, Some(Box::new(linearity))))
 }
 
 /// The data with the variances that those of neighbouring lines give. The scatter of a few periods alone is occasionally far too
@@ -115,12 +114,11 @@ fn estimate_stepped_sine(
     windows: &[Window],
     (low_hz, high_hz): (f64, f64),
 ) -> Result<Segments, IdentifyError> {
-    let (mut frf, mut data, mut input_powers) = (Frf::default(), Vec::new(), Vec::new());
+    let (mut frf, mut input_powers) = (Frf::default(), Vec::new());
     for (hz, window) in rising_windows(signals, windows) {
         match sine(signals, window, hz) {
             Ok(periods) => {
-                append(&mut frf, periods.frf);
-                data.extend(periods.frf_data);
+                frf.append(periods.frf);
                 input_powers.extend(periods.input_powers);
             }
             // The other sines are still usable.
@@ -128,14 +126,11 @@ fn estimate_stepped_sine(
             Err(error) => return Err(error),
         }
     }
-    if data.is_empty() {
+    if frf.data.is_empty() {
         Err(IdentifyError::NotExcited { low_hz, high_hz })
     } else {
-        Ok(Segments::Lines(
-            frf,
-            with_mean_variance(&data, &input_powers),
-            None,
-        ))
+        let data = with_mean_variance(&frf.data, &input_powers);
+        Ok(Segments::Lines(Frf { data, ..frf }, None))
     }
 }
 
@@ -172,13 +167,4 @@ fn sine(signals: &Signals, window: &Window, frequency_hz: f64) -> Result<Periods
         band_hz,
         repetition,
     )
-}
-
-fn append(frf: &mut Frf, other: Frf) {
-    frf.frequency_hz.extend(other.frequency_hz);
-    frf.response.extend(other.response);
-    frf.coherence.extend(other.coherence);
-    frf.magnitude_sigma.extend(other.magnitude_sigma);
-    frf.phase_sigma_rad.extend(other.phase_sigma_rad);
-    frf.resolution_hz.extend(other.resolution_hz);
 }

@@ -9,14 +9,14 @@ use crate::analysis::{
 };
 use bench_config::Config;
 use bench_identify::verdict::Certainty;
-use bench_identify::{Frf, FrfDatum, best_of};
+use bench_identify::{Frf, best_of};
 
-/// The responses of the shots, and their data for the fit.
+/// The responses of the shots.
 #[derive(Default)]
 pub(super) struct Evidence {
     frfs: Vec<Frf>,
-    /// The data of all shots, frequencies rising.
-    pub(super) data: Vec<FrfDatum>,
+    /// The best points and the data of all shots.
+    pub(super) frf: Frf,
     filled_ticks: u64,
     /// Defects of the runs.
     cautions: Vec<String>,
@@ -34,9 +34,7 @@ impl Evidence {
         let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
         self.frfs.push(estimate.frf);
         self.cautions.extend(cautions(&recording));
-        self.data.extend(estimate.frf_data);
-        self.data
-            .sort_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz));
+        self.frf = best_of(&self.frfs);
         Ok(())
     }
 
@@ -46,8 +44,7 @@ impl Evidence {
     /// When the model of the plant cannot be analysed.
     pub(super) fn analysis(&self, config: &Config) -> Result<Analysis, AnalysisError> {
         let estimate = ResponseEstimate {
-            frf: best_of(&self.frfs),
-            frf_data: self.data.clone(),
+            frf: self.frf.clone(),
             closed: None,
             linearity: None,
         };

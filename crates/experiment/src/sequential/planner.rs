@@ -71,7 +71,7 @@ impl<'a> SequentialExperiment<'a> {
         evidence.add(&run.path, &planned.config)?;
         let first = FirstShot {
             shot: planned.shot,
-            data: evidence.data.clone(),
+            data: evidence.frf.data.clone(),
             amplitude: AmplitudeCurve::of_current(&planned.config.chirp.amplitude),
         };
         let analysis = evidence.analysis(base)?;
@@ -153,7 +153,7 @@ impl<'a> SequentialExperiment<'a> {
         let Ok(fit) = &self.analysis.fit else {
             return Ok(None);
         };
-        let input = self.scope.input(fit, &self.evidence.data, &self.chain);
+        let input = self.scope.input(fit, &self.evidence.frf.data, &self.chain);
         let quantities = decisive_quantities(&input)?;
         if quantities.is_empty() {
             return Ok(None);

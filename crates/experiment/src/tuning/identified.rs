@@ -379,5 +379,6 @@ fn verdict(
     let up_to_rad_s = LAST_MODE * highest;
     let chain = MeasurementChain::bench(config);
     let scope = VerdictScope::up_to(up_to_rad_s);
-    verdict::verdict(&scope.input(fit, &source.data, &chain)).map_err(TuneSourceError::Zeros)
+    let data = &source.measured.frf.data;
+    verdict::verdict(&scope.input(fit, data, &chain)).map_err(TuneSourceError::Zeros)
 }

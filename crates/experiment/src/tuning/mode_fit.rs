@@ -31,7 +31,8 @@ impl Selection {
     fn of(self, source: &FrfSource) -> Vec<FrfDatum> {
         match self {
             Selection::EverySecond(first) => {
-                source.data.iter().skip(first).step_by(2).copied().collect()
+                let data = source.measured.frf.data.iter();
+                data.skip(first).step_by(2).copied().collect()
             }
             Selection::Points => independent(&source.measured.frf),
         }
@@ -43,7 +44,7 @@ impl Selection {
 /// # Errors
 /// That of the fit of all data, if none succeeds.
 pub(super) fn best_fit(source: &FrfSource, chain: &MeasurementChain) -> Result<ModalFit, FitError> {
-    let mut best = modal::fit(&source.data, chain);
+    let mut best = modal::fit(&source.measured.frf.data, chain);
     for selection in OTHERS {
         if best.as_ref().is_ok_and(|fit| unresolved(fit) == 0) {
             break;

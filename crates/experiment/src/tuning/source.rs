@@ -10,17 +10,15 @@ use bench_base::numeric::to_four_decimals;
 use bench_config::{Config, PlantSettings};
 use bench_identify::{Frf, FrfDatum};
 
-/// A measured frequency response, from command (A) to reading (m), with the data for a fit.
+/// A measured frequency response, from command (A) to reading (m).
 #[derive(Clone, Debug)]
 pub struct FrfSource {
     /// The file as the user named it.
     pub file: String,
     /// SHA-256 of the file, as hexadecimal digits.
     pub sha256: String,
-    /// The response.
+    /// The response, with its data for a fit.
     pub measured: MeasuredFrf,
-    /// Independent data of the response.
-    pub data: Vec<FrfDatum>,
 }
 
 impl FrfSource {
@@ -30,8 +28,8 @@ impl FrfSource {
     /// When the file cannot be read, or has no response from current to displacement.
     pub fn read(path: &Path) -> Result<FrfSource, TuneSourceError> {
         let file = path.display().to_string();
-        let read = MeasuredFrf::read_with_data(path);
-        let (measured, data) = read.map_err(|why| TuneSourceError::File {
+        let read = MeasuredFrf::read(path);
+        let mut measured = read.map_err(|why| TuneSourceError::File {
             file: file.clone(),
             why: Box::new(why),
         })?;
@@ -40,12 +38,14 @@ impl FrfSource {
             why,
         })?;
         let digest = Sha256::digest(&bytes);
-        let data = data.unwrap_or_else(|| independent(&measured.frf));
+        // A CSV file contains the points only.
+        if measured.frf.data.is_empty() {
+            measured.frf.data = independent(&measured.frf);
+        }
         Ok(FrfSource {
             file,
             sha256: digest.iter().map(|byte| format!("{byte:02x}")).collect(),
             measured,
-            data,
         })
     }
 

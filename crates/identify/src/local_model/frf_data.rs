@@ -23,8 +23,8 @@ const WIDTH_RATIO: f64 = 0.0005;
 /// rise. Blocks without input or without any noise are omitted. Of the settings, only the smallest half-width is used.
 ///
 /// # Errors
-/// Those of [`super::local::estimate`].
-pub fn frf_data(
+/// When the signals, the band or the settings allow no estimate: see [`IdentifyError`].
+pub(crate) fn frf_data(
     signals: &Signals,
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
@@ -32,22 +32,11 @@ pub fn frf_data(
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    non_empty(
-        of_spectra(&RecordSpectra::of_signals(signals), &bins, settings),
-        band_hz,
-    )
-}
-
-/// The data, or an error if there are none.
-pub(super) fn non_empty(
-    data: Vec<FrfDatum>,
-    band_hz: (f64, f64),
-) -> Result<Vec<FrfDatum>, IdentifyError> {
-    if data.is_empty() {
-        Err(IdentifyError::not_excited(band_hz))
-    } else {
-        Ok(data)
-    }
+    Ok(of_spectra(
+        &RecordSpectra::of_signals(signals),
+        &bins,
+        settings,
+    ))
 }
 
 /// The data between two bins.

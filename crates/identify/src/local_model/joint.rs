@@ -30,14 +30,14 @@ use core::ops::RangeInclusive;
 
 use nalgebra::Complex;
 
-use super::frf_data::{non_empty, of_spectra};
+use super::frf_data::of_spectra;
 use super::local::{collect, h1};
 use super::model::{self, FittedModel};
 use super::record_spectra::RecordSpectra;
 use super::spectra::Spectra;
 use super::window::{LocalFit, Window};
 use crate::fft::RealFft;
-use crate::{EstimatorSettings, Frf, FrfDatum, IdentifyError, Signals, SignalsError, band};
+use crate::{EstimatorSettings, Frf, IdentifyError, Signals, SignalsError, band};
 
 /// Reference, command and position of a closed loop: one sample per tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,10 +51,8 @@ pub struct LoopSignals {
 /// The responses of a closed loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointEstimate {
-    /// P, from command (A) to position (m).
+    /// P, from command (A) to position (m), with its data for a fit.
     pub plant: Frf,
-    /// P without smoothing, for a fit.
-    pub frf_data: Vec<FrfDatum>,
     /// T = P C/(1 + P C), from reference to position.
     pub complementary: Frf,
     /// S = 1/(1 + P C), from reference to error.
@@ -105,9 +103,12 @@ fn estimate_bins(
     let positions = settings.positions(bins, band_hz, position.bin_hz());
     let plant = responses.position_over(&responses.command);
     let loop_gain = responses.position_over(error);
+    let plant = Frf {
+        data: of_spectra(&plant, bins, settings),
+        ..collect(h1(&plant, &positions, settings))
+    };
     Ok(JointEstimate {
-        plant: collect(h1(&plant, &positions, settings)),
-        frf_data: non_empty(of_spectra(&plant, bins, settings), band_hz)?,
+        plant: plant.with_data(band_hz)?,
         complementary: collect(h1(position, &positions, settings)),
         sensitivity: collect(h1(error, &positions, settings)),
         loop_gain: collect(h1(&loop_gain, &positions, settings)),

@@ -40,10 +40,10 @@ use super::record_spectra::RecordSpectra;
 use super::spectra::Spectra;
 use crate::estimator::{hv, inverse};
 use crate::{
-    Estimator, EstimatorSettings, Frf, FrfDatum, FrfPoint, IdentifyError, LocalModel, Signals, band,
+    Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, LocalModel, Signals, band,
 };
 
-/// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` that have input.
+/// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` that have input, with its data for a fit.
 ///
 /// The coherence is the ratio of the output's power that the model explains; for a constant it is |sum w Y conj(U)|^2/(sum w
 /// |U|^2 sum w |Y|^2). See the module for standard deviations and bias.
@@ -68,35 +68,15 @@ pub fn estimate(
     band_hz: (f64, f64),
     settings: &EstimatorSettings,
 ) -> Result<Frf, IdentifyError> {
-    let (bins, spectra) = spectra_in_band(signals, band_hz, settings)?;
-    of_spectra(&spectra, &bins, band_hz, settings)
-}
-
-/// As [`estimate`], with the data of [`frf_data()`](crate::frf_data()).
-///
-/// # Errors
-/// Those of [`estimate`].
-pub fn estimate_with_data(
-    signals: &Signals,
-    band_hz: (f64, f64),
-    settings: &EstimatorSettings,
-) -> Result<(Frf, Vec<FrfDatum>), IdentifyError> {
-    let (bins, spectra) = spectra_in_band(signals, band_hz, settings)?;
-    let frf = of_spectra(&spectra, &bins, band_hz, settings)?;
-    let data = frf_data::of_spectra(&spectra, &bins, settings);
-    Ok((frf, frf_data::non_empty(data, band_hz)?))
-}
-
-/// The bins of a band, and the spectra of a record that allows an estimate.
-fn spectra_in_band(
-    signals: &Signals,
-    band_hz: (f64, f64),
-    settings: &EstimatorSettings,
-) -> Result<(RangeInclusive<usize>, RecordSpectra), IdentifyError> {
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    Ok((bins, RecordSpectra::of_signals(signals)))
+    of_spectra(
+        &RecordSpectra::of_signals(signals),
+        &bins,
+        band_hz,
+        settings,
+    )
 }
 
 fn of_spectra(
@@ -106,7 +86,11 @@ fn of_spectra(
     settings: &EstimatorSettings,
 ) -> Result<Frf, IdentifyError> {
     let positions = settings.positions(bins, band_hz, spectra.bin_hz());
-    collect(estimates(spectra, &positions, settings)).excited(band_hz)
+    let frf = collect(estimates(spectra, &positions, settings)).excited(band_hz)?;
+    Ok(Frf {
+        data: frf_data::of_spectra(spectra, bins, settings),
+        ..frf
+    })
 }
 
 /// The response of those positions that have an estimate.

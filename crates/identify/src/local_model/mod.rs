@@ -7,7 +7,7 @@
 //! joint: the same for a stage in closed loop, by ratios of two models
 //! ```
 
-pub mod frf_data;
+pub(super) mod frf_data;
 pub mod joint;
 mod least_squares;
 pub mod local;

@@ -18,11 +18,9 @@ pub use super::lines::Repetition;
 /// The response by averages over periods.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Periods {
-    /// The response at the excited lines; the resolution is the distance of the lines.
+    /// The response at the excited lines, with one datum per line; the resolution is the distance of the lines.
     pub frf: Frf,
-    /// The same for a fit, one datum per line.
-    pub frf_data: Vec<FrfDatum>,
-    /// |mean U|^2 of each of these data.
+    /// |mean U|^2 of each datum.
     pub input_powers: Vec<f64>,
     /// Number of averaged periods.
     pub count: usize,
@@ -42,18 +40,16 @@ pub fn estimate(
     let count = lines.first().map_or(0, |line| line.input.len());
     let mut periods = Periods {
         frf: Frf::default(),
-        frf_data: Vec::new(),
         input_powers: Vec::new(),
         count,
     };
     for line in excited(&lines) {
         periods.push(line, line_hz);
     }
-    if periods.frf_data.is_empty() {
-        Err(IdentifyError::not_excited(band_hz))
-    } else {
-        Ok(periods)
-    }
+    Ok(Periods {
+        frf: periods.frf.with_data(band_hz)?,
+        ..periods
+    })
 }
 
 impl Periods {
@@ -71,7 +67,7 @@ impl Periods {
             resolution_hz: line_hz,
         };
         if self.frf.push(point) && variance > 0.0 {
-            self.frf_data.push(FrfDatum {
+            self.frf.data.push(FrfDatum {
                 frequency_hz,
                 spread_hz: 0.0,
                 response,
