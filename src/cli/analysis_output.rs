@@ -14,7 +14,7 @@ use bench_config::Config;
 use bench_experiment::certificate::{SIGNS_DIFFER, SignCheck};
 use bench_experiment::outputs::{AnalysisOutputs, OutputError, PageFiles, ResultFiles};
 use bench_experiment::{
-    AnalysedRun, AnalysisPhase, ReadSignals, RunSummary, analyse_opened, open_with_signals,
+    AnalysedRun, AnalysisPhase, ReadSignals, RunSummary, analyse, open_with_signals,
 };
 use bench_recording::Recording;
 use bench_report::MagnitudeAxis;
@@ -45,7 +45,7 @@ pub(super) fn analyse_and_write(
     progress: &Progress,
 ) -> Result<AnalysisOutputs, CliError> {
     progress.begin("analysing", STEPS);
-    let analysis = analyse_opened(recording, signals, config, &mut shown_by(progress))?;
+    let analysis = analyse(recording, signals, config, &mut shown_by(progress))?;
     let run = AnalysedRun::new(recording, &analysis, config);
     let page = BenchRun::new(recording, &analysis, config).with_magnitude_axis(magnitude_axis);
     write_results(&run, &page, results)

@@ -3,7 +3,7 @@ use std::process::Command;
 
 use bench_experiment::certificate::{SignAgreement, SignCheck};
 use bench_experiment::evidence::{ResponseFile, certify};
-use bench_experiment::{AnalysedRun, Plan, analyse};
+use bench_experiment::{AnalysedRun, Plan, ReadSignals, analyse, never_cancels};
 use bench_identify::modal::FittedMode;
 use bench_identify::{Estimate, SIGMAS_95};
 use bench_plant::{ModalModel, build};
@@ -147,7 +147,13 @@ fn recorded(plan: impl FnOnce(bench_config::Config) -> Plan, more: &[&str]) -> R
 fn only_a_completed_chirp_leaves_a_certificate() {
     let config = config(&[]);
     let complete = Recording::open(&chirp().file("recording")).expect("a recording");
-    let analysis = analyse(&complete, &config).expect("an analysis");
+    let analysis = analyse(
+        &complete,
+        ReadSignals::default(),
+        &config,
+        &mut never_cancels,
+    )
+    .expect("an analysis");
     let certificate = |run: AnalysedRun<'_>| {
         let response = ResponseFile {
             name: "frf.csv",

@@ -3,7 +3,7 @@ use std::f64::consts::TAU;
 
 use bench_config::{Config, ReferenceSettings, Source, load};
 use bench_excitation::SweptReference;
-use bench_experiment::{Analysis, AnalysisError, Plan, analyse};
+use bench_experiment::{Analysis, AnalysisError, Plan, ReadSignals, analyse, never_cancels};
 use bench_identify::verdict::Cnmp;
 use bench_plant::LoopPlant;
 use bench_recording::Recording;
@@ -264,7 +264,12 @@ fn run_that_trips_before_the_loop_closes_gives_no_response() {
         .expect("ticks")
         .filter(|tick| tick.as_ref().expect("whole").state == State::Running);
     assert!(running.count() > 10, "the program did not run");
-    let answer = analyse(&recording, &plan.config);
+    let answer = analyse(
+        &recording,
+        ReadSignals::default(),
+        &plan.config,
+        &mut never_cancels,
+    );
     assert!(
         matches!(answer, Err(AnalysisError::NothingRan)),
         "{:?}",

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use bench_config::Config;
 use bench_excitation::{Chirp, Excitation};
-use bench_experiment::{Plan, analyse};
+use bench_experiment::{Plan, ReadSignals, analyse, never_cancels};
 use bench_hal::Validity;
 use bench_plant::Mode;
 use bench_recording::{Header, Recorder, Recording};
@@ -114,7 +114,13 @@ fn recorded(config: &Config, wires: &Wires, folder: &Path) -> (Recording, f64) {
 fn deviation(config: &Config, wires: &Wires) -> (f64, f64, f64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (recording, age_s) = recorded(config, wires, folder.path());
-    let analysis = analyse(&recording, config).expect("an analysis");
+    let analysis = analyse(
+        &recording,
+        ReadSignals::default(),
+        config,
+        &mut never_cancels,
+    )
+    .expect("an analysis");
     let mut mean = config.clone();
     mean.amplifier.latency_s = wires.command_s.0 + 0.5 * wires.command_s.1;
     // Readings are taken at the start of the tick.

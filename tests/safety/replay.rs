@@ -7,7 +7,9 @@ use bench_config::{
     whole,
 };
 use bench_excitation::{SineReference, StepReference};
-use bench_experiment::{Plan, ReplayError, Replayed, RunKind, replay};
+use bench_experiment::{
+    Plan, ReadSignals, ReplayError, Replayed, RunKind, analyse, never_cancels, replay,
+};
 use bench_hal::Validity;
 use bench_recording::{Header, Recorder, Recording};
 use bench_rig::calibration::Correction;
@@ -123,7 +125,13 @@ fn recording_with_refused_damping_is_read_replayed_and_identified() {
     let recording = Recording::open(&path).expect("a recording");
     let read = Plan::of(&recording).expect("a plan");
     assert_eq!(read.config.plant, plan.config.plant);
-    let analysis = bench_experiment::analyse(&recording, &read.config).expect("an analysis");
+    let analysis = analyse(
+        &recording,
+        ReadSignals::default(),
+        &read.config,
+        &mut never_cancels,
+    )
+    .expect("an analysis");
     assert!(analysis.frf.len() > 100, "{}", analysis.frf.len());
 }
 

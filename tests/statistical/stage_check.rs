@@ -6,7 +6,9 @@ use bench_config::{Config, Purpose, Source, load};
 use bench_experiment::certificate::CertificateText;
 use bench_experiment::evidence::{ResponseFile, certify};
 use bench_experiment::stage_check::StageCheck;
-use bench_experiment::{AnalysedRun, Plan, PlannedStageCheck, Run, analyse};
+use bench_experiment::{
+    AnalysedRun, Plan, PlannedStageCheck, ReadSignals, Run, analyse, never_cancels,
+};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
@@ -37,7 +39,13 @@ fn certified_plan() -> Plan {
     let folder = tempfile::tempdir().expect("a folder");
     let config = config(&["sim.seed=1000".into()]);
     let recording = run(&Plan::chirp(config.clone()), &config, folder.path());
-    let analysis = analyse(&recording, &config).expect("an analysis");
+    let analysis = analyse(
+        &recording,
+        ReadSignals::default(),
+        &config,
+        &mut never_cancels,
+    )
+    .expect("an analysis");
     let csv = frf_csv::to_string(&analysis.frf, METRES_PER_AMPERE);
     let response = ResponseFile {
         name: "frf.csv",

@@ -55,7 +55,7 @@ pub mod tuning;
 pub use analysis::{
     AnalysedRun, Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError,
     ClosedResponses, EndKind, Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse,
-    analyse_opened, analyse_with_progress, open_with_signals, recorded_frf,
+    never_cancels, open_with_signals, recorded_frf,
 };
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::FigureError;
 use super::model::Model;
 use bench_config::Config;
-use bench_experiment::{Analysis, Plan, TrackingMetrics};
+use bench_experiment::{Analysis, Plan, ReadSignals, TrackingMetrics, analyse, never_cancels};
 use bench_recording::Recording;
 use bench_rig::devices;
 use bench_rt::record::{TickRecord, flag};
@@ -66,7 +66,12 @@ impl Runs {
         }
         let config = Model::stage().config()?;
         let recording = self.run(&Plan::chirp(config.clone()), "chirp")?;
-        let analysis = bench_experiment::analyse(&recording, &config)?;
+        let analysis = analyse(
+            &recording,
+            ReadSignals::default(),
+            &config,
+            &mut never_cancels,
+        )?;
         Ok(self.chirp.get_or_init(|| analysis))
     }
 

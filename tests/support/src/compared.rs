@@ -5,12 +5,11 @@
 //! ```
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 use std::path::Path;
 
 use bench_config::{Config, Purpose, Source, load};
-use bench_experiment::Plan;
 use bench_experiment::run_comparison::{Comparison, Difference, RunResult};
+use bench_experiment::{Plan, never_cancels};
 use bench_recording::Recording;
 
 use crate::simulated;
@@ -57,7 +56,7 @@ pub fn result(config: &Config) -> RunResult {
     let folder = tempfile::tempdir().expect("a folder");
     let path = simulated::recorded(&Plan::chirp(config.clone()), folder.path());
     let recording = Recording::open(&path).expect("a recording");
-    RunResult::of(&recording, &mut |_, _| ControlFlow::Continue(())).expect("an analysis")
+    RunResult::of(&recording, &mut never_cancels).expect("an analysis")
 }
 
 /// The comparison of two chirps of equal stages with different noise.

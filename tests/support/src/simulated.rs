@@ -2,7 +2,7 @@
 use std::path::{Path, PathBuf};
 
 use bench_config::Config;
-use bench_experiment::{Analysis, AnalysisError, Plan, analyse};
+use bench_experiment::{Analysis, AnalysisError, Plan, ReadSignals, analyse, never_cancels};
 use bench_recording::Recording;
 use bench_rig::simulated::SimulatedRig;
 use bench_rt::servo_run::ServoEnd;
@@ -30,6 +30,8 @@ pub fn analysed(plan: &Plan, assumed: &Config) -> Result<Analysis, AnalysisError
     let folder = tempfile::tempdir().expect("a temporary folder");
     analyse(
         &Recording::open(&recorded(plan, folder.path())).expect("a recording"),
+        ReadSignals::default(),
         assumed,
+        &mut never_cancels,
     )
 }

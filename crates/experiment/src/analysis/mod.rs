@@ -24,9 +24,7 @@ pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub(crate) use measured_frf::{check_frf, check_rate, judge_excess};
 pub use model_response::ModelResponse;
 pub use read_run::{ReadSignals, open_with_signals};
-pub use recorded_excitation::{
-    Analysis, AnalysisPhase, AnalysisProgress, analyse, analyse_opened, analyse_with_progress,
-};
+pub use recorded_excitation::{Analysis, AnalysisPhase, AnalysisProgress, analyse, never_cancels};
 pub(crate) use recorded_excitation::{
     ModalStep, cautions, estimated, run_signals, run_signals_of, scope_of_model,
 };

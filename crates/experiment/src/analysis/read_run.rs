@@ -11,8 +11,9 @@ use bench_recording::{Preceding, Recording, RecordingError};
 use bench_rt::arming::State;
 use bench_rt::record::{TickRecord, flag};
 
-/// The signals of a run, or why it has none. `None` if they are not read, because the configuration does not precede the ticks in the
-/// file.
+/// The signals of a run, or why it has none. `None` if they are not read yet, by default or because the configuration does not precede
+/// the ticks in the file.
+#[derive(Default)]
 pub struct ReadSignals(Option<Result<RunSignals, AnalysisError>>);
 
 impl ReadSignals {

@@ -84,62 +84,24 @@ impl AnalysisPhase {
 /// Receives the progress of each phase, 0 to 1; `Break` cancels the analysis.
 pub type AnalysisProgress<'a> = dyn FnMut(AnalysisPhase, f64) -> ControlFlow<()> + 'a;
 
+/// A receiver of progress that ignores it and never cancels.
+pub fn never_cancels(_: AnalysisPhase, _: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
+}
+
 /// Analyses a recording made with `config`: of an excitation, or of a closed loop with a swept reference. The reasons of the
-/// verdict mention a run that was not completed.
+/// verdict mention a run that was not completed. `signals` are those of [`open_with_signals`](crate::open_with_signals), or
+/// [`ReadSignals::default`] to read them here.
 ///
 /// # Errors
-/// When the recording cannot be read, or contains no frequency response: see [`AnalysisError`].
-pub fn analyse(recording: &Recording, config: &Config) -> Result<Analysis, AnalysisError> {
-    analyse_with_progress(recording, config, &mut |_, _| ControlFlow::Continue(()))
-}
-
-/// As [`analyse`], with a receiver of its progress, which can cancel it.
-///
-/// # Errors
-/// Those of [`analyse`], and [`AnalysisError::Cancelled`].
-pub fn analyse_with_progress(
-    recording: &Recording,
-    config: &Config,
-    progress: &mut AnalysisProgress<'_>,
-) -> Result<Analysis, AnalysisError> {
-    let only_closed = is_closed_loop(recording.metadata());
-    let signals = read_signals(recording, config.servo.rate_hz, only_closed, progress)?;
-    analyse_signals(recording, signals, config, progress)
-}
-
-/// As [`analyse_with_progress`], with the signals of [`open_with_signals`](crate::open_with_signals).
-///
-/// # Errors
-/// Those of [`analyse_with_progress`].
-pub fn analyse_opened(
+/// When the recording cannot be read, or contains no frequency response, or `progress` cancels: see [`AnalysisError`].
+pub fn analyse(
     recording: &Recording,
     signals: ReadSignals,
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
     let signals = run_signals_of(recording, signals, config, progress)?;
-    analyse_signals(recording, signals, config, progress)
-}
-
-/// The signals as read with the recording, or else by reading it again.
-pub(crate) fn run_signals_of(
-    recording: &Recording,
-    signals: ReadSignals,
-    config: &Config,
-    progress: &mut AnalysisProgress<'_>,
-) -> Result<RunSignals, AnalysisError> {
-    signals.into_result().unwrap_or_else(|| {
-        let only_closed = is_closed_loop(recording.metadata());
-        read_signals(recording, config.servo.rate_hz, only_closed, progress)
-    })
-}
-
-fn analyse_signals(
-    recording: &Recording,
-    signals: RunSignals,
-    config: &Config,
-    progress: &mut AnalysisProgress<'_>,
-) -> Result<Analysis, AnalysisError> {
     let filled_ticks = signals.filled_ticks;
     let estimate = estimated(recording, signals, config, progress)?;
     let with_modes = ModalStep {
@@ -158,15 +120,27 @@ fn analyse_signals(
     })
 }
 
+/// The signals as read with the recording, or else by reading it again.
+pub(crate) fn run_signals_of(
+    recording: &Recording,
+    signals: ReadSignals,
+    config: &Config,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<RunSignals, AnalysisError> {
+    signals.into_result().unwrap_or_else(|| {
+        let only_closed = is_closed_loop(recording.metadata());
+        read_signals(recording, config.servo.rate_hz, only_closed, progress)
+    })
+}
+
 /// The frequency response of a recording, from the commanded current to the measured position: [`Analysis::frf`].
 pub(super) fn measured_response(
     recording: &Recording,
     signals: ReadSignals,
     config: &Config,
 ) -> Result<Frf, AnalysisError> {
-    let mut no_progress = |_, _| ControlFlow::Continue(());
-    let signals = run_signals_of(recording, signals, config, &mut no_progress)?;
-    Ok(estimated(recording, signals, config, &mut no_progress)?.frf)
+    let signals = run_signals_of(recording, signals, config, &mut never_cancels)?;
+    Ok(estimated(recording, signals, config, &mut never_cancels)?.frf)
 }
 
 /// Defects of a run that affect its results.
@@ -319,8 +293,7 @@ fn visible_modes(modal: &ModalModel, up_to_rad_s: f64) -> usize {
 /// # Errors
 /// When the recording cannot be read, or lacks too many ticks.
 pub(crate) fn run_signals(recording: &Recording, rate_hz: f64) -> Result<Signals, AnalysisError> {
-    let mut no_progress = |_, _| ControlFlow::Continue(());
-    let read = read_signals(recording, rate_hz, false, &mut no_progress)?;
+    let read = read_signals(recording, rate_hz, false, &mut never_cancels)?;
     Ok(read.loop_signals.signals)
 }
 

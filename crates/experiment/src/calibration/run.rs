@@ -3,7 +3,7 @@
 use std::time::SystemTime;
 
 use super::staircase_fit::{StaircaseFit, fit};
-use crate::analysis::{Analysis, analyse};
+use crate::analysis::{Analysis, ReadSignals, analyse, never_cancels};
 use crate::errors::ExperimentError;
 use crate::forecast::{extremes, predicted_extremes};
 use crate::live::abandon_on_signal;
@@ -216,7 +216,12 @@ fn measure_delay(
     if summary.is_completed() {
         let (path, config) = (run.path.clone(), config.clone());
         let analysis = abandon_on_signal(move || -> Result<Analysis, ExperimentError> {
-            Ok(analyse(&Recording::open(&path)?, &config)?)
+            Ok(analyse(
+                &Recording::open(&path)?,
+                ReadSignals::default(),
+                &config,
+                &mut never_cancels,
+            )?)
         })?;
         set_delay(&mut calibration.chain, analysis.transpose()?);
     }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::load::LoadCheck;
-use crate::analysis::{Analysis, AnalysisError, analyse};
+use crate::analysis::{Analysis, AnalysisError, ReadSignals, analyse, never_cancels};
 use crate::live::Run;
 use crate::sequential::Sequence;
 use bench_config::Config;
@@ -50,7 +50,12 @@ pub fn analyse_point(run: &mut Run, config: &Config) -> Result<PointResult, Reco
     if let Some(why) = trip_reason(run) {
         return Ok(undecided(why, loop_digest));
     }
-    match analyse(&Recording::open(&run.path)?, config) {
+    match analyse(
+        &Recording::open(&run.path)?,
+        ReadSignals::default(),
+        config,
+        &mut never_cancels,
+    ) {
         Ok(analysis) => Ok(result(&analysis, loop_digest)),
         Err(AnalysisError::Recording(error)) => Err(error),
         Err(error) => Ok(undecided(error.to_string(), loop_digest)),

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::analysis::{
-    Analysis, AnalysisError, AnalysisProgress, Ending, analyse_with_progress, cautions,
+    Analysis, AnalysisError, AnalysisProgress, Ending, ReadSignals, analyse, cautions,
 };
 use crate::errors::ExperimentError;
 use crate::plan::{Description, Plan, RunKind};
@@ -125,7 +125,7 @@ fn analysed(
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<(Option<Analysis>, Option<String>), ExperimentError> {
-    match analyse_with_progress(recording, config, progress) {
+    match analyse(recording, ReadSignals::default(), config, progress) {
         Ok(analysis) => {
             let why = analysis.fit.as_ref().err().map(ToString::to_string);
             Ok((Some(analysis), why))

@@ -1,10 +1,9 @@
 //! The data of all shots.
 
-use core::ops::ControlFlow;
 use std::path::Path;
 
 use crate::analysis::{
-    Analysis, AnalysisError, AnalysisPhase, ModalStep, ResponseEstimate, cautions, estimated,
+    Analysis, AnalysisError, ModalStep, ResponseEstimate, cautions, estimated, never_cancels,
     open_with_signals, run_signals_of,
 };
 use bench_config::Config;
@@ -58,8 +57,4 @@ impl Evidence {
         }
         Ok(analysis)
     }
-}
-
-fn never_cancels(_: AnalysisPhase, _: f64) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }

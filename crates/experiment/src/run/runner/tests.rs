@@ -6,7 +6,7 @@ use crate::MarginError;
 use crate::certificate::{CertificateError, CertificateText};
 use crate::evidence::{ResponseFile, certify};
 use crate::stage_check::StageCheckError;
-use crate::{AnalysedRun, analyse};
+use crate::{AnalysedRun, ReadSignals, analyse, never_cancels};
 use bench_config::{Purpose, Source, load};
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
 
@@ -102,7 +102,13 @@ fn chirped() -> CertificateText {
     let path = run.path.clone();
     run.finish("{}").expect("a good disk");
     let recording = Recording::open(&path).expect("a recording");
-    let analysis = analyse(&recording, &config).expect("an analysis");
+    let analysis = analyse(
+        &recording,
+        ReadSignals::default(),
+        &config,
+        &mut never_cancels,
+    )
+    .expect("an analysis");
     let csv = frf_csv::to_string(&analysis.frf, METRES_PER_AMPERE);
     let response = ResponseFile {
         name: "frf.csv",
