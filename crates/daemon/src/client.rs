@@ -274,7 +274,7 @@ impl Connection {
 
     /// Asks for a turn and waits for it.
     fn enter(&mut self, open: OpenCommand, progress: &Progress) -> Result<(), ExperimentError> {
-        self.send(&FromCommand::Open(open))?;
+        self.send(&FromCommand::Open(Box::new(open)))?;
         loop {
             match self.receive()? {
                 FromDaemon::Granted => return Ok(()),

@@ -24,7 +24,7 @@ pub const MAX_MESSAGE_BYTES: usize = 16 << 20;
 #[serde(rename_all = "snake_case")]
 pub enum FromCommand {
     /// Asks for a turn.
-    Open(OpenCommand),
+    Open(Box<OpenCommand>),
     /// Orders a run.
     Run(Box<PlannedRun>),
     /// The command waits for the end of its run.

@@ -70,7 +70,7 @@ impl ExcitationOptions {
 /// Errors of the model are returned unchanged; every other error names the option `--shape`.
 fn refused(source: &ResponseSource, error: AmplitudePlanError) -> ExperimentError {
     match error {
-        AmplitudePlanError::Model(error) => error.into(),
+        AmplitudePlanError::Model(error) => error,
         other => ExperimentError::Refused(format!("--shape {source}: {other}")),
     }
 }
