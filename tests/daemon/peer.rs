@@ -132,7 +132,7 @@ fn set_user_of_thread(uid: u32) {
 /// The order with another folder.
 fn with_folder(run: &Value, folder: &Path) -> Value {
     let mut run = run.clone();
-    run["run"]["folder"] = folder.display().to_string().into();
+    run["run"]["conditions"]["folder"] = folder.display().to_string().into();
     run
 }
 

@@ -18,6 +18,7 @@ pub mod http_client;
 mod lease;
 pub mod live;
 mod metrics;
+mod order_files;
 mod output;
 mod owner;
 mod ownership;

@@ -9,8 +9,8 @@ use axum::response::{IntoResponse, Response};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::file_check::Outside;
 use crate::files::FolderError;
+use crate::order_files::Outside;
 use crate::schedule::ScheduleError;
 use crate::worker::ComputeError;
 use bench_experiment::{ErrorKind, ErrorObject};
