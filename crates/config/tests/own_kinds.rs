@@ -1,7 +1,10 @@
-//! A configuration with a plant and a reference of another crate.
+//! A configuration with a plant, a reference and an excitation of another crate.
 
-use bench_config::{ConfigError, Source, load, schema, whole};
-use bench_excitation::{Reference, ReferenceContext, ReferenceDesign, ReferenceError};
+use bench_config::{ConfigError, Purpose, Source, load, schema, whole};
+use bench_excitation::{
+    Excitation, ExcitationDesign, Length, Reference, ReferenceContext, ReferenceDesign,
+    ReferenceError, SharedSettings,
+};
 use bench_plant::{Assembly, ModalModel, PlantModel, Structure, build};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -49,6 +52,40 @@ impl Reference for Pulse {
     }
 }
 
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
+struct Kick {
+    #[schemars(range(min = 1, max = 1000))]
+    ticks: u64,
+}
+
+impl ExcitationDesign for Kick {
+    fn describe(&self, _: &SharedSettings<'_>) -> String {
+        format!("a kick of {} ticks", self.ticks)
+    }
+
+    fn length(&self, _: &SharedSettings<'_>) -> Length {
+        Length {
+            ticks: self.ticks as f64,
+            key: "own_excitation.ticks",
+            value: self.ticks as f64,
+        }
+    }
+
+    fn build(&self, _: &SharedSettings<'_>) -> Box<dyn Excitation> {
+        Box::new(*self)
+    }
+}
+
+impl Excitation for Kick {
+    fn current_a(&self, _: u64) -> f64 {
+        1e-3
+    }
+
+    fn ticks(&self) -> u64 {
+        self.ticks
+    }
+}
+
 const CONFIGURATION: &str = "title = 'own'
 [plant]
 model = 'oscillator'
@@ -57,6 +94,11 @@ stiffness_n_per_m = 5e4
 [control.reference]
 kind = 'pulse'
 height_m = 1e-5
+[excitation]
+kind = 'own'
+[own_excitation]
+kind = 'kick'
+ticks = 100
 ";
 
 fn loaded(text: &str) -> Result<bench_config::Config, ConfigError> {
@@ -66,13 +108,14 @@ fn loaded(text: &str) -> Result<bench_config::Config, ConfigError> {
     let config = Some(file.display().to_string());
     load(&Source {
         config,
+        purpose: Purpose::Chirp,
         ..Source::default()
     })
 }
 
 /// One test, because the kinds are those of the whole process.
 #[test]
-fn own_plant_and_reference_are_loaded_checked_and_recorded() {
+fn own_plant_reference_and_excitation_are_loaded_checked_and_recorded() {
     let before = loaded(CONFIGURATION)
         .expect_err("unknown kinds")
         .to_string();
@@ -81,8 +124,15 @@ fn own_plant_and_reference_are_loaded_checked_and_recorded() {
         "{before}"
     );
 
+    assert!(
+        before.contains("`own_excitation` belongs to a kind that this program does not know"),
+        "{before}"
+    );
+
     bench_plant::register_plant::<Oscillator>("oscillator").expect("new");
     bench_excitation::register_reference::<Pulse>("pulse").expect("new");
+    bench_excitation::register_excitation::<Kick>("kick").expect("new");
+    assert!(bench_excitation::register_excitation::<Kick>("kick").is_err());
     assert!(bench_plant::register_plant::<Oscillator>("xy").is_err());
     assert!(bench_excitation::register_reference::<Pulse>("sine").is_err());
 
@@ -93,6 +143,7 @@ fn own_plant_and_reference_are_loaded_checked_and_recorded() {
         config.control.reference.design().describe(),
         "a pulse of 0.00001 m"
     );
+    assert_eq!(config.chosen_excitation().describe(), "a kick of 100 ticks");
     // w^2 = k/m, residue 1/m.
     let model = ModalModel::of(&build(&config.plant).expect("built")).expect("a mode");
     assert!((model.modes[0].omega_rad_s - (5e4_f64 / 2.0).sqrt()).abs() < 1e-9);
@@ -110,6 +161,18 @@ fn own_plant_and_reference_are_loaded_checked_and_recorded() {
     let misspelt = loaded(&CONFIGURATION.replace("height_m", "heigth_m"));
     let why = misspelt.expect_err("unknown key").to_string();
     assert!(why.contains("the nearest is `height_m`"), "{why}");
+
+    let long = loaded(&CONFIGURATION.replace("ticks = 100", "ticks = 1001"));
+    let why = long.expect_err("out of range").to_string();
+    assert!(why.contains("`own_excitation.ticks` is 1001"), "{why}");
+    let (without_table, _) = CONFIGURATION
+        .split_once("[own_excitation]")
+        .expect("a table");
+    let why = loaded(without_table).expect_err("no table").to_string();
+    assert!(
+        why.contains("`excitation.kind` needs the table [own_excitation]"),
+        "{why}"
+    );
 
     let schema = schema().to_string();
     assert!(schema.contains("\"oscillator\"") && schema.contains("\"pulse\""));

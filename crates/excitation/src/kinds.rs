@@ -1,4 +1,5 @@
-//! The kinds of excitation. A new one is one file, and one line in `excitations!`.
+//! The kinds of excitation. A new one is one file, and one line in `excitations!`; one of another crate is added by
+//! [`register_excitation`](super::register_excitation).
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -6,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::chirp::ChirpDesign;
 use super::design::ExcitationDesign;
 use super::multisine::MultisineSettings;
+use super::own::OwnExcitation;
 use super::prbs::PrbsSettings;
 use super::stepped_sine::SteppedSineSettings;
 
@@ -21,10 +23,12 @@ macro_rules! excitations {
             /// A sine of rising or falling frequency, `[chirp]`.
             Chirp,
             $($(#[$doc])* $kind,)*
+            /// An excitation of another crate; settings in `[own_excitation]`.
+            Own,
         }
 
         impl ExcitationKind {
-            /// All kinds.
+            /// All kinds of this crate.
             pub const ALL: &[ExcitationKind] = &[ExcitationKind::Chirp, $(ExcitationKind::$kind,)*];
 
             /// The name in configurations and file names.
@@ -32,6 +36,7 @@ macro_rules! excitations {
                 match self {
                     ExcitationKind::Chirp => "chirp",
                     $(ExcitationKind::$kind => stringify!($table),)*
+                    ExcitationKind::Own => "own",
                 }
             }
         }
@@ -40,14 +45,22 @@ macro_rules! excitations {
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
         pub struct ExcitationTables {
             $($(#[$doc])* $(#[$attribute])* pub $table: $settings,)*
+            /// An excitation of another crate, by its `kind`; needed for `excitation.kind = "own"`.
+            #[serde(default, skip_serializing_if = "Option::is_none")]
+            #[schemars(with = "OwnExcitation")]
+            pub own_excitation: Option<OwnExcitation>,
         }
 
         impl ExcitationTables {
-            /// The settings of a kind.
+            /// The settings of a kind. An own excitation without its table, which the check of a configuration refuses, is a chirp.
             pub fn design(&self, kind: ExcitationKind) -> &dyn ExcitationDesign {
                 match kind {
                     ExcitationKind::Chirp => &ChirpDesign,
                     $(ExcitationKind::$kind => &self.$table,)*
+                    ExcitationKind::Own => match &self.own_excitation {
+                        Some(own) => own.design(),
+                        None => &ChirpDesign,
+                    },
                 }
             }
         }

@@ -22,6 +22,7 @@ pub mod fourier;
 mod kinds;
 mod limits;
 mod multisine;
+mod own;
 mod periodic;
 mod prbs;
 mod reference;
@@ -44,6 +45,7 @@ pub use extremes::Extremes;
 pub use kinds::{ExcitationKind, ExcitationTables};
 pub use limits::Limits;
 pub use multisine::{Lines, MultisineSettings};
+pub use own::{OwnExcitation, register_excitation};
 pub use periodic::Periodic;
 pub use prbs::PrbsSettings;
 pub use reference::{

@@ -106,6 +106,9 @@ impl Keywords {
     }
 }
 
+/// The table of a kind that another program registers.
+const NO_KIND: &str = "belongs to a kind that this program does not know; use the program that registers the kind (docs/own-bench.md), or remove the table";
+
 struct Checker<'a> {
     root: &'a Json,
     renamed: RenamedKeys,
@@ -127,6 +130,9 @@ impl Checker<'_> {
 
     fn node(&mut self, schema: &Json, value: &Value, path: &str) {
         let keywords = Keywords::of(self.root, schema);
+        if keywords.0.contains_key("not") {
+            return self.add(path, NO_KIND.into());
+        }
         if let Some(variants) = keywords.list("oneOf") {
             return self.variant(variants, value, path);
         }

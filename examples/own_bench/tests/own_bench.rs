@@ -4,6 +4,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use bench_test_support::program::{Answer, Bench, NO_DAEMON};
+use serde_json::Value;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_own-bench");
 const CONFIGURATION: &str = include_str!("../bench.toml");
@@ -62,6 +63,36 @@ fn own_law_gives_the_loop_of_its_matrices() {
     assert!((0.2..0.6).contains(&settling_s), "{own}");
     let error_m = own["steady_state_mean_error_m"].as_f64().expect("a mean");
     assert!(error_m.abs() < 10e-9, "{own}");
+}
+
+/// The modes that the doublet of this crate finds are those of the model of the simulated stage.
+#[test]
+fn own_excitation_identifies_the_modes_of_the_model() {
+    let bench = own_bench();
+    bench.write("doublet.toml", include_str!("../doublet.toml"));
+    let model = bench.json("model modes");
+    let measured = bench.json("chirp --config doublet.toml");
+    assert_eq!(measured["outcome"], "completed");
+    let excitation = bench.run("chirp --config doublet.toml --plan").out;
+    assert!(excitation.starts_with("doublet of 0.5 A, pulses of 0.004 s"));
+    let modes = |report: &Value| report["modes"].as_array().expect("modes").clone();
+    // A mode of the model whose residue is zero at this operating point is not observable.
+    let is_observable = |mode: &Value| mode["residue"].as_f64().expect("a residue").abs() > 0.01;
+    let model: Vec<Value> = modes(&model).into_iter().filter(is_observable).collect();
+    assert_eq!(model.len(), 3);
+    for (mode, found) in model.iter().zip(&modes(&measured)) {
+        for key in ["frequency_hz", "damping_ratio", "residue"] {
+            let truth = mode[key].as_f64().expect(key);
+            let value = found[key].as_f64().expect(key);
+            let sigma = found[format!("{key}_sigma")].as_f64().expect("a sigma");
+            // Nine comparisons: one beyond 4 sigmas in 1,700 seeds.
+            assert!(
+                (value - truth).abs() < 4.0 * sigma,
+                "{key}: {value} {truth} {sigma}"
+            );
+        }
+    }
+    assert_eq!(measured["cnmp"], "detected");
 }
 
 #[test]
