@@ -47,6 +47,9 @@ impl SeedOption {
     }
 
     /// Refuses the option for a run on devices, where it has no effect.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn refuse_on_devices(&self) -> Result<(), ExperimentError> {
         match self.seed {
             None => Ok(()),
@@ -78,6 +81,9 @@ impl BenchOptions {
     }
 
     /// The effective configuration; `more` are those of the command's own options.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn load(
         &self,
         purpose: Purpose,

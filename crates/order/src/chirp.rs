@@ -79,6 +79,9 @@ impl ChirpOrder {
     }
 
     /// The configuration with the requested amplitude over frequency.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn config(&self) -> Result<Config, ExperimentError> {
         let config = self.bench.load(Purpose::Chirp, &self.settings())?;
         self.refuse_unused(&config)?;
@@ -121,6 +124,9 @@ fn word(value: impl ValueEnum) -> String {
 
 impl SequentialOptions {
     /// The limit of the motion in seconds; `None` for a single chirp.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn max_motion_s(&self, config: &Config) -> Result<Option<f64>, ExperimentError> {
         if !self.until_decided {
             return Ok(None);

@@ -56,6 +56,9 @@ impl ExcitationOptions {
     }
 
     /// The configuration with the requested amplitude over frequency.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn shaped(&self, config: Config) -> Result<Config, ExperimentError> {
         let shaped = match (&self.shape, &self.amplitude) {
             (Some(source), _) => shape_amplitude(config, source),

@@ -124,6 +124,9 @@ impl ExternalOptions {
     }
 
     /// The columns to read.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn columns(&self, path: &Path) -> Result<Columns, ColumnsError> {
         let (Some(input), Some(output)) = (self.input.clone(), self.output.clone()) else {
             let (file, names) = (path.display(), names(path)?);
@@ -169,6 +172,9 @@ impl ExternalOptions {
     }
 
     /// How the signals are analysed.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn identification(&self, signals: &Signals) -> Result<Identification, ExperimentError> {
         let mut identification = Identification::new(signals.rate_hz);
         if let Some((low_hz, high_hz)) = self.band_hz()? {

@@ -24,7 +24,7 @@ const MAX_AMPLITUDES: usize = 10;
 const SCALES: RangeInclusive<f64> = 1e-6..=1e6;
 
 /// The bench, and the amplitudes.
-#[derive(Clone, Debug, Default, PartialEq, clap::Args, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, clap::Args, Serialize, JsonSchema)]
 pub struct LinearityOrder {
     /// The bench.
     #[command(flatten)]
@@ -55,6 +55,9 @@ pub struct LinearityOrder {
 
 impl LinearityOrder {
     /// The ratios, rising.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn amplitude_ratios(&self) -> Result<Vec<f64>, ExperimentError> {
         let mut scales: Vec<f64> = self.scales.iter().map(Ratio::si).collect();
         scales.sort_by(f64::total_cmp);
@@ -68,6 +71,9 @@ impl LinearityOrder {
     }
 
     /// The settings with the planned amplitude.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn planned(&self) -> Result<Config, ExperimentError> {
         let lines = LINES.map(|(key, value)| OptionSetting::new(key, value, "bench linearity"));
         let mut settings = [&lines[..], &self.band.settings()].concat();

@@ -52,6 +52,9 @@ impl RigOptions {
     }
 
     /// The requested pace, or that of the rig. Devices run in real time only.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn loop_pace(&self, config: &Config) -> Result<Pace, ExperimentError> {
         match (self.pace, self.is_simulated(config)) {
             (Some(Pace::Virtual), false) => Err(ExperimentError::Refused(
@@ -64,6 +67,9 @@ impl RigOptions {
     }
 
     /// How the heat of the motor is treated. With `--motor-cold` this statement is stored first.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn motor_handling(&self, config: &Config) -> Result<MotorHandling, ExperimentError> {
         if self.is_simulated(config) {
             self.refuse_motor_options()?;
@@ -94,6 +100,9 @@ impl RigOptions {
     }
 
     /// The motor of the configured devices before the run `plan`; `None` for a simulated motor.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn motor_summary(&self, plan: &Plan) -> Result<Option<MotorSummary>, ExperimentError> {
         match self.motor_handling(&plan.config)? {
             MotorHandling::Simulated => Ok(None),

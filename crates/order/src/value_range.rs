@@ -43,11 +43,17 @@ impl<T> JsonSchema for ValueRange<T> {
 }
 
 /// A range of operating points, each with its unit. For clap.
+///
+/// # Errors
+/// When the text is no such range.
 pub fn operating_points(text: &str) -> Result<ValueRange<OperatingPoint>, String> {
     ValueRange::parse(text, "0%:8%:15 or 0mm:3.8mm:15", OperatingPoint::with_unit)
 }
 
 /// A range of mass asymmetries. For clap.
+///
+/// # Errors
+/// When the text is no such range.
 pub fn asymmetries(text: &str) -> Result<ValueRange<Ratio>, String> {
     ValueRange::parse(text, "-10%:10%:41", str::parse)
 }
@@ -72,6 +78,9 @@ impl<T> ValueRange<T> {
 
 impl ValueRange<OperatingPoint> {
     /// The values of `--operating-points` as ratios of the beam length.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn ratios(&self, beam_length_m: f64) -> Result<Vec<f64>, ExperimentError> {
         let ratio = |point: &OperatingPoint| {
             let ratio = point.ratio(beam_length_m);
@@ -83,6 +92,9 @@ impl ValueRange<OperatingPoint> {
 
 impl ValueRange<Ratio> {
     /// The values of `--asymmetries`.
+    ///
+    /// # Errors
+    /// When an option or a setting is refused.
     pub fn ratios(&self) -> Result<Vec<f64>, ExperimentError> {
         self.spaced("--asymmetries", self.from.si(), self.to.si())
     }
