@@ -130,7 +130,7 @@ pub(super) fn text(outputs: &AnalysisOutputs) -> String {
         linearity.unwrap_or_default(),
         certificate_text(outputs.certificate.as_deref()),
         pages_text(&outputs.pages),
-        modal_output::text(&outputs.summary),
+        modal_output::text(&outputs.summary, "1/kg"),
         outputs.signs.as_ref().map_or(String::new(), signs_text),
     ]
     .concat()

@@ -1,13 +1,11 @@
 //! The result of `bench compare` as text.
 
-use super::table::{labelled, table, wrap};
-use bench_base::decimal::Decimal;
+use super::table::{labelled, result_table, wrap};
 use bench_experiment::run_comparison::{
-    Comparison, Difference, FigureDifference, ModeDifferences, RunDifferences, RunHead,
+    Comparison, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
-use bench_identify::Estimate;
 use bench_identify::verdict::Cnmp;
-use bench_report::number::interval;
+use bench_report::figures::{difference_table, figure_table, frequencies};
 
 /// Tables of the differences, and what they mean.
 pub(super) fn text(comparison: &Comparison, page: Option<&str>) -> String {
@@ -81,77 +79,24 @@ fn settings_text(other: &RunDifferences) -> String {
 }
 
 fn modes_text(modes: &ModeDifferences) -> String {
-    let of_modes = modes.modes.iter().flat_map(|mode| {
-        let name = format!("mode {:.2} Hz", mode.frequency_hz.reference.value);
-        [
-            difference_row(&format!("{name}: Hz"), &mode.frequency_hz, 1.0),
-            difference_row("damping ratio", &mode.damping_ratio, 1.0),
-            difference_row("residue 1/kg", &mode.residue_per_kg, 1.0),
-        ]
-    });
-    let compliance = modes.static_compliance_m_per_n.iter();
-    let compliance = compliance.map(|found| difference_row("compliance um/N", found, 1e6));
-    let rows: Vec<Vec<String>> = of_modes.chain(compliance).collect();
-    let table = if rows.is_empty() {
+    let differences = difference_table(modes).without("If equal");
+    let differences = if differences.is_empty() {
         String::new()
     } else {
-        format!(
-            "\n{}",
-            table(&["", "reference", "difference", "%", ""], &rows)
-        )
+        format!("\n{}", result_table(&differences))
     };
-    table
+    differences
         + &unpaired("only in the reference", &modes.only_in_reference_hz)
         + &unpaired("only in this run", &modes.only_in_other_hz)
 }
 
-fn difference_row(name: &str, found: &Difference, factor: f64) -> Vec<String> {
-    let shown = |estimate: Estimate| {
-        let scaled = estimate.scaled(factor);
-        interval(scaled.value, scaled.half_width_95())
-    };
-    let percent = found
-        .percent()
-        .map(|percent| format!("{:+.3}", Decimal(percent)));
-    vec![
-        name.into(),
-        shown(found.reference),
-        shown(found.difference),
-        percent.unwrap_or_default(),
-        if found.significant { "*" } else { "" }.into(),
-    ]
-}
-
 fn unpaired(text: &str, frequencies_hz: &[f64]) -> String {
-    let shown: Vec<String> = frequencies_hz.iter().map(|hz| format!("{hz:.2}")).collect();
-    if shown.is_empty() {
-        String::new()
-    } else {
-        wrap(&format!("{text}: modes at {} Hz", shown.join(", ")), 2)
-    }
+    let shown = frequencies(frequencies_hz);
+    shown.map_or(String::new(), |shown| {
+        wrap(&format!("{text}: modes at {shown} Hz"), 2)
+    })
 }
 
 fn figures_text(figures: &[FigureDifference]) -> String {
-    let rows: Vec<Vec<String>> = figures.iter().map(figure_row).collect();
-    format!(
-        "\n{}",
-        table(&["", "reference", "this run", "difference"], &rows)
-    )
-}
-
-fn figure_row(found: &FigureDifference) -> Vec<String> {
-    let (name, factor) = found.figure.name_and_factor();
-    let shown = |value: Option<f64>| match value {
-        Some(value) => {
-            let digits = found.figure.decimals();
-            format!("{:.digits$}", Decimal(value * factor))
-        }
-        None => "none".into(),
-    };
-    vec![
-        name.into(),
-        shown(found.reference),
-        shown(found.other),
-        shown(found.difference),
-    ]
+    format!("\n{}", result_table(&figure_table(figures)))
 }

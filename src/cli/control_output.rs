@@ -11,7 +11,7 @@ use super::error::CliError;
 use super::margins::text as margins_text;
 use super::output::warn;
 use super::run_options::run_text;
-use super::table::{labelled, table};
+use super::table::{figure_sentence, labelled, table};
 use bench_base::decimal::Decimal;
 use bench_config::Config;
 use bench_control::{Margins, Pole, StepMetrics};
@@ -20,11 +20,11 @@ use bench_experiment::evidence::{Agreement, Condition, Evidence};
 use bench_experiment::outputs::{AnalysisOutputs, ControlFiles, ExistingFile, ResultFiles};
 use bench_experiment::stage_check::RestAfterCheck;
 use bench_experiment::{
-    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, SineResponse, TrackingMetrics,
+    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
 };
-use bench_identify::SIGMAS_95;
 use bench_recording::Recording;
+use bench_report::figures::{self, Figure};
 use bench_report::run_pages::{ControlReport, write_control_page};
 
 /// The JSON object of the command.
@@ -68,6 +68,8 @@ pub(super) struct ControlResult {
     /// Largest values and heat, also of a run that tripped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub whole_run: Option<RunFigures>,
+    /// Tracking and largest values as shown.
+    pub figures: Vec<Figure>,
     /// Plots and page; `None` with `--no-report`.
     #[serde(flatten)]
     pub files: Option<ControlFiles>,
@@ -90,8 +92,12 @@ pub(super) fn result(
     let result = abandon_on_signal(work).map_err(|error| CliError::Failed(error.to_string()))?;
     let result = result.unwrap_or_else(|| Ok(ControlResult::default()));
     let result = result.map_err(|error| analysis_failed(&error, path))?;
+    let measured = result.measured.filter(|_| is_completed);
+    let tracking = measured.iter().flat_map(figures::tracking_figures);
+    let whole_run = result.whole_run.iter().flat_map(figures::whole_run);
     Ok(ControlResult {
-        measured: result.measured.filter(|_| is_completed),
+        figures: tracking.chain(whole_run).collect(),
+        measured,
         ..result
     })
 }
@@ -103,7 +109,7 @@ fn figures_only(path: &Path) -> Result<ControlResult, CliError> {
     Ok(ControlResult {
         measured: tracking_metrics(&recording, &config.control, &config.servo)?,
         whole_run: Some(run_figures(&recording, config, plan.motor.thermal_a2)?),
-        files: None,
+        ..ControlResult::default()
     })
 }
 
@@ -124,6 +130,7 @@ fn analysed(path: &Path) -> Result<ControlResult, CliError> {
         measured: run.tracking,
         whole_run: Some(run.figures),
         files: written(&report, results),
+        ..ControlResult::default()
     })
 }
 
@@ -154,10 +161,16 @@ impl fmt::Display for PlanText<'_> {
             f.write_str(&labelled("command", text.trim_start_matches("; ")))?;
         }
         if let Some(step) = &self.predicted.step {
-            f.write_str(&labelled("predicted", &step_text(step)))?;
+            f.write_str(&labelled(
+                "predicted",
+                &figure_sentence(&figures::step(step)),
+            ))?;
         }
         if let Some(sine) = &self.predicted.sine {
-            f.write_str(&labelled("predicted", &predicted_sine_text(sine)))?;
+            f.write_str(&labelled(
+                "predicted",
+                &figure_sentence(&figures::predicted_sine(sine)),
+            ))?;
         }
         if let Some(extremes) = &self.plan.predicted_extremes {
             f.write_str(&travel_text(extremes))?;
@@ -281,19 +294,6 @@ fn shaper_text(command: &CommandSummary) -> String {
     }
 }
 
-fn step_text(step: &StepMetrics) -> String {
-    let settling = step
-        .settling_time_s
-        .map_or("none".into(), |s| format!("{:.1} ms", s * 1e3));
-    let overshoot = Decimal(step.overshoot_percent);
-    format!("settling to 2 % in {settling}, overshoot {overshoot:.1} %")
-}
-
-fn predicted_sine_text(sine: &PredictedSine) -> String {
-    let phase_deg = Decimal(sine.phase_deg);
-    format!("gain {:.4}, phase {phase_deg:.2} deg", sine.gain)
-}
-
 /// The result of the run.
 pub(super) fn text(report: &Report, config: &Config) -> String {
     let run = run_text(&report.run, config);
@@ -330,52 +330,12 @@ fn measured_text(measured: Option<&TrackingMetrics>) -> String {
             "no result: the run ended before the steady state",
         );
     };
-    let parts = match &measured.sine {
-        Some(sine) => vec![sine_text(sine), residual_text(sine, measured)],
-        None => {
-            let step = measured.step.as_ref().map(step_text);
-            step.into_iter().chain([steady_text(measured)]).collect()
-        }
-    };
-    labelled("measured", &parts.join("; "))
-}
-
-fn steady_text(measured: &TrackingMetrics) -> String {
-    format!(
-        "steady state: mean error {:+.4} um, sigma {:.4} um",
-        Decimal(measured.steady_state_mean_error_m * 1e6),
-        measured.steady_state_sigma_m * 1e6
+    labelled(
+        "measured",
+        &figure_sentence(&figures::tracking_figures(measured)),
     )
 }
 
-fn sine_text(sine: &SineResponse) -> String {
-    let half_width = |sigma: Option<f64>, digits: usize| {
-        sigma.map_or(String::new(), |sigma| {
-            format!(" +- {:.digits$}", SIGMAS_95 * sigma)
-        })
-    };
-    format!(
-        "gain {:.4}{}, phase {:.2}{} deg",
-        sine.gain,
-        half_width(sine.gain_sigma, 4),
-        Decimal(sine.phase_deg),
-        half_width(sine.phase_sigma_deg, 2),
-    )
-}
-
-/// What the sine leaves, and the error that follows from its gain and phase.
-fn residual_text(sine: &SineResponse, measured: &TrackingMetrics) -> String {
-    let (residual_um, error_um) = (sine.residual_rms_m * 1e6, measured.steady_state_rms_m * 1e6);
-    format!("beside the sine {residual_um:.4} um rms; error with it {error_um:.4} um rms")
-}
-
-fn figures_text(figures: &RunFigures) -> String {
-    let heat_percent = 100.0 * (figures.thermal_peak_a / figures.thermal_limit_a).powi(2);
-    let text = format!(
-        "error at most {:.2} um; current at most {:.3} A, rms {:.3} A; heat of the motor at most {heat_percent:.1} % of its limit",
-        figures.peak_error_m * 1e6,
-        figures.peak_current_a,
-        figures.rms_current_a,
-    );
-    labelled("whole run", &text)
+fn figures_text(run: &RunFigures) -> String {
+    labelled("whole run", &figure_sentence(&figures::whole_run(run)))
 }

@@ -141,7 +141,7 @@ impl Report {
             self.record_text(),
             response_text(&self.frf_csv, self.frequencies, coherence),
             pages_text(&self.pages),
-            modal_output::text(&self.summary)
+            modal_output::text(&self.summary, "output/input/s^2")
         )
     }
 

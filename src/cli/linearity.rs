@@ -14,7 +14,7 @@ use super::linearity_output;
 use super::output::{print_result, print_text};
 use super::progress::ProgressLine;
 use super::run_options::{RunCommand, RunOptions, run_text};
-use super::table::{labelled, table, wrap};
+use super::table::{labelled, table, terminal, wrap};
 use bench_base::progress::Progress;
 use bench_config::Config;
 use bench_excitation::Extremes;
@@ -23,10 +23,10 @@ use bench_experiment::linearity::{
 };
 use bench_experiment::outputs::{AnalysisOutputs, ExistingFile, ResultFiles};
 use bench_experiment::{Run, RunSummary, Runner};
-use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
+use bench_identify::modal::{Estimate, FittedMode};
 use bench_order::{LinearityOrder, Order};
 use bench_report::MagnitudeAxis;
-use bench_report::number::interval;
+use bench_report::figures::interval_of;
 use bench_report::run_pages::AmplitudeFiles;
 
 /// The order, and where its recordings go.
@@ -260,6 +260,6 @@ fn mode_row(scale: f64, mode: &ModeOverAmplitude, fitted: Option<&FittedMode>) -
 }
 
 fn cell(estimate: Estimate, shifts: bool) -> String {
-    let text = interval(estimate.value, SIGMAS_95 * estimate.sigma);
+    let text = terminal(&interval_of(estimate));
     if shifts { text + " *" } else { text }
 }

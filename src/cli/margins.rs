@@ -10,15 +10,14 @@ use super::exit::Exit;
 use super::figure_options::PictureOptions;
 use super::measured_margins::{self, Measured};
 use super::output::{no_json, print_result, warn};
-use super::table::{table, wrap};
+use super::table::{figure_lines, table, wrap};
 use bench_base::decimal::Decimal;
 use bench_config::{Config, ProbeSettings, Purpose};
 use bench_control::{ClosedLoop, Margins, Pole, listed_poles};
 use bench_experiment::{LoopModel, Stage, check_calibration, closed_loop};
 use bench_order::{BenchOptions, ControllerChoice, GLOSSARY};
-use bench_report::{
-    LoopPlot, Picture, ReportError, joined, loop_svg, margin_rows, plant_conditions,
-};
+use bench_report::figures::{self, Figure};
+use bench_report::{LoopPlot, Picture, ReportError, joined, loop_svg, plant_conditions};
 
 /// The bench and the controller.
 #[derive(Clone, Debug, clap::Args)]
@@ -52,6 +51,8 @@ struct Report {
     poles: Vec<Pole>,
     /// Mean delay from a command to the position that its reading shows, without hold and amplifier lag.
     delay_s: f64,
+    /// The margins as shown; empty for an unstable loop.
+    figures: Vec<Figure>,
     /// The margins with the measured plant.
     #[serde(skip_serializing_if = "Option::is_none")]
     measured: Option<Measured>,
@@ -80,6 +81,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
         .map_or(margins.stable, Measured::is_stable);
     let report = Report {
         margins: margins_json(&margins)?,
+        figures: model_figures(&margins),
         poles: listed_poles(&poles, config.servo.rate_hz),
         delay_s: if args.continuous {
             0.0
@@ -117,6 +119,14 @@ fn drawn(
         caption: "L = P C by the model with its margins, as Bode plot and in the complex plane with -1; S from reference to error and T from reference to displacement.".into(),
         title,
     })
+}
+
+fn model_figures(model: &Margins) -> Vec<Figure> {
+    if model.stable {
+        figures::margins(model)
+    } else {
+        Vec::new()
+    }
 }
 
 /// The margins with their names; `null` where the loop is unstable.
@@ -180,7 +190,7 @@ pub(super) fn text(config: &Config, margins: &Margins, poles: &[Pole]) -> String
     let time = time_text(config, margins);
     let title = format!("{} controller, {time}", config.control.controller);
     let rest = if margins.stable {
-        margin_lines(margins)
+        format!("  stable\n{}", figure_lines(&figures::margins(margins)))
     } else {
         unstable_text(poles)
     };
@@ -205,16 +215,4 @@ fn unstable_text(poles: &[Pole]) -> String {
     let header = ["unstable pole rad/s", "Hz", "damping"];
     let text = "UNSTABLE: the closed loop has poles in the right half plane, and so no margins";
     wrap(text, 2) + &table(&header, &rows)
-}
-
-fn margin_lines(margins: &Margins) -> String {
-    let rows = margin_rows(margins).into_iter();
-    // The terminal has the ordinary minus sign.
-    let lines = rows.map(|(name, value)| margin_line(name, value).replace('\u{2212}', "-"));
-    format!("  stable\n{}", lines.collect::<String>())
-}
-
-fn margin_line(name: &str, value: Option<String>) -> String {
-    let value = value.unwrap_or("none".into());
-    format!("  {name:<23}{value}\n")
 }

@@ -7,19 +7,15 @@ use serde::Serialize;
 use super::analysis_output::in_folder;
 use super::error::CliError;
 use super::output::warn;
-use super::table::wrap;
-use bench_base::units::{UM_PER_M, hz};
+use super::table::{figure_lines, wrap};
+use bench_base::units::hz;
 use bench_config::Config;
 use bench_control::ClosedLoop;
-use bench_control::measured::{
-    LoopPeaks, MeasuredMargins, NyquistCount, OutsideBand, RangeBound, Stability,
-};
+use bench_control::measured::{NyquistCount, OutsideBand, RangeBound, Stability};
 use bench_experiment::outputs::{ExistingFile, ResultFiles};
-use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins, measured_margins};
-use bench_identify::Estimate;
-use bench_report::number::interval;
+use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins};
+use bench_report::figures::{Figure, loop_peaks, measured_margins};
 use bench_report::run_pages::{MeasuredLoopFiles, MeasuredLoopReport};
-use bench_report::{crossing_count, place};
 
 /// The margins with a measured plant, and the files of the loop.
 #[derive(Debug, Serialize)]
@@ -30,6 +26,8 @@ pub(super) struct Measured {
     frequencies: usize,
     #[serde(flatten)]
     result: MeasuredLoopMargins,
+    /// Margins and peaks as shown.
+    figures: Vec<Figure>,
     /// The files with --out.
     #[serde(skip_serializing_if = "Option::is_none")]
     files: Option<MeasuredLoopFiles>,
@@ -52,14 +50,21 @@ pub(super) fn measured(
     let measured = MeasuredFrf::read(path)?;
     warn(&measured.cautions);
     warn(&measured.differences(config));
-    let result = measured_margins(&measured, closed_loop, config)?;
+    let result = bench_experiment::measured_margins(&measured, closed_loop, config)?;
     let files = out.map(|folder| write(folder, path, &measured, &result, closed_loop, config));
     Ok(Measured {
         frf: path.display().to_string(),
         frequencies: measured.frf.len(),
+        figures: figures(&result),
         result,
         files: files.transpose()?,
     })
+}
+
+fn figures(result: &MeasuredLoopMargins) -> Vec<Figure> {
+    let margins = result.margins.as_ref().map(measured_margins);
+    let peaks = result.peaks.as_ref().map(loop_peaks);
+    margins.into_iter().chain(peaks).flatten().collect()
 }
 
 fn write(
@@ -101,8 +106,7 @@ pub(super) fn text(measured: &Measured) -> String {
     [
         wrap(&title, 0),
         wrap(&stability_text(&result.count), 2),
-        result.margins.as_ref().map_or(String::new(), margin_lines),
-        result.peaks.as_ref().map_or(String::new(), peak_lines),
+        figure_lines(&measured.figures),
         outside_text(&result.outside_band),
         measured.files.as_ref().map_or(String::new(), files_text),
     ]
@@ -120,105 +124,6 @@ fn stability_text(count: &NyquistCount) -> String {
             "UNDECIDED: the measured curve passes -1 at a distance of {sigmas:.1} standard deviations, too close to decide about stability; measure longer, or choose a controller with more margin"
         ),
     }
-}
-
-fn margin_lines(margins: &MeasuredMargins) -> String {
-    let peak = format!(
-        "{} dB at {:.3} Hz",
-        number(margins.sensitivity_peak_db, 1.0),
-        hz(margins.sensitivity_peak_rad_s)
-    );
-    [
-        line("crossover", margins.crossover_rad_s.map(frequency)),
-        line("phase margin", phase_margin_text(margins)),
-        line(
-            "gain margin",
-            at(margins.gain_margin_db, margins.gain_margin_rad_s, 1.0, "dB"),
-        ),
-        gain_margin_lines(margins),
-        line(
-            "delay margin",
-            at(
-                margins.delay_margin_s,
-                margins.delay_margin_rad_s,
-                1e3,
-                "ms",
-            ),
-        ),
-        line("modulus margin", Some(number(margins.modulus_margin, 1.0))),
-        line("peak of S", Some(peak)),
-        line(
-            "sensitivity bandwidth",
-            margins.sensitivity_bandwidth_rad_s.map(frequency),
-        ),
-    ]
-    .concat()
-}
-
-/// A margin and its frequency.
-fn at(margin: Option<Estimate>, rad_s: Option<f64>, factor: f64, unit: &str) -> Option<String> {
-    let (margin, rad_s) = margin.zip(rad_s)?;
-    Some(format!(
-        "{} {unit} {}",
-        number(margin, factor),
-        place(rad_s)
-    ))
-}
-
-fn phase_margin_text(margins: &MeasuredMargins) -> Option<String> {
-    let text = at(
-        margins.phase_margin_deg,
-        margins.phase_margin_rad_s,
-        1.0,
-        "deg",
-    )?;
-    Some(text + &crossing_count(margins.crossings.len()))
-}
-
-/// Both gain margins, if the loop gain may not fall without limit.
-fn gain_margin_lines(margins: &MeasuredMargins) -> String {
-    if margins.lower_gain_margin_db.is_none() {
-        return String::new();
-    }
-    let (upper_db, upper_rad_s) = (
-        margins.upper_gain_margin_db,
-        margins.upper_gain_margin_rad_s,
-    );
-    let (lower_db, lower_rad_s) = (
-        margins.lower_gain_margin_db,
-        margins.lower_gain_margin_rad_s,
-    );
-    line("upper gain margin", at(upper_db, upper_rad_s, 1.0, "dB"))
-        + &line("lower gain margin", at(lower_db, lower_rad_s, 1.0, "dB"))
-}
-
-fn peak_lines(peaks: &LoopPeaks) -> String {
-    let control = Some(peaks.control_peak_a_per_m).map(unit(1.0 / UM_PER_M, "A/um"));
-    let disturbance = Some(peaks.disturbance_peak_m_per_a).map(unit(UM_PER_M, "um/A"));
-    [
-        line("peak of T", Some(number(peaks.complementary_peak, 1.0))),
-        line("peak of C S", control),
-        line("peak of P S", disturbance),
-    ]
-    .concat()
-}
-
-fn line(name: &str, value: Option<String>) -> String {
-    let value = value.unwrap_or("none in the band".into());
-    format!("  {name:<23}{value}\n")
-}
-
-fn number(estimate: Estimate, factor: f64) -> String {
-    let scaled = estimate.scaled(factor);
-    interval(scaled.value, scaled.half_width_95())
-}
-
-fn unit(factor: f64, unit: &'static str) -> impl Fn(Estimate) -> String {
-    move |estimate| format!("{} {unit}", number(estimate, factor))
-}
-
-fn frequency(rad_s: Estimate) -> String {
-    format!("{} rad/s ({:.3} Hz)", number(rad_s, 1.0), hz(rad_s.value))
 }
 
 fn outside_text(outside: &OutsideBand) -> String {

@@ -1,11 +1,16 @@
 //! Text for a terminal: tables, wrapped sentences, labelled lines, at most 80 columns wide.
 
+use bench_report::figures::Figure;
+use bench_report::table::Table;
+
 /// Largest width of a line, in columns.
 const WIDTH: usize = 80;
 /// The gap between two columns of a table.
 const GAP: &str = "  ";
 /// Width of the label of a labelled line.
 const LABEL: usize = 13;
+/// Width of the name of a figure.
+const NAME: usize = 23;
 
 /// Rows of cells, right-aligned below a header. A table wider than 80 columns is split into several ones below each
 /// other, each with the first column of the whole.
@@ -21,6 +26,61 @@ pub(super) fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         .map(|columns| part(&lines, &widths, columns))
         .collect();
     parts.join("\n")
+}
+
+/// A table of a result.
+pub(super) fn result_table(result: &Table) -> String {
+    let columns: Vec<String> = result.columns.iter().map(|name| terminal(name)).collect();
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let rows = result.rows.iter();
+    let rows: Vec<Vec<String>> = rows
+        .map(|row| row.iter().map(|cell| terminal(cell)).collect())
+        .collect();
+    table(&columns, &rows)
+}
+
+/// Figures as lines `  Phase margin           31.50 deg at 46.00 Hz`.
+pub(super) fn figure_lines(figures: &[Figure]) -> String {
+    let lines = figures.iter().map(|figure| {
+        let text = terminal(&figure.text());
+        format!("  {:<NAME$}{text}\n", figure.name)
+    });
+    lines.collect()
+}
+
+/// Figures as one sentence: `overshoot 3.1 %, RMS of the error 0.0021 um`.
+pub(super) fn figure_sentence(figures: &[Figure]) -> String {
+    let texts: Vec<String> = figures
+        .iter()
+        .map(|figure| {
+            format!(
+                "{} {}",
+                uncapitalised(&figure.name),
+                terminal(&figure.text())
+            )
+        })
+        .collect();
+    texts.join(", ")
+}
+
+/// Text of a page for a terminal, which may lack the typographic minus sign and the Greek letter.
+pub(super) fn terminal(text: &str) -> String {
+    text.replace('\u{2212}', "-")
+        .replace('–', "-")
+        .replace('µ', "u")
+}
+
+/// `Overshoot` as `overshoot`; an abbreviation such as `RMS` stays.
+fn uncapitalised(name: &str) -> String {
+    let mut letters = name.chars();
+    let first = letters.next();
+    let rest = letters.as_str();
+    match first {
+        Some(first) if !rest.starts_with(char::is_uppercase) => {
+            first.to_lowercase().chain(rest.chars()).collect()
+        }
+        _ => name.into(),
+    }
 }
 
 fn width(lines: &[&Vec<String>], column: usize) -> usize {
@@ -95,6 +155,22 @@ mod tests {
             .map(|line| line.chars().count())
             .max()
             .unwrap_or(0)
+    }
+
+    #[test]
+    fn figures_have_the_signs_of_a_terminal() {
+        let figures = [
+            Figure::new("RMS of the error", -0.25, "µm", 2),
+            Figure::new("Gain margin", None::<f64>, "dB", 2),
+        ];
+        assert_eq!(
+            figure_lines(&figures),
+            "  RMS of the error       -0.25 um\n  Gain margin            none\n"
+        );
+        assert_eq!(
+            figure_sentence(&figures),
+            "RMS of the error -0.25 um, gain margin none"
+        );
     }
 
     #[test]

@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use super::error::CliError;
 use super::output::warn;
-use super::table::{table, wrap};
+use super::table::{result_table, wrap};
 use bench_base::progress::Progress;
 use bench_base::units::UM_PER_M;
 use bench_config::Config;
 use bench_control::measured::Stability;
 use bench_control::tuning::{Goal, MeasuredPlant};
 use bench_experiment::campaign::recorded_points;
-use bench_experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf, ModeRole};
+use bench_experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf};
 use bench_identify::verdict::Cnmp;
 use bench_order::BenchOptions;
+use bench_report::figures::frf_table;
 
 /// Where the plants come from.
 #[derive(Clone, Debug, clap::Args)]
@@ -138,42 +139,20 @@ pub(super) fn text(frfs: &[FrfEvidence], remarks: &[String]) -> String {
     if frfs.is_empty() {
         return String::new();
     }
-    let header = [
-        "plant", "lower", "at Hz", "margin", "from Hz", "to Hz", "CNMP", "signs",
-    ];
-    let rows: Vec<Vec<String>> = frfs.iter().map(frf_row).collect();
-    let legend = "lower: smallest |1 + L| - 2.448 sigma |C| over the measured frequencies; at each of them the true distance is larger with 95 %. margin: modulus margin of the measured response. signs: of the modes that are used with their signs";
+    let legend = "lower margin: smallest |1 + L| - 2.448 sigma |C| over the measured frequencies; at each of them the true distance is larger with 95 %. modulus margin: of the measured response, ± 95 % confidence interval";
     let files = frfs.iter().map(|frf| {
         let line = format!("{}: {}, SHA-256 {}", frf.plant, frf.file, &frf.sha256);
         wrap(&line, 2)
     });
     let remarks = remarks.iter().map(|remark| wrap(remark, 0));
     [
-        table(&header, &rows),
+        result_table(&frf_table(frfs)),
         wrap(legend, 0),
         files.collect(),
         wrap(&outside_text(frfs), 0),
         remarks.collect(),
     ]
     .concat()
-}
-
-fn frf_row(frf: &FrfEvidence) -> Vec<String> {
-    let signed = frf
-        .modes
-        .iter()
-        .filter(|used| used.role == ModeRole::Signed);
-    let margin = frf.modulus_margin;
-    vec![
-        frf.plant.clone(),
-        format!("{:.4}", frf.modulus_margin_lower),
-        format!("{:.2}", frf.modulus_margin_lower_at_hz),
-        margin.map_or("-".into(), |margin| format!("{:.4}", margin.value)),
-        format!("{:.2}", frf.band_hz[0]),
-        format!("{:.1}", frf.band_hz[1]),
-        frf.cnmp.name().to_string(),
-        signed.map(|used| used.mode.sign()).collect(),
-    ]
 }
 
 /// What lies outside of the bands, the least favourable of all.

@@ -2,23 +2,21 @@
 
 use std::path::Path;
 
-use super::table::{table, wrap};
+use super::table::{result_table, wrap};
 use super::tune_measured;
-use bench_control::tuning::Binding;
 use bench_experiment::tuning::{DesignCertificate, OppositeAsymmetry};
-use bench_report::{BINDING_COLUMNS, PLANT_COLUMNS, binding_cells, plant_cells};
+use bench_report::figures::{binding_table, plant_table};
 
 /// The design as text.
 pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path) -> String {
     let title = certificate.title();
-    let rows: Vec<Vec<String>> = certificate.plants.iter().map(plant_cells).collect();
     let legend = "margin: modulus margin; slope, bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; rms: error and current under the disturbance and noise of the configuration; gain margin, phase: gain margin and phase margin";
     let folder = folder.display();
     let files = format!(
         "files: {folder}/controller.toml, certificate.json, report.html, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"
     );
     let binding = if explain {
-        binding_text(&certificate.binding)
+        result_table(&binding_table(&certificate.binding))
     } else {
         String::new()
     };
@@ -32,7 +30,7 @@ pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path
     let opposite = opposite.map_or(String::new(), opposite_text);
     let parts = [
         wrap(&title, 0),
-        table(&PLANT_COLUMNS, &rows),
+        result_table(&plant_table(&certificate.plants)),
         wrap(legend, 0),
         measured,
         bound,
@@ -59,9 +57,4 @@ fn opposite_text(opposite: &OppositeAsymmetry) -> String {
         states.join("; ")
     );
     wrap(&text, 0)
-}
-
-fn binding_text(binding: &[Binding]) -> String {
-    let rows: Vec<Vec<String>> = binding.iter().map(binding_cells).collect();
-    table(&BINDING_COLUMNS, &rows)
 }

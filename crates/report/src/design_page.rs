@@ -1,10 +1,9 @@
 //! The page of a designed controller: goal, figures of every plant, what limits the design, plots.
 
-use super::html::{document_with_plots, escaped, facts, note, picture, row, section, table};
-use super::number::interval;
+use super::figures::{binding_table, frf_table, plant_table};
+use super::html::{document_with_plots, escaped, facts, note, picture, section};
 use bench_base::units::UM_PER_M;
-use bench_control::tuning::{Binding, PlantFigures};
-use bench_experiment::tuning::{DesignCertificate, FrfEvidence, ModeRole};
+use bench_experiment::tuning::DesignCertificate;
 
 const FIGURES_NOTE: &str = "Margin: modulus margin, the smallest distance of L from -1 with everything that the plant lacks at its \
     most unfavourable phase. Slope: largest frequency w_s in rad/s with |S(jw)| ≤ 0.707 w/w_s for all w ≤ w_s. Bandwidth: in rad/s, up \
@@ -70,18 +69,13 @@ impl DesignPage<'_> {
     }
 
     fn figures(&self) -> String {
-        let rows = self.certificate.plants.iter();
-        let rows: String = rows.map(|plant| row(&plant_cells(plant))).collect();
-        section(
-            "Plants",
-            &(note(FIGURES_NOTE) + &table(&PLANT_COLUMNS, &rows)),
-        )
+        let table = plant_table(&self.certificate.plants);
+        section("Plants", &(note(FIGURES_NOTE) + &table.html()))
     }
 
     fn limits(&self) -> String {
-        let rows = self.certificate.binding.iter().take(BINDING_ROWS);
-        let rows: String = rows.map(|binding| row(&binding_cells(binding))).collect();
-        let body = note(BINDING_NOTE) + &table(&BINDING_COLUMNS, &rows);
+        let table = binding_table(&self.certificate.binding).first(BINDING_ROWS);
+        let body = note(BINDING_NOTE) + &table.html();
         section("What limits the design", &body)
     }
 
@@ -90,17 +84,6 @@ impl DesignPage<'_> {
         if frfs.is_empty() {
             return String::new();
         }
-        let header = [
-            "Plant",
-            "Lower margin",
-            "at (Hz)",
-            "Modulus margin",
-            "Band (Hz)",
-            "CNMP zeros",
-            "Modes used with sign (Hz)",
-            "Tolerated above the band (µm/A)",
-        ];
-        let rows: String = frfs.iter().map(frf_row).collect();
         let files: Vec<(String, String)> = frfs
             .iter()
             .map(|frf| {
@@ -110,7 +93,7 @@ impl DesignPage<'_> {
                 )
             })
             .collect();
-        let body = note(FRF_NOTE) + &table(&header, &rows) + &facts(&files);
+        let body = note(FRF_NOTE) + &frf_table(frfs).html() + &facts(&files);
         section("Measured responses", &body)
     }
 }
@@ -160,87 +143,4 @@ fn settings(certificate: &DesignCertificate) -> Vec<(String, String)> {
         ("Program".into(), format!("bench {}", certificate.version)),
     ]);
     facts
-}
-
-/// Heads of the columns of [`plant_cells`].
-pub const PLANT_COLUMNS: [&str; 10] = [
-    "plant",
-    "margin",
-    "slope",
-    "bandwidth",
-    "|S| at 10",
-    "|KS| A/um",
-    "rms um",
-    "rms A",
-    "gain margin",
-    "phase deg",
-];
-
-/// The figures of a plant as the cells of a table.
-pub fn plant_cells(figures: &PlantFigures) -> Vec<String> {
-    vec![
-        figures.plant.clone(),
-        format!("{:.4}", figures.modulus_margin),
-        format!("{:.1}", figures.slope_bandwidth_rad_s),
-        format!("{:.1}", figures.sensitivity_bandwidth_rad_s),
-        format!("{:.4}", figures.sensitivity_at_10_rad_s),
-        format!("{:.4}", figures.control_sensitivity_a_per_um),
-        optional(figures.error_rms_m.map(|rms_m| rms_m * UM_PER_M), 4),
-        optional(figures.current_rms_a, 4),
-        optional(figures.gain_margin, 2),
-        optional(figures.phase_margin_deg, 1),
-    ]
-}
-
-/// Heads of the columns of [`binding_cells`].
-pub const BINDING_COLUMNS: [&str; 4] = [
-    "requirement that limits the design",
-    "plant",
-    "rad/s",
-    "slack %",
-];
-
-/// A binding requirement as the cells of a table.
-pub fn binding_cells(binding: &Binding) -> Vec<String> {
-    let frequency = binding.frequency_rad_s;
-    vec![
-        binding.requirement.to_string(),
-        binding.plant.clone(),
-        frequency.map_or("all".into(), |w| format!("{w:.1}")),
-        format!("{:.2}", 100.0 * binding.slack),
-    ]
-}
-
-/// A number, or a dash if there is none.
-fn optional(value: Option<f64>, digits: usize) -> String {
-    value.map_or("-".into(), |value| format!("{value:.digits$}"))
-}
-
-fn frf_row(frf: &FrfEvidence) -> String {
-    let [first_hz, last_hz] = frf.band_hz;
-    let margin = frf.modulus_margin;
-    row(&[
-        frf.plant.clone(),
-        format!("{:.4}", frf.modulus_margin_lower),
-        format!("{:.2}", frf.modulus_margin_lower_at_hz),
-        margin.map_or("–".into(), |margin| {
-            interval(margin.value, margin.half_width_95())
-        }),
-        format!("{first_hz:.2} to {last_hz:.1}"),
-        frf.cnmp.name().to_string(),
-        signed_modes(frf),
-        format!("{:.1}", frf.tolerated_above_m_per_a * UM_PER_M),
-    ])
-}
-
-/// Frequency and sign of each mode that is used with its sign.
-fn signed_modes(frf: &FrfEvidence) -> String {
-    let signed = frf
-        .modes
-        .iter()
-        .filter(|used| used.role == ModeRole::Signed);
-    let texts: Vec<String> = signed
-        .map(|used| format!("{:.2} {}", used.mode.frequency_hz().value, used.mode.sign()))
-        .collect();
-    texts.join(", ")
 }

@@ -24,12 +24,12 @@ mod distortion;
 pub mod ellipse;
 mod error;
 mod error_spectrum;
+pub mod figures;
 pub mod html;
 mod identification;
 mod labels;
 mod loops;
 mod magnitude;
-mod margin_text;
 mod model_pictures;
 pub mod number;
 mod nyquist;
@@ -41,6 +41,7 @@ mod quadrants;
 pub mod run_pages;
 mod run_signals;
 mod stability;
+pub mod table;
 mod trace;
 
 pub use amplitudes::{AmplitudeOverview, amplitudes_svg};
@@ -52,7 +53,7 @@ pub use chart::{
 };
 pub use coherence::coherence_svg;
 pub use conditions::{joined, plant_conditions};
-pub use design_page::{BINDING_COLUMNS, DesignPage, PLANT_COLUMNS, binding_cells, plant_cells};
+pub use design_page::DesignPage;
 pub use distortion::{DistortionLevels, distortion_svg};
 pub use error::ReportError;
 pub use error_spectrum::error_spectrum_svg;
@@ -63,7 +64,6 @@ pub use loops::{
     measured_bode_svg, measured_nyquist_svg, measured_sensitivity_svg, sensitivity_svg,
 };
 pub use magnitude::MagnitudeAxis;
-pub use margin_text::{crossing_count, margin_rows, place};
 pub use model_pictures::{
     CnmpMap, locus_svg, map_svg, model_step_svg, study_svg, veering_caption, veering_svg,
 };

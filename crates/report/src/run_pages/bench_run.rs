@@ -2,12 +2,11 @@
 
 use super::distortion_plot::distortion_plot;
 use super::loop_pictures::MeasuredLoop;
-use super::page::{delay_ms, named, table_section, with_interval};
+use super::page::{delay_ms, named, table_section};
 use super::{Plot, RecordReport, run_facts};
 use crate::conditions::lines;
-use crate::html::row;
-use crate::number::{angular_frequency, significant};
-use crate::{MagnitudeAxis, ReportError, crossing_count, place};
+use crate::number::significant;
+use crate::{MagnitudeAxis, ReportError, figures};
 use bench_config::Config;
 use bench_excitation::AmplitudeCurve;
 use bench_experiment::outputs::PlotKind;
@@ -219,42 +218,8 @@ fn evidence(analysis: &Analysis) -> Vec<(String, String)> {
 
 /// Measured and predicted margins of the closed loop.
 fn margins(closed: &ClosedResponses) -> String {
-    let rows = [
-        crossovers(closed),
-        phase_margins(closed),
-        modulus_margins(closed),
-    ];
-    let header = ["", "Measured", "By the model"];
-    table_section("The closed loop", MARGINS_NOTE, &header, &rows.concat())
-}
-
-fn crossovers(closed: &ClosedResponses) -> String {
-    let measured = closed.margins.crossover_rad_s;
-    let measured = measured.map(|crossover| format!("{} rad/s", with_interval(crossover, 1.0)));
-    let predicted = closed.predicted.crossover_rad_s.map(angular_frequency);
-    row(&["Crossover".into(), or_none(measured), or_none(predicted)])
-}
-
-fn phase_margins(closed: &ClosedResponses) -> String {
-    let (measured, predicted) = (&closed.margins, &closed.predicted);
-    let measured = measured.phase_margin_deg.zip(measured.phase_margin_rad_s);
-    let measured = measured.map(|(margin, rad_s)| {
-        let count = crossing_count(closed.margins.crossings.len());
-        format!("{} deg {}{count}", with_interval(margin, 1.0), place(rad_s))
-    });
-    let predicted = predicted.phase_margin_deg.zip(predicted.phase_margin_rad_s);
-    let predicted = predicted.map(|(deg, rad_s)| format!("{deg:.2} deg {}", place(rad_s)));
-    row(&["Phase margin".into(), or_none(measured), or_none(predicted)])
-}
-
-fn modulus_margins(closed: &ClosedResponses) -> String {
-    row(&[
-        "Modulus margin".into(),
-        with_interval(closed.margins.modulus_margin, 1.0),
-        format!("{:.4}", closed.predicted.modulus_margin),
-    ])
-}
-
-fn or_none(text: Option<String>) -> String {
-    text.unwrap_or_else(|| "none in the band".into())
+    let measured = figures::measured_margins(&closed.margins);
+    let predicted = figures::margins(&closed.predicted);
+    let table = figures::beside(&measured, &predicted);
+    table_section("The closed loop", MARGINS_NOTE, &table)
 }

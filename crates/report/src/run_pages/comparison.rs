@@ -1,7 +1,8 @@
 //! One page for several recordings: their differences, their frequency responses and their steps.
 
 use super::run_differences::differences;
-use crate::html::{document_with_plots, escaped, note, picture, row, section, table};
+use crate::html::{document_with_plots, escaped, note, picture, section};
+use crate::table::Table;
 use crate::{
     ReportError, SignalsPlot, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg,
     signals_svg, step_svg,
@@ -146,7 +147,7 @@ pub(super) fn signals_section(overview: &Overview) -> Result<String, ReportError
 }
 
 fn figures(steps: &[(&str, &StepResponse)]) -> String {
-    let header = [
+    let columns = [
         "Recording",
         "Step (µm)",
         "Settling to 2 % (ms)",
@@ -156,15 +157,13 @@ fn figures(steps: &[(&str, &StepResponse)]) -> String {
         "Mean error (µm)",
         "Sigma of the error (µm)",
     ];
-    let rows: String = steps
-        .iter()
-        .map(|(name, step)| figure_row(name, step))
-        .collect();
+    let rows = steps.iter().map(|(name, step)| figure_row(name, step));
+    let table = Table::new(columns).with_rows(rows);
     let text = "A settling time is given if the band of 2 % is above three sigma of the error.";
-    note(text) + &table(&header, &rows)
+    note(text) + &table.html()
 }
 
-fn figure_row(name: &str, step: &StepResponse) -> String {
+fn figure_row(name: &str, step: &StepResponse) -> Vec<String> {
     let measured = step.metrics.and_then(|metrics| metrics.step);
     let predicted = step.predicted.as_ref().map(|predicted| predicted.metrics);
     let ms = |seconds: Option<f64>| seconds.map_or("none".into(), |s| format!("{:.1}", s * 1e3));
@@ -173,7 +172,7 @@ fn figure_row(name: &str, step: &StepResponse) -> String {
         let value = step.metrics.as_ref().map(value);
         value.map_or("none".into(), |metres| format!("{:.4}", metres * 1e6))
     };
-    row(&[
+    vec![
         name.into(),
         format!("{:.3}", step.height_m * 1e6),
         ms(measured.and_then(|step| step.settling_time_s)),
@@ -182,5 +181,5 @@ fn figure_row(name: &str, step: &StepResponse) -> String {
         percent(predicted.map(|step| step.overshoot_percent)),
         um(|metrics| metrics.steady_state_mean_error_m),
         um(|metrics| metrics.steady_state_sigma_m),
-    ])
+    ]
 }

@@ -1,19 +1,18 @@
 //! The report of a closed-loop run: its figures, its signals, its error spectrum and the loop by the model.
 
 use super::comparison::step_picture;
-use super::page::{named, table_section};
+use super::page::table_section;
 use super::{Plot, run_facts};
 use crate::conditions::{joined, lines};
-use crate::html::{facts, note, row, section};
-use crate::number::{interval, plain};
+use crate::figures::{Figure, control_table, whole_run};
+use crate::html::{facts, note, section};
 use crate::{
     LoopPlot, ReportError, SettlingBand, SignalsPlot, error_spectrum_svg, loop_bode_svg,
-    loop_nyquist_svg, margin_rows, sensitivity_svg, signals_svg,
+    loop_nyquist_svg, sensitivity_svg, signals_svg,
 };
 use bench_config::Config;
 use bench_experiment::outputs::PlotKind;
-use bench_experiment::{ControlRun, Extent, SineResponse, StepResponse, TrackingMetrics};
-use bench_identify::SIGMAS_95;
+use bench_experiment::{ControlRun, Extent, StepResponse};
 use bench_recording::Recording;
 
 const SIGNALS_CAPTION: &str =
@@ -109,89 +108,13 @@ impl ControlReport<'_> {
 
     /// Measured and predicted figures of step, steady state and sine.
     fn figures(&self) -> String {
-        let mut rows = String::new();
-        if let Some(step) = &self.run.step {
-            rows += &step_rows(step);
-        }
-        if let Some(sine) = self.run.sine() {
-            rows += &self.sine_rows(&sine);
-        }
-        if let Some(tracking) = &self.run.tracking {
-            rows += &steady_rows(tracking);
-        }
-        rows += &self.margin_rows();
-        table_section(
-            "Figures",
-            FIGURES_NOTE,
-            &["", "Measured", "By the model"],
-            &rows,
-        )
-    }
-
-    fn sine_rows(&self, sine: &SineResponse) -> String {
-        let predicted = self.run.predicted_sine;
-        let with_sigma = |value: f64, sigma: Option<f64>, digits: usize| match sigma {
-            Some(sigma) => interval(value, SIGMAS_95 * sigma),
-            None => plain(value, digits),
-        };
-        let rows = [
-            [
-                format!("Gain at {} Hz", sine.frequency_hz),
-                with_sigma(sine.gain, sine.gain_sigma, 4),
-                or_none(predicted.map(|sine| plain(sine.gain, 5))),
-            ],
-            [
-                "Phase (deg)".into(),
-                with_sigma(sine.phase_deg, sine.phase_sigma_deg, 2),
-                or_none(predicted.map(|sine| plain(sine.phase_deg, 3))),
-            ],
-            [
-                "RMS beside the sine (µm)".into(),
-                um(sine.residual_rms_m),
-                String::new(),
-            ],
-        ];
-        rows.iter().map(|cells| row(cells)).collect()
-    }
-
-    fn margin_rows(&self) -> String {
-        let margins = &self.run.model.margins;
-        if !margins.stable {
-            return row(&["Closed loop".into(), String::new(), "unstable".into()]);
-        }
-        let rows = margin_rows(margins).into_iter();
-        let rows = rows.map(|(name, value)| row(&[capital(name), String::new(), or_none(value)]));
-        rows.collect()
+        table_section("Figures", FIGURES_NOTE, &control_table(self.run))
     }
 
     /// Largest values and heat.
     fn whole_run(&self) -> String {
-        let figures = &self.run.figures;
-        let heat_percent = 100.0 * (figures.thermal_peak_a / figures.thermal_limit_a).powi(2);
-        let pairs = named([
-            (
-                "Largest error",
-                Some(format!("{} µm", um(figures.peak_error_m))),
-            ),
-            (
-                "RMS of the error",
-                Some(format!("{} µm", um(figures.rms_error_m))),
-            ),
-            (
-                "Peak current",
-                Some(format!("{:.4} A", figures.peak_current_a)),
-            ),
-            (
-                "RMS current",
-                Some(format!("{:.4} A", figures.rms_current_a)),
-            ),
-            (
-                "Heat of the motor",
-                Some(format!(
-                    "at most {heat_percent:.2} % of the limit of the interlock"
-                )),
-            ),
-        ]);
+        let figures = whole_run(&self.run.figures);
+        let pairs: Vec<(String, String)> = figures.iter().map(Figure::pair).collect();
         section(
             "Whole run",
             &(note("From the tick on in which the loop closed.") + &facts(&pairs)),
@@ -301,56 +224,4 @@ impl ControlReport<'_> {
 fn envelope(extents: &[Extent]) -> Vec<(f64, f64, f64)> {
     let extents = extents.iter();
     extents.map(|e| (e.time_s, e.min, e.max)).collect()
-}
-
-fn step_rows(step: &StepResponse) -> String {
-    let measured = step.metrics.and_then(|metrics| metrics.step);
-    let predicted = step.predicted.as_ref().map(|predicted| predicted.metrics);
-    let ms = |seconds: Option<f64>| or_none(seconds.map(|s| format!("{:.1}", s * 1e3)));
-    let percent = |value: Option<f64>| or_none(value.map(|value| plain(value, 1)));
-    let rows = [
-        [
-            "Height of the step (µm)".into(),
-            format!("{:.3}", step.height_m * 1e6),
-            String::new(),
-        ],
-        [
-            "Settling to 2 % (ms)".into(),
-            ms(measured.and_then(|step| step.settling_time_s)),
-            ms(predicted.and_then(|step| step.settling_time_s)),
-        ],
-        [
-            "Overshoot (%)".into(),
-            percent(measured.map(|step| step.overshoot_percent)),
-            percent(predicted.map(|step| step.overshoot_percent)),
-        ],
-    ];
-    rows.iter().map(|cells| row(cells)).collect()
-}
-
-/// The error in the steady state. That of a sine is the part that follows from its gain and phase.
-fn steady_rows(tracking: &TrackingMetrics) -> String {
-    let rows = [
-        ("Mean error (µm)", tracking.steady_state_mean_error_m),
-        ("Sigma of the error (µm)", tracking.steady_state_sigma_m),
-        ("RMS of the error (µm)", tracking.steady_state_rms_m),
-    ];
-    rows.map(|(name, metres)| row(&[name.into(), um(metres), String::new()]))
-        .concat()
-}
-
-/// Metres in micrometres, with four decimals.
-fn um(metres: f64) -> String {
-    plain(metres * 1e6, 4)
-}
-
-fn or_none(text: Option<String>) -> String {
-    text.unwrap_or_else(|| "none".into())
-}
-
-/// A name at the beginning of a row.
-fn capital(name: &str) -> String {
-    let mut letters = name.chars();
-    let first = letters.next().map(|first| first.to_ascii_uppercase());
-    first.into_iter().chain(letters).collect()
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Complex;
 
-use super::page::with_interval;
+use crate::figures::interval_of;
 use crate::labels::frequency_text;
 use crate::{
     MeasuredLoopPlot, MeasuredMark, MeasuredSensitivityPlot, ReportError, measured_bode_svg,
@@ -78,7 +78,7 @@ fn crossover_mark(margins: &MeasuredMargins) -> Option<MeasuredMark> {
     let crossing = margins.crossover()?;
     let margin_deg = crossing.phase_margin_deg;
     let argument = (margin_deg.value - 180.0).to_radians();
-    let (margin, frequency_hz) = (with_interval(margin_deg, 1.0), hz(crossing.rad_s.value));
+    let (margin, frequency_hz) = (interval_of(margin_deg), hz(crossing.rad_s.value));
     let place = frequency_text(frequency_hz);
     Some(MeasuredMark {
         label: format!("phase margin {margin} deg at the crossover, {place}"),
@@ -90,7 +90,7 @@ fn crossover_mark(margins: &MeasuredMargins) -> Option<MeasuredMark> {
 /// The peak of |S|.
 fn peak_mark(margins: &MeasuredMargins, loop_gain: &Frf) -> MeasuredMark {
     let (frequency_hz, margin) = (hz(margins.sensitivity_peak_rad_s), margins.modulus_margin);
-    let margin = with_interval(margin, 1.0);
+    let margin = interval_of(margin);
     MeasuredMark {
         label: format!(
             "modulus margin {margin} (peak of |S|) at {}",

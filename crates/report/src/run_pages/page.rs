@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
-use crate::html::{document_with_plots, escaped, facts, note, row, section, table};
-use crate::number::{interval, percent};
+use crate::figures::{interval_of, mode_table, zero_table};
+use crate::html::{document_with_plots, escaped, facts, note, section};
+use crate::table::Table;
 use bench_base::decimal::Decimal;
 use bench_experiment::certificate::SIGNS_DIFFER;
-use bench_identify::modal::{Estimate, FittedMode, SIGMAS_95};
-use bench_identify::verdict::UncertainZero;
+use bench_identify::modal::Estimate;
 
 /// The page as an HTML document.
 pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
@@ -92,82 +92,30 @@ pub(super) fn named<const N: usize>(pairs: [(&str, Option<String>); N]) -> Vec<(
         .collect()
 }
 
-/// An estimate with its 95 % interval.
-pub(super) fn with_interval(estimate: Estimate, factor: f64) -> String {
-    interval(estimate.value * factor, SIGMAS_95 * estimate.sigma * factor)
-}
-
 /// A delay in milliseconds with its 95 % interval.
 pub(super) fn delay_ms(delay_s: Estimate) -> String {
-    format!("{} ms", with_interval(delay_s, 1e3))
+    format!("{} ms", interval_of(delay_s.scaled(1e3)))
 }
 
 /// A section with a note and a table.
-pub(super) fn table_section(heading: &str, text: &str, header: &[&str], rows: &str) -> String {
-    section(heading, &(note(text) + &table(header, rows)))
+pub(super) fn table_section(heading: &str, text: &str, table: &Table) -> String {
+    section(heading, &(note(text) + &table.html()))
 }
 
 fn modes(report: &RecordReport<'_>) -> String {
     let Some(fit) = report.fit else {
         return String::new();
     };
-    let residue = format!("Residue ({})", report.residue_unit);
-    let header = [
-        "Frequency (Hz)",
-        "Damping ratio",
-        &residue,
-        "Sign",
-        "Probability of the other sign",
-    ];
-    let rows: String = fit.modes().iter().map(mode_row).collect();
-    table_section(
-        "Modes",
-        "± is the 95 % confidence interval.",
-        &header,
-        &rows,
-    )
-}
-
-fn mode_row(mode: &FittedMode) -> String {
-    let sign = if mode.sign() == '+' { "+" } else { "\u{2212}" };
-    row(&[
-        with_interval(mode.omega_rad_s, 1.0 / TAU),
-        with_interval(mode.damping_ratio, 1.0),
-        with_interval(mode.residue_per_kg, 1.0),
-        sign.into(),
-        percent(mode.sign_error_probability()),
-    ])
+    let table = mode_table(&fit.modes(), &report.residue_unit);
+    table_section("Modes", "± is the 95 % confidence interval.", &table)
 }
 
 fn zeros(report: &RecordReport<'_>) -> String {
-    let zeros = &report.verdict.zeros;
-    if zeros.is_empty() {
+    let table = zero_table(&report.verdict.zeros);
+    if table.is_empty() {
         return String::new();
     }
-    let header = [
-        "|s| (Hz)",
-        "Real part (rad/s)",
-        "Imaginary part (rad/s)",
-        "Kind",
-        "Probability right of the imaginary axis",
-    ];
     let text = "Zeros of the fit up to the limit of the verdict; of a conjugate pair the one above the real axis. ± is the \
                 95 % confidence interval.";
-    let rows: String = zeros.iter().map(zero_row).collect();
-    table_section("Zeros", text, &header, &rows)
-}
-
-fn zero_row(zero: &UncertainZero) -> String {
-    let half_widths = [0, 1].map(|k| SIGMAS_95 * zero.covariance[k][k].sqrt());
-    row(&[
-        format!("{:.3}", zero.s.norm() / TAU),
-        interval(zero.s.re, half_widths[0]),
-        if zero.s.im == 0.0 {
-            "0".into()
-        } else {
-            interval(zero.s.im, half_widths[1])
-        },
-        zero.kind.name().into(),
-        percent(zero.rhp_probability),
-    ])
+    table_section("Zeros", text, &table)
 }

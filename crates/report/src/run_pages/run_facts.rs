@@ -1,7 +1,8 @@
 //! Sections of a page about the run itself: its scheduling and its configuration.
 
 use super::page::{self, named};
-use crate::html::{document_with_plots, escaped, facts, note, row, section, table};
+use crate::html::{document_with_plots, escaped, facts, note, section};
+use crate::table::Table;
 use crate::{joined, plant_conditions};
 use bench_config::{Config, SettingDifference, changed_settings};
 use bench_experiment::{Description, Ending, TripSummary};
@@ -107,21 +108,22 @@ fn changed(profile: &str, config: &Config) -> String {
     if changed.is_empty() {
         return note("All settings are those of the profile.");
     }
-    let rows: String = changed.iter().map(setting_row).collect();
-    let header = ["Setting", "Value", "In the profile"];
-    note("Settings that differ from the profile:") + &table(&header, &rows)
+    let columns = ["Setting", "Value", "In the profile"];
+    let table = Table::new(columns).with_rows(changed.iter().map(setting_row));
+    note("Settings that differ from the profile:") + &table.html()
 }
 
-fn setting_row(setting: &SettingDifference) -> String {
-    row(&[
+/// A setting, its value, and that of the reference.
+pub(super) fn setting_row(setting: &SettingDifference) -> Vec<String> {
+    vec![
         setting.key.clone(),
         setting_cell(setting.value.as_deref()),
         setting_cell(setting.reference.as_deref()),
-    ])
+    ]
 }
 
 /// The value of a setting as the cell of a table.
-pub(super) fn setting_cell(value: Option<&str>) -> String {
+fn setting_cell(value: Option<&str>) -> String {
     value.map_or("not set".into(), shortened)
 }
 
@@ -159,25 +161,21 @@ pub(super) fn events(recording: &Recording) -> String {
     }
     let period_s = recording.period_s().unwrap_or_default();
     let shown = events.iter().take(MOST_EVENTS);
-    let rows: String = shown
-        .map(|event| {
-            let time_s = event.tick as f64 * period_s;
-            row(&[
-                format!("{time_s:.4}"),
-                event.tick.to_string(),
-                event_text(event),
-            ])
-        })
-        .collect();
+    let rows = shown.map(|event| {
+        let time_s = event.tick as f64 * period_s;
+        vec![
+            format!("{time_s:.4}"),
+            event.tick.to_string(),
+            event_text(event),
+        ]
+    });
+    let table = Table::new(["Time (s)", "Tick", "Event"]).with_rows(rows);
     let left = events.len().saturating_sub(MOST_EVENTS);
     let left = match left {
         0 => String::new(),
         left => note(&format!("{left} further events are in the recording.")),
     };
-    section(
-        "Events",
-        &(table(&["Time (s)", "Tick", "Event"], &rows) + &left),
-    )
+    section("Events", &(table.html() + &left))
 }
 
 /// How the loop was scheduled, and what it recorded. `more` are further counts.
