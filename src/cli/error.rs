@@ -92,6 +92,7 @@ impl From<ColumnsError> for CliError {
         match error {
             ColumnsError::Options(error) => error.into(),
             ColumnsError::File(error) => error.into(),
+            other => CliError::Failed(other.to_string()),
         }
     }
 }

@@ -7,6 +7,7 @@ use bench_recording::RecordingError;
 
 /// Why a file was not exported.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExportError {
     /// The recording cannot be read.
     #[error(transparent)]

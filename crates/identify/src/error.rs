@@ -6,6 +6,7 @@ use thiserror::Error;
 
 /// Why no frequency response can be estimated. Messages state value, place, limit and remedy.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum IdentifyError {
     /// Samples, their number or their rate are unusable.
     #[error(transparent)]

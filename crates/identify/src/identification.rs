@@ -102,6 +102,7 @@ impl Distortion {
 
 /// Why signals cannot be identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum IdentificationError {
     /// The signals allow no estimate.
     #[error(transparent)]

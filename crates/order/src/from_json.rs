@@ -25,6 +25,7 @@ const MAX_BYTES: usize = 16 << 10;
 
 /// A JSON value that is no order.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OrderError {
     /// No object.
     #[error("it is no object; give {{\"command\": ..., OPTION: VALUE, ...}}")]

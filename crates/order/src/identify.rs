@@ -37,6 +37,7 @@ pub struct IdentifyOrder {
 
 /// A CSV whose columns are not selected, or that cannot be read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ColumnsError {
     /// The options do not select the columns.
     #[error(transparent)]
@@ -198,7 +199,7 @@ impl ExternalOptions {
             IdentifyError::Periods { .. } => {
                 self.skip_periods.map(|n| format!("--skip-periods {n}"))
             }
-            IdentifyError::Signals(_) | IdentifyError::NotExcited { .. } => None,
+            _ => None,
         };
         match option {
             Some(option) => ExperimentError::Refused(format!("{option}: {why}")),

@@ -7,6 +7,7 @@ use mcap::McapError;
 
 /// A recording that could not be written or read.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordingError {
     /// The file exists.
     #[error("{}: this recording exists, and a recording is never overwritten; choose another name or move it away", path.display())]

@@ -28,6 +28,7 @@ const VERDICTS: [(Cnmp, Colour, Symbol); 3] = [
 
 /// Why there is no picture.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PictureError {
     /// The model cannot be analysed.
     #[error(transparent)]

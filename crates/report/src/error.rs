@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Why a plot cannot be drawn.
 #[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
 pub enum ReportError {
     /// No trace or chart was given.
     #[error("there is nothing to plot; give at least one trace")]

@@ -9,6 +9,7 @@ use super::trip::Trip;
 
 /// A device that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum DeviceDefect {
     /// The amplifier reports a fault, or does not answer.
     Amplifier,

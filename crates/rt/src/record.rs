@@ -177,6 +177,7 @@ pub enum Origin {
 
 /// Why the loop refused a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Refusal {
     /// Only a disarmed loop can be armed.
     NotDisarmed,

@@ -31,6 +31,7 @@ impl Default for Factors {
 
 /// A change of the factors that was refused.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TuneError {
     /// The reference factor is not a number within the limits.
     #[error("the reference factor is {0}; choose a factor from -{MAX_FACTOR} to {MAX_FACTOR}")]

@@ -35,6 +35,7 @@ use bench_base::checkpoint::FileError;
 
 /// The reason why a study is refused or fails.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// A tolerance that cannot be read, or that does not apply to its setting.
     #[error("--vary {text}: {why}")]

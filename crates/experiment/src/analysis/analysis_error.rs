@@ -9,6 +9,7 @@ use bench_recording::RecordingError;
 
 /// Why a recording gives no frequency response.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AnalysisError {
     /// The recording cannot be read.
     #[error(transparent)]
@@ -16,6 +17,9 @@ pub enum AnalysisError {
     /// The signals allow no estimate.
     #[error(transparent)]
     Identify(#[from] IdentifyError),
+    /// The signals cannot be identified.
+    #[error(transparent)]
+    Identification(#[from] IdentificationError),
     /// The model cannot be analysed.
     #[error(transparent)]
     Plant(#[from] PlantError),
@@ -58,17 +62,9 @@ pub enum AnalysisError {
     },
 }
 
-impl From<IdentificationError> for AnalysisError {
-    fn from(error: IdentificationError) -> Self {
-        match error {
-            IdentificationError::Signals(error) => error.into(),
-            IdentificationError::Zeros(error) => error.into(),
-        }
-    }
-}
-
 /// A closed-loop recording from which the plant cannot be estimated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ClosedLoopError {
     /// The reference did not sweep the band: it was constant, a step, or a single sine.
     #[error(

@@ -45,6 +45,7 @@ pub struct MeasuredFrf {
 
 /// A measured plant that cannot be used for margins.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrfError {
     /// The CSV file cannot be used.
     #[error("{path}: {why}")]

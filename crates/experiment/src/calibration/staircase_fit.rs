@@ -12,6 +12,7 @@ const MIN_SIGMAS: f64 = 20.0;
 
 /// A staircase without a usable fit.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StaircaseError {
     /// The recording cannot be read.
     #[error(transparent)]

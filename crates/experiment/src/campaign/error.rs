@@ -8,6 +8,7 @@ use bench_plant::PlantError;
 
 /// A campaign that was refused or that failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CampaignError {
     /// The grid cannot be measured.
     #[error("{0}")]

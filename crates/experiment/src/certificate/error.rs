@@ -4,6 +4,7 @@ use std::fmt;
 
 /// A certificate that is missing, or with which a loop is not closed on devices. Each text is `what is wrong; remedy`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CertificateError {
     /// None is given, and the loop would close on devices.
     #[error(

@@ -17,6 +17,7 @@ pub struct OverrideReason(String);
 
 /// A text that is not a reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReasonError {
     /// Too short, or too long.
     #[error(

@@ -17,6 +17,7 @@ use bench_rig::devices::DevicesError;
 
 /// An experiment that was refused or that failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ExperimentError {
     /// The run cannot be planned.
     #[error(transparent)]

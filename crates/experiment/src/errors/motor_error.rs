@@ -4,6 +4,7 @@ use bench_rig::motor::MotorMemoryError;
 
 /// A run that the motor does not allow, or whose wait was stopped. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotorError {
     /// The motor is too warm at this time.
     #[error(

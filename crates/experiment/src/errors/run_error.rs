@@ -7,6 +7,7 @@ use bench_recording::{MIN_FREE_BYTES, RecordingError};
 
 /// A run that was refused, or that failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
     /// The plan is refused.
     #[error(transparent)]

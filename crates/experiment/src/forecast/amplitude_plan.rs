@@ -52,6 +52,7 @@ impl fmt::Display for ResponseSource {
 
 /// Why no amplitude can be planned.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AmplitudePlanError {
     /// The excitation has the same amplitude at all frequencies.
     #[error(

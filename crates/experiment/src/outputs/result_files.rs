@@ -9,6 +9,7 @@ use bench_identify::frf_csv;
 
 /// Why the files of an analysis cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum OutputError {
     /// The certificate cannot be made.
     #[error(transparent)]

@@ -74,6 +74,7 @@ fn quoted(word: &str) -> String {
 
 /// A text that is not a name, a note or an operator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum DescriptionError {
     /// Nothing, or only spaces.
     #[error("it is empty; give a text of 1 to {0} characters")]

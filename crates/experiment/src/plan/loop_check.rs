@@ -10,6 +10,7 @@ use bench_rig::devices;
 
 /// A loop that is refused: too small a margin, or unstable.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum MarginError {
     /// The modulus margin is below the configured limit.
     #[error(

@@ -9,6 +9,7 @@ use bench_plant::PlantError;
 
 /// A run that cannot be planned.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlanError {
     /// The configuration is refused.
     #[error(transparent)]

@@ -11,6 +11,7 @@ use bench_rt::tuning::Factors;
 
 /// A change that is refused. The run goes on as it was.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TuneRefusal {
     /// The run has no control loop.
     #[error("the run has no control loop; only runs of `bench control` can be tuned")]

@@ -26,6 +26,7 @@ use recorded_rig::{RecordedClock, RecordedRig, RecordedTick, RigFeed};
 
 /// A recording that cannot be replayed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ReplayError {
     /// The recording contains no plan.
     #[error(transparent)]

@@ -71,6 +71,7 @@ pub struct RunDifferences {
 
 /// Why runs cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ComparisonError {
     /// Fewer than two.
     #[error("one recording cannot be compared; give two or more")]

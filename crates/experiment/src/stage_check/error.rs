@@ -4,6 +4,7 @@ use super::figures::{PhaseComparison, StaticComparison};
 
 /// A stage that does not agree with the certificate. Each text is `what is wrong; remedy`.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StageCheckError {
     /// The stage moves in the other direction.
     #[error(

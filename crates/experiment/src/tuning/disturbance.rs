@@ -22,6 +22,7 @@ const LEAST_STEADY_S: f64 = 10.0;
 
 /// A recording from which no disturbance can be computed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DisturbanceError {
     /// It cannot be read.
     #[error(transparent)]

@@ -8,6 +8,7 @@ use bench_plant::PlantError;
 
 /// Measured responses that cannot be used for a design.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TuneSourceError {
     /// A file that cannot be used.
     #[error("{}{why}", prefix(.file, .why))]

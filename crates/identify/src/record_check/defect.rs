@@ -4,6 +4,7 @@ use std::fmt;
 
 /// A defect of a record. Times are in seconds from its first sample, heights in units of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Defect {
     /// A few samples are far off.
     Spike {

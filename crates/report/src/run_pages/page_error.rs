@@ -5,6 +5,7 @@ use bench_experiment::outputs::OutputError;
 
 /// Why plots and pages cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum PageError {
     /// A plot cannot be drawn.
     #[error(transparent)]

@@ -84,6 +84,7 @@ pub struct ChainCalibration {
 
 /// A value of a calibration with which no run is made. Its text ends with the remedy.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrationDefect {
     /// A gain of the probe with which no position could be measured.
     #[error(
@@ -123,6 +124,7 @@ pub enum CalibrationDefect {
 
 /// A calibration that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CalibrationError {
     /// The file is not a calibration.
     #[error(transparent)]

@@ -12,6 +12,7 @@ use bench_config::{AmplifierDevice, AmplifierSettings, LoopSettings};
 
 /// An amplifier that cannot be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AmplifierError {
     /// The CAN interface.
     #[error(transparent)]

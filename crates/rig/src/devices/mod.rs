@@ -37,6 +37,7 @@ const RETRY: Duration = Duration::from_millis(1);
 
 /// A rig that cannot be opened. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DevicesError {
     /// The model of the simulated stage cannot be analysed.
     #[error(transparent)]

@@ -10,6 +10,7 @@ use bench_config::{ProbeDevice, ProbeSettings};
 
 /// A probe that cannot be opened.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ProbeError {
     /// The serial probe.
     #[error(transparent)]

@@ -30,6 +30,7 @@ pub enum AmplifierFault {
 
 /// A text that names no fault.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FaultError {
     /// No such kind.
     #[error("there is no fault `{kind}`; choose one of {}", names())]

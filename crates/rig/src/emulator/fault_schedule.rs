@@ -18,6 +18,7 @@ pub struct PlannedFault {
 
 /// A text that is not a planned fault.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlannedFaultError {
     /// The fault.
     #[error(transparent)]

@@ -66,6 +66,7 @@ impl fmt::Display for EmulatedDevice {
 
 /// A device that cannot be emulated, or a fault that it cannot have.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EmulatorError {
     /// The configuration names no device.
     #[error(

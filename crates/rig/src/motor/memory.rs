@@ -14,6 +14,7 @@ use bench_config::{AmplifierSettings, Config, MotorSettings};
 
 /// A file of the motor that cannot be used. Nothing was moved.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MotorMemoryError {
     /// Neither variable of the environment is set.
     #[error(
