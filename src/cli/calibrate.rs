@@ -38,8 +38,6 @@ impl Args {
     pub(super) fn command(&self) -> RunCommand<'_> {
         RunCommand {
             order: Order::Calibrate(self.order.clone()),
-            bench: &self.order.bench,
-            rig: &self.order.rig,
             options: &self.run,
             is_plan: self.plan,
         }

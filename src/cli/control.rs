@@ -39,8 +39,6 @@ impl Args {
     pub(super) fn command(&self) -> RunCommand<'_> {
         RunCommand {
             order: Order::Control(Box::new(self.order.clone())),
-            bench: &self.order.bench,
-            rig: &self.order.rig,
             options: &self.run,
             is_plan: self.plan,
         }

@@ -1,5 +1,6 @@
 //! Options of every command that makes a run, and how the run ended, as text.
 
+use std::borrow::Cow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -41,14 +42,24 @@ pub(super) struct RunOptions {
 /// A command that makes runs: what is ordered, and how it is carried out.
 pub(super) struct RunCommand<'a> {
     pub order: Order,
-    pub bench: &'a BenchOptions,
-    pub rig: &'a RigOptions,
     pub options: &'a RunOptions,
     /// Whether it only predicts what it would do.
     pub is_plan: bool,
 }
 
 impl RunCommand<'_> {
+    /// Options of the bench of the order; without them, their default values.
+    pub fn bench(&self) -> Cow<'_, BenchOptions> {
+        let bench = self.order.bench();
+        bench.map_or_else(Cow::default, Cow::Borrowed)
+    }
+
+    /// Options of the rig of the order; without them, their default values.
+    fn rig(&self) -> Cow<'_, RigOptions> {
+        let rig = self.order.rig();
+        rig.map_or_else(Cow::default, Cow::Borrowed)
+    }
+
     /// The daemon at an address that carries out the whole command, if the command names one.
     pub fn remote(&self) -> Result<Option<Target>, CliError> {
         let target = self.options.connect.remote()?;
@@ -64,7 +75,7 @@ impl RunCommand<'_> {
 
     /// Rig, pace and folder of a run.
     pub fn setup(&self, config: &Config) -> Result<Setup, CliError> {
-        let (rig, options) = (self.rig, self.options);
+        let (rig, options) = (self.rig(), self.options);
         if !rig.is_simulated(config) {
             rig.seed.refuse_on_devices()?;
         }
@@ -78,14 +89,15 @@ impl RunCommand<'_> {
             },
             simulate: rig.simulate,
             now: Moment::now,
-            description: options.description.description(self.bench.profile()),
+            description: options.description.description(self.bench().profile()),
             owner: self.owner(config)?,
         })
     }
 
     /// The daemon that makes the run. A rehearsal of a run on devices is made in this process.
     fn owner(&self, config: &Config) -> Result<Option<Arc<dyn RigOwner>>, CliError> {
-        if self.rig.simulate {
+        let rig = self.rig();
+        if rig.simulate {
             return Ok(None);
         }
         let RunOptions {
@@ -93,7 +105,7 @@ impl RunCommand<'_> {
             description,
             ..
         } = self.options;
-        connect.owner(self.rig.stage(config), &self.order, description)
+        connect.owner(rig.stage(config), &self.order, description)
     }
 
     /// Runs a plan on the rig of its configuration, with progress on a terminal.

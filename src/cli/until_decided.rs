@@ -45,7 +45,7 @@ impl SequenceCommand<'_> {
     /// Makes the shots and writes the results of all of them beside the last recording.
     pub(super) fn measure(&self, base: &Config, max_motion_s: f64) -> Result<Exit, CliError> {
         let setup = self.command.setup(base)?;
-        let json = self.command.bench.json;
+        let json = self.command.bench().json;
         let sequence = stop_on_signal(|stop| {
             let limits = SequenceLimits { max_motion_s, stop };
             shots(base, limits, setup, json)
@@ -69,7 +69,7 @@ impl SequenceCommand<'_> {
         let text = run_text(&report.run, &sequence.config)
             + &wrap(&end_text(report.sequence, report.motion_s), 2)
             + &analysis_output::text(&report.made);
-        close(sequence.last, &report, self.command.bench.json, &text)?;
+        close(sequence.last, &report, self.command.bench().json, &text)?;
         let last = analysis_exit(&report.run, &report.made);
         Ok(sequence_exit(report.sequence, &report.shots, last))
     }

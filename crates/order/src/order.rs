@@ -12,6 +12,7 @@ use super::chirp::ChirpOrder;
 use super::control::ControlOrder;
 use super::identify::IdentifyOrder;
 use super::linearity::LinearityOrder;
+use super::rig_options::RigOptions;
 use super::words::words_of;
 
 /// Commands that may be ordered.
@@ -135,6 +136,17 @@ impl Order {
             Order::Linearity(order) => Some(&order.bench),
             Order::Campaign(order) => Some(&order.bench),
             Order::Identify(_) => None,
+        }
+    }
+
+    /// The options of the rig, for a command that makes runs as ordered. A campaign makes its own; an analysis has none.
+    pub fn rig(&self) -> Option<&RigOptions> {
+        match self {
+            Order::Chirp(order) => Some(&order.rig),
+            Order::Control(order) => Some(&order.rig),
+            Order::Calibrate(order) => Some(&order.rig),
+            Order::Linearity(order) => Some(&order.rig),
+            Order::Campaign(_) | Order::Identify(_) => None,
         }
     }
 
