@@ -8,7 +8,6 @@ use super::error::CliError;
 use super::remote::tcp_target;
 use bench_daemon::client::{DaemonOwner, rig_of, running_daemon};
 use bench_daemon::http_client::Target;
-use bench_daemon::{OnDisconnect, RunRequest};
 use bench_experiment::{RigOwner, Stage};
 use bench_order::Order;
 
@@ -50,7 +49,7 @@ impl ConnectOption {
             None => running_daemon().filter(|socket| rig_of(socket).ok() == Some(stage)),
         };
         let owner = socket.map(|socket| {
-            DaemonOwner::new(socket, request(order, description), description.operator())
+            DaemonOwner::new(socket, description.request(order), description.operator())
         });
         Ok(owner.map(|owner| Arc::new(owner) as Arc<dyn RigOwner>))
     }
@@ -85,16 +84,6 @@ fn name(stage: Stage) -> &'static str {
     match stage {
         Stage::Simulated => "the simulated stage",
         Stage::Devices => "devices",
-    }
-}
-
-/// The order, for the queue of the daemon.
-fn request(order: &Order, description: &DescriptionOptions) -> RunRequest {
-    RunRequest {
-        order: order.clone(),
-        name: description.name().into(),
-        note: description.note().into(),
-        on_disconnect: OnDisconnect::Default,
     }
 }
 

@@ -2,7 +2,9 @@
 
 use super::arguments::arguments;
 use bench_daemon::client::is_started_by_daemon;
+use bench_daemon::{OnDisconnect, RunRequest};
 use bench_experiment::{Description, Invocation, operator_name, run_name, run_note};
+use bench_order::Order;
 
 /// Name, note and operator of a run.
 #[derive(Clone, Debug, Default, clap::Args)]
@@ -34,14 +36,15 @@ impl DescriptionOptions {
         }
     }
 
-    /// The name; empty if it is not given.
-    pub fn name(&self) -> &str {
-        self.name.as_deref().unwrap_or_default()
-    }
-
-    /// The note; empty if it is not given.
-    pub fn note(&self) -> &str {
-        self.note.as_deref().unwrap_or_default()
+    /// What is asked of a daemon: the order with its name and note. If this process disappears, the daemon
+    /// does what is its default for the command.
+    pub fn request(&self, order: &Order) -> RunRequest {
+        RunRequest {
+            order: order.clone(),
+            name: self.name.clone().unwrap_or_default(),
+            note: self.note.clone().unwrap_or_default(),
+            on_disconnect: OnDisconnect::Default,
+        }
     }
 
     /// The operator, by default the user of this process.

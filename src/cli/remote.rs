@@ -15,7 +15,7 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::output::{print_message, print_note, print_text};
 use bench_daemon::http_client::{Ask, HttpError, Target, json as answer, send};
-use bench_daemon::{Hold, OnDisconnect, OutputPiece, RunRequest};
+use bench_daemon::{Hold, OutputPiece};
 use bench_experiment::StopSignals;
 use bench_order::Order;
 
@@ -91,18 +91,12 @@ async fn carried_out(
     )
     .await?;
     let lease = lease["lease"].as_str().unwrap_or_default().to_string();
-    let request = RunRequest {
-        order: order.clone(),
-        name: description.name().into(),
-        note: description.note().into(),
-        on_disconnect: OnDisconnect::Default,
-    };
     let run = ask(
         target,
         Method::POST,
         "/api/v1/runs",
         Some(&lease),
-        Some(json!(request)),
+        Some(json!(description.request(order))),
     )
     .await;
     let outcome = match run {
