@@ -273,7 +273,10 @@ impl JsonSchema for Order {
 
 /// The schema of an order that has more fields beside its options.
 pub fn order_schema(generator: &mut SchemaGenerator, more: &Map<String, Value>) -> Schema {
-    let variants = Command::ALL.map(|command| variant(command, generator, more));
+    let variants = Command::ALL.iter();
+    let variants: Vec<Value> = variants
+        .map(|command| variant(*command, generator, more))
+        .collect();
     json_schema!({ "oneOf": variants })
 }
 

@@ -15,118 +15,104 @@ use super::linearity::LinearityOrder;
 use super::rig_options::RigOptions;
 use super::words::words_of;
 
-/// Commands that may be ordered.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
-#[serde(rename_all = "snake_case")]
-pub enum Command {
-    /// Excite the stage and estimate its frequency response.
-    Chirp,
-    /// Run the closed loop with a reference.
-    Control,
-    /// Measure scale, sign and offset of amplifier and probe.
-    Calibrate,
-    /// Excite the stage at several amplitudes.
-    Linearity,
-    /// A chirp at each point of a grid.
-    Campaign,
-    /// Analyse a recording, without motion.
-    Identify,
+/// Declares the commands that may be ordered: `/// what it does`, `Command(options) = "name on the command line"`.
+macro_rules! commands {
+    ($(#[doc = $text:literal] $command:ident($options:ty) = $name:literal,)*) => {
+        /// Commands that may be ordered.
+        #[derive(
+            Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+        )]
+        pub enum Command {
+            $(
+                #[doc = $text]
+                #[serde(rename = $name)]
+                $command,
+            )*
+        }
+
+        impl Command {
+            /// All commands.
+            pub const ALL: &[Command] = &[$(Command::$command,)*];
+
+            /// The name on the command line.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Command::$command => $name,)*
+                }
+            }
+
+            /// What it does.
+            pub(crate) fn description(self) -> &'static str {
+                match self {
+                    $(Command::$command => $text.trim_ascii(),)*
+                }
+            }
+
+            /// The schema of its options, as an object.
+            pub(crate) fn options_schema(self, generator: &mut SchemaGenerator) -> Schema {
+                match self {
+                    $(Command::$command => <$options>::json_schema(generator),)*
+                }
+            }
+        }
+
+        /// A command with its options: what a command line fills, what a client of the daemon sends, and what its queue holds.
+        ///
+        /// As JSON it is one object: `command`, and each option by its name on the command line with `_` for `-`. Quantities are
+        /// texts as typed (`"0.1A"`), switches are `true`, an option that may be repeated is a list.
+        ///
+        /// ```
+        /// use bench_order::Order;
+        ///
+        /// let json = r#"{"command":"control","slow":true,"duration":"2s","set":["loop.rate_hz=5000"]}"#;
+        /// let order: Order = serde_json::from_str(json)?;
+        /// assert_eq!(order.arguments(), ["--set=loop.rate_hz=5000", "--slow", "--duration=2s"]);
+        /// let error = serde_json::from_str::<Order>(r#"{"command":"chirp","duration":"2m"}"#).unwrap_err();
+        /// assert!(error.to_string().contains("give a time in s, such as 20s"));
+        /// # Ok::<(), serde_json::Error>(())
+        /// ```
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Order {
+            $(
+                #[doc = $text]
+                $command($options),
+            )*
+        }
+
+        impl Order {
+            /// The command.
+            pub fn command(&self) -> Command {
+                match self {
+                    $(Order::$command(_) => Command::$command,)*
+                }
+            }
+
+            /// The options by their names in JSON.
+            fn options(&self) -> Result<Value, serde_json::Error> {
+                match self {
+                    $(Order::$command(options) => serde_json::to_value(options),)*
+                }
+            }
+        }
+    };
 }
 
-impl Command {
-    /// All commands.
-    pub const ALL: [Command; 6] = [
-        Command::Chirp,
-        Command::Control,
-        Command::Calibrate,
-        Command::Linearity,
-        Command::Campaign,
-        Command::Identify,
-    ];
-
-    /// The name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Command::Chirp => "chirp",
-            Command::Control => "control",
-            Command::Calibrate => "calibrate",
-            Command::Linearity => "linearity",
-            Command::Campaign => "campaign",
-            Command::Identify => "identify",
-        }
-    }
-
-    /// What it does.
-    pub(crate) fn description(self) -> &'static str {
-        match self {
-            Command::Chirp => "Excite the stage and estimate its frequency response.",
-            Command::Control => "Run the closed loop with a reference.",
-            Command::Calibrate => "Measure scale, sign and offset of amplifier and probe.",
-            Command::Linearity => "Excite the stage at several amplitudes.",
-            Command::Campaign => "A chirp at each point of a grid.",
-            Command::Identify => "Analyse a recording, without motion.",
-        }
-    }
-
-    /// The schema of its options, as an object.
-    pub(crate) fn options_schema(self, generator: &mut SchemaGenerator) -> Schema {
-        match self {
-            Command::Chirp => ChirpOrder::json_schema(generator),
-            Command::Control => ControlOrder::json_schema(generator),
-            Command::Calibrate => CalibrateOrder::json_schema(generator),
-            Command::Linearity => LinearityOrder::json_schema(generator),
-            Command::Campaign => CampaignOrder::json_schema(generator),
-            Command::Identify => IdentifyOrder::json_schema(generator),
-        }
-    }
-}
-
-/// A command with its options: what a command line fills, what a client of the daemon sends, and what its queue holds.
-///
-/// As JSON it is one object: `command`, and each option by its name on the command line with `_` for `-`. Quantities are texts as typed
-/// (`"0.1A"`), switches are `true`, an option that may be repeated is a list.
-///
-/// ```
-/// use bench_order::Order;
-///
-/// let json = r#"{"command":"control","slow":true,"duration":"2s","set":["loop.rate_hz=5000"]}"#;
-/// let order: Order = serde_json::from_str(json)?;
-/// assert_eq!(order.arguments(), ["--set=loop.rate_hz=5000", "--slow", "--duration=2s"]);
-/// let error = serde_json::from_str::<Order>(r#"{"command":"chirp","duration":"2m"}"#).unwrap_err();
-/// assert!(error.to_string().contains("give a time in s, such as 20s"));
-/// # Ok::<(), serde_json::Error>(())
-/// ```
-#[derive(Clone, Debug, PartialEq)]
-pub enum Order {
+commands! {
     /// Excite the stage and estimate its frequency response.
-    Chirp(ChirpOrder),
+    Chirp(ChirpOrder) = "chirp",
     /// Run the closed loop with a reference.
-    Control(Box<ControlOrder>),
+    Control(Box<ControlOrder>) = "control",
     /// Measure scale, sign and offset of amplifier and probe.
-    Calibrate(CalibrateOrder),
+    Calibrate(CalibrateOrder) = "calibrate",
     /// Excite the stage at several amplitudes.
-    Linearity(LinearityOrder),
+    Linearity(LinearityOrder) = "linearity",
     /// A chirp at each point of a grid.
-    Campaign(CampaignOrder),
+    Campaign(CampaignOrder) = "campaign",
     /// Analyse a recording, without motion.
-    Identify(IdentifyOrder),
+    Identify(IdentifyOrder) = "identify",
 }
 
 impl Order {
-    /// The command.
-    pub fn command(&self) -> Command {
-        match self {
-            Order::Chirp(_) => Command::Chirp,
-            Order::Control(_) => Command::Control,
-            Order::Calibrate(_) => Command::Calibrate,
-            Order::Linearity(_) => Command::Linearity,
-            Order::Campaign(_) => Command::Campaign,
-            Order::Identify(_) => Command::Identify,
-        }
-    }
-
     /// The options of the bench; an analysis takes its bench from the recording.
     pub fn bench(&self) -> Option<&BenchOptions> {
         match self {
@@ -211,15 +197,7 @@ impl Order {
 
     /// The options that are given, by their names in JSON.
     fn fields(&self) -> Result<Map<String, Value>, serde_json::Error> {
-        let object = match self {
-            Order::Chirp(order) => serde_json::to_value(order),
-            Order::Control(order) => serde_json::to_value(order),
-            Order::Calibrate(order) => serde_json::to_value(order),
-            Order::Linearity(order) => serde_json::to_value(order),
-            Order::Campaign(order) => serde_json::to_value(order),
-            Order::Identify(order) => serde_json::to_value(order),
-        };
-        let Value::Object(mut fields) = object? else {
+        let Value::Object(mut fields) = self.options()? else {
             return Ok(Map::new());
         };
         fields.retain(|_, value| is_given(value));
