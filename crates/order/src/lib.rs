@@ -10,6 +10,7 @@
 //! | `words` | the words of a command line for options in JSON |
 //! | `chirp`, `control`, `calibrate`, `linearity`, `campaign`, `identify` | the options of each command, and the configuration that they select |
 //! | `bench_options`, `rig_options`, `excitation_options`, `figure_options`, `controller_choice` | options that several commands share |
+//! | `reference` | the value of `--reference` |
 //! | `value_range` | a grid as typed |
 //! | `help` | texts of options with the value of the default profile |
 
@@ -29,6 +30,7 @@ mod identify;
 mod linearity;
 mod order;
 mod path_text;
+mod reference;
 mod rig_options;
 #[cfg(test)]
 mod tests;
@@ -39,7 +41,7 @@ pub use bench_options::{BenchOptions, SeedOption, given};
 pub use calibrate::CalibrateOrder;
 pub use campaign::CampaignOrder;
 pub use chirp::{ChirpOrder, SequentialOptions};
-pub use control::{ControlOrder, Reference, ReferenceKind, Shaper, defaults_help};
+pub use control::{ControlOrder, Shaper, defaults_help};
 pub use controller_choice::ControllerChoice;
 pub use excitation_options::ExcitationOptions;
 pub use figure_options::ResponseFigureOptions;
@@ -48,5 +50,6 @@ pub use help::{GLOSSARY, default_value, with_setting};
 pub use identify::{ColumnsError, ExternalOptions, Hold, IdentifyOrder};
 pub use linearity::LinearityOrder;
 pub use order::{Command, Order};
+pub use reference::{Reference, ReferenceKind};
 pub use rig_options::RigOptions;
 pub use value_range::{ValueRange, asymmetries, operating_points};
