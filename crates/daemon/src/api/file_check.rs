@@ -4,8 +4,8 @@ use super::error::ApiError;
 use crate::order_files::{Outside, check_paths};
 use crate::shared::Daemon;
 
-/// Refuses files outside the folder of the recordings, directly or through a link. What is no file, as the name of a profile, stays
-/// unchanged.
+/// Refuses files outside the folder of the recordings, directly or through a link. A name that is not a path, such as that of a profile,
+/// passes.
 pub async fn check_files(daemon: &Daemon, files: Vec<String>) -> Result<(), ApiError> {
     check_paths(&files)?;
     let catalogue = daemon.catalogue();
