@@ -121,10 +121,14 @@ macro_rules! plant_models {
     ($($(#[$doc:meta])* $variant:ident($settings:ident) = $name:literal,)*) => {
         /// The settings of a model of the mechanics.
         #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-        #[serde(tag = "model", rename_all = "snake_case")]
+        #[serde(tag = "model")]
         #[schemars(transform = bench_base::kinds::list_added_kinds)]
         pub enum PlantSettings {
-            $($(#[$doc])* $variant($settings),)*
+            $(
+                $(#[$doc])*
+                #[serde(rename = $name)]
+                $variant($settings),
+            )*
             /// A model of another crate.
             #[serde(untagged)]
             Own(OwnPlant),
