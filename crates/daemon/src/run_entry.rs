@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::de::Error as _;
+use serde::de::{DeserializeOwned, Error as _};
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
@@ -12,7 +12,7 @@ use super::hold::StopKind;
 use super::secret::Secret;
 use bench_base::progress::Progress;
 use bench_experiment::{Description, EndKind, operator_name, run_name, run_note};
-use bench_order::{Order, order_schema};
+use bench_order::{Order, OrderError, order_schema};
 use bench_rt::supervision::StopFlags;
 
 /// What happens to a run whose client disappears.
@@ -42,8 +42,34 @@ pub struct RunRequest {
     pub on_disconnect: OnDisconnect,
 }
 
+/// A JSON value that is no request.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum RequestError {
+    /// Its order is refused.
+    #[error(transparent)]
+    Order(#[from] OrderError),
+    /// A field beside the order is refused.
+    #[error("`{field}` cannot be used: {why}; see /api/v1/openapi.json for its form")]
+    Remark {
+        /// The field.
+        field: &'static str,
+        /// Why.
+        why: String,
+    },
+}
+
+impl RequestError {
+    /// The field that is wrong, as in the JSON object of the request; `None` if it is not a single one.
+    pub fn field(&self) -> Option<String> {
+        match self {
+            RequestError::Order(error) => error.field(),
+            RequestError::Remark { field, .. } => Some((*field).into()),
+        }
+    }
+}
+
 /// The fields of a request beside its order.
-#[derive(Debug, Default, Deserialize, JsonSchema)]
+#[derive(Default, JsonSchema)]
 #[serde(default)]
 struct Remarks {
     /// A name for the list of recordings.
@@ -55,26 +81,34 @@ struct Remarks {
 }
 
 impl Remarks {
-    /// The names of its fields.
-    const FIELDS: [&str; 3] = ["name", "note", "on_disconnect"];
+    /// Takes them out of the fields of a request; what remains is its order.
+    fn take_from(fields: &mut Map<String, Value>) -> Result<Remarks, RequestError> {
+        Ok(Remarks {
+            name: taken(fields, "name")?,
+            note: taken(fields, "note")?,
+            on_disconnect: taken(fields, "on_disconnect")?,
+        })
+    }
+}
+
+/// The value of a field, which is removed; that of an absent field is the default value of its type.
+fn taken<T: DeserializeOwned + Default>(
+    fields: &mut Map<String, Value>,
+    field: &'static str,
+) -> Result<T, RequestError> {
+    let Some(value) = fields.shift_remove(field) else {
+        return Ok(T::default());
+    };
+    T::deserialize(value).map_err(|error| RequestError::Remark {
+        field,
+        why: error.to_string(),
+    })
 }
 
 impl<'de> Deserialize<'de> for RunRequest {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<RunRequest, D::Error> {
-        let (mut order, mut remarks) = (Map::deserialize(deserializer)?, Map::new());
-        for field in Remarks::FIELDS {
-            if let Some(value) = order.shift_remove(field) {
-                remarks.insert(field.into(), value);
-            }
-        }
-        let order = Order::from_json(Value::Object(order)).map_err(D::Error::custom)?;
-        let remarks = Remarks::deserialize(Value::Object(remarks)).map_err(D::Error::custom)?;
-        Ok(RunRequest {
-            order,
-            name: remarks.name,
-            note: remarks.note,
-            on_disconnect: remarks.on_disconnect,
-        })
+        let value = Value::deserialize(deserializer)?;
+        RunRequest::from_json(value).map_err(D::Error::custom)
     }
 }
 
@@ -91,6 +125,23 @@ impl JsonSchema for RunRequest {
 }
 
 impl RunRequest {
+    /// Reads a request from a JSON object.
+    ///
+    /// # Errors
+    /// When it is no request; the message says which field is wrong.
+    pub fn from_json(value: Value) -> Result<RunRequest, RequestError> {
+        let Value::Object(mut fields) = value else {
+            return Err(OrderError::NoObject.into());
+        };
+        let remarks = Remarks::take_from(&mut fields)?;
+        Ok(RunRequest {
+            order: Order::from_json(Value::Object(fields))?,
+            name: remarks.name,
+            note: remarks.note,
+            on_disconnect: remarks.on_disconnect,
+        })
+    }
+
     /// Whether the run settles when its client disappears.
     pub fn ends_with_client(&self) -> bool {
         match (self.on_disconnect, &self.order) {

@@ -14,7 +14,7 @@ use serde::{Deserialize, Deserializer};
 use serde_json::{Map, Value};
 
 use super::order::{Command, Order};
-use super::words::{POSITIONAL, words_of};
+use super::words::{POSITIONAL, field_of, words_of};
 use bench_base::nearest::nearest;
 use bench_base::remedy;
 
@@ -28,7 +28,7 @@ const MAX_BYTES: usize = 16 << 10;
 #[non_exhaustive]
 pub enum OrderError {
     /// No object.
-    #[error("it is no object; give {{\"command\": ..., OPTION: VALUE, ...}}")]
+    #[error("an order is an object; give {{\"command\": ..., OPTION: VALUE, ...}}")]
     NoObject,
     /// No command, or an unknown one.
     #[error(
@@ -80,6 +80,21 @@ impl From<clap::Error> for OrderError {
         OrderError::Refused {
             message: usage_message(&error),
             option: refused_option(&error),
+        }
+    }
+}
+
+impl OrderError {
+    /// The field that is wrong, as in the JSON object of the order; `None` if it is not a single one.
+    pub fn field(&self) -> Option<String> {
+        match self {
+            OrderError::Command(_) => Some("command".into()),
+            OrderError::Args => Some("args".into()),
+            OrderError::Unknown { field, .. } | OrderError::Type { field, .. } => {
+                Some(field.clone())
+            }
+            OrderError::Refused { option, .. } => option.as_deref().map(field_of),
+            OrderError::NoObject | OrderError::TooLong => None,
         }
     }
 }

@@ -170,6 +170,52 @@ fn rejects_what_is_no_order() {
 }
 
 #[test]
+fn names_the_field_that_is_wrong() {
+    for (sent, field) in [
+        (json!(["control"]), None),
+        (json!({}), Some("command")),
+        (json!({ "command": "control", "args": [] }), Some("args")),
+        (
+            json!({ "command": "chirp", "durration": "2s" }),
+            Some("durration"),
+        ),
+        (
+            json!({ "command": "chirp", "duration": 2 }),
+            Some("duration"),
+        ),
+        (
+            json!({ "command": "chirp", "duration": "2m" }),
+            Some("duration"),
+        ),
+        (
+            json!({ "command": "campaign", "threads": 0 }),
+            Some("threads"),
+        ),
+        (
+            json!({ "command": "chirp", "operating_point": "x" }),
+            Some("operating_point"),
+        ),
+        (
+            json!({ "command": "chirp", "max_duration": "2s" }),
+            Some("until_decided"),
+        ),
+        (json!({ "command": "identify" }), Some("recording")),
+    ] {
+        let found = Order::from_json(sent.clone())
+            .expect_err("no order")
+            .field();
+        assert_eq!(found.as_deref(), field, "{sent}");
+    }
+    // Either of the two may be named.
+    let sent = json!({ "command": "control", "slow": true, "fast": true });
+    let found = Order::from_json(sent).expect_err("no order").field();
+    assert!(
+        ["slow", "fast"].map(Some).contains(&found.as_deref()),
+        "{found:?}"
+    );
+}
+
+#[test]
 fn rejects_an_order_that_is_too_long() {
     let sets = |count: usize| json!({ "command": "chirp", "set": vec!["a=1"; count] });
     assert!(Order::from_json(sets(200)).is_ok());

@@ -17,6 +17,15 @@ pub(crate) fn words_of(fields: &Map<String, Value>) -> Vec<String> {
     words
 }
 
+/// The field in JSON of an option as a parser names it: `--operating-point <LENGTH>` is `operating_point`.
+pub(crate) fn field_of(option: &str) -> String {
+    let word = option.split([' ', ',', '=']).next().unwrap_or_default();
+    match word.strip_prefix("--") {
+        Some(name) => name.replace('-', "_"),
+        None => word.trim_matches(['<', '>', '[', ']']).to_lowercase(),
+    }
+}
+
 fn option_words(option: &str, value: &Value) -> Vec<String> {
     match value {
         Value::Null | Value::Bool(false) | Value::Object(_) => Vec::new(),

@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use crate::files::FolderError;
 use crate::order_files::Outside;
+use crate::run_entry::RequestError;
 use crate::schedule::ScheduleError;
 use crate::worker::ComputeError;
 use bench_experiment::{ErrorKind, ErrorObject};
@@ -30,17 +31,26 @@ const RETRY_AFTER_S: u32 = 5;
 /// The body of an error.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ErrorBody {
+    /// The error.
     error: ErrorFields,
 }
 
 /// What is wrong and what to do.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct ErrorFields {
+    /// What is wrong and what to do, as text.
     message: String,
+    /// Kind of the error: usage, configuration, controller, plan, model, devices, calibration, margin, certificate, recording, data, study,
+    /// campaign or failed.
     kind: String,
+    /// The field, option, file or line that is wrong, as the client wrote it; null if it is not a single one.
     #[serde(rename = "where")]
     place: Option<String>,
+    /// What to do, as in the message; null if nothing is known.
     remedy: Option<String>,
+    /// All defects of a certificate, each as `what is wrong; what to do`; absent without defects.
+    #[serde(default)]
+    defects: Vec<String>,
 }
 
 impl ApiError {
@@ -64,6 +74,12 @@ impl ApiError {
     /// A request that cannot be understood.
     pub fn bad_request(message: impl Into<String>) -> ApiError {
         ApiError::new(StatusCode::BAD_REQUEST, ErrorKind::Usage, message)
+    }
+
+    /// The same error at a place: the field, option, file or line that is wrong.
+    pub fn at(mut self, place: Option<String>) -> ApiError {
+        self.object.place = place;
+        self
     }
 
     /// A request that is understood and refused.
@@ -126,6 +142,12 @@ impl From<ScheduleError> for ApiError {
     }
 }
 
+impl From<RequestError> for ApiError {
+    fn from(error: RequestError) -> ApiError {
+        ApiError::refused(ErrorKind::Usage, error.to_string()).at(error.field())
+    }
+}
+
 impl From<Outside> for ApiError {
     fn from(error: Outside) -> ApiError {
         ApiError::refused(ErrorKind::Usage, error.to_string())
@@ -161,6 +183,19 @@ impl IntoResponse for ApiError {
         headers.extend(retry_after.map(|value| (header::RETRY_AFTER, value)));
         response
     }
+}
+
+/// Describes the error object as an answer, with `text` as its description.
+pub fn described(
+    context: &mut GenContext,
+    operation: &mut Operation,
+    text: &str,
+) -> Option<Described> {
+    let described = ApiError::operation_response(context, operation)?;
+    Some(Described {
+        description: text.into(),
+        ..described
+    })
 }
 
 impl OperationOutput for ApiError {

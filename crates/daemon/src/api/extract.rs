@@ -11,7 +11,6 @@ use aide::openapi::{Operation, ReferenceOr};
 use axum::Json;
 use axum::body::Body as HttpBody;
 use axum::extract::{ConnectInfo, FromRequest, FromRequestParts, Path, Query, Request};
-use axum::http::StatusCode;
 use axum::http::request::Parts;
 use bytes::Bytes;
 use schemars::JsonSchema;
@@ -21,74 +20,11 @@ use serde::de::DeserializeOwned;
 use super::error::ApiError;
 use crate::schedule::StopKind;
 use crate::shared::{Daemon, now};
-use bench_experiment::ErrorKind;
-
-/// Longest time in which a client sends its body.
-const BODY_TIME: Duration = Duration::from_secs(10);
 
 /// Longest time in which the body of a stop arrives.
 const STOP_BODY_TIME: Duration = Duration::from_secs(2);
 /// Largest body of a stop: anyone may send one.
 const MAX_STOP_BYTES: usize = 1 << 10;
-
-/// A JSON body.
-pub struct Body<T>(pub T);
-
-impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
-    type Rejection = ApiError;
-
-    async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
-        let read = tokio::time::timeout(BODY_TIME, object(request, state));
-        let read = read.await.unwrap_or_else(|_| {
-            let message = format!(
-                "the body of the request did not arrive within {} s; send it again",
-                BODY_TIME.as_secs()
-            );
-            Err(ApiError::new(
-                StatusCode::REQUEST_TIMEOUT,
-                ErrorKind::Usage,
-                message,
-            ))
-        });
-        read.map(Body)
-    }
-}
-
-async fn object<T: DeserializeOwned>(
-    request: Request,
-    state: &(impl Send + Sync),
-) -> Result<T, ApiError> {
-    let (parts, body) = request.into_parts();
-    let limited = Request::from_parts(parts.clone(), body);
-    let read = Bytes::from_request(limited, state).await;
-    let bytes = read.map_err(|rejection| unusable(rejection.status(), &rejection.body_text()))?;
-    let parsed = Json::<T>::from_request(Request::from_parts(parts, bytes.clone().into()), state);
-    let Json(body) = parsed
-        .await
-        .map_err(|rejection| unusable(rejection.status(), &rejection.body_text()))?;
-    // An array of the fields can be read as the object, too.
-    if bytes.trim_ascii_start().starts_with(b"{") {
-        Ok(body)
-    } else {
-        Err(unusable(
-            StatusCode::UNPROCESSABLE_ENTITY,
-            "it is no object",
-        ))
-    }
-}
-
-fn unusable(status: StatusCode, why: &str) -> ApiError {
-    let message = format!(
-        "the body of the request cannot be used: {why}; see /api/v1/openapi.json for its form"
-    );
-    ApiError::new(status, ErrorKind::Usage, message)
-}
-
-impl<T: JsonSchema> OperationInput for Body<T> {
-    fn operation_input(context: &mut GenContext, operation: &mut Operation) {
-        Json::<T>::operation_input(context, operation);
-    }
-}
 
 /// How a run is stopped.
 #[derive(Debug, Default, Deserialize, JsonSchema)]

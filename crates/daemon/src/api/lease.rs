@@ -8,8 +8,9 @@ use axum::response::NoContent;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::body::Body;
 use super::error::ApiError;
-use super::extract::{Body, LeaseHeader};
+use super::extract::LeaseHeader;
 use super::reply::{Created, Reply};
 use super::views::Operator;
 use crate::lease::LEASE;

@@ -1,5 +1,6 @@
 //! The HTTP interface: one line per request in [`routes`], one file per resource.
 
+mod body;
 mod download;
 pub mod error;
 mod extract;

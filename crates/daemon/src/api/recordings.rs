@@ -10,9 +10,10 @@ use axum::response::{IntoResponse, NoContent, Response};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::body::Body;
 use super::download::OpenFile;
 use super::error::ApiError;
-use super::extract::{Body, ClientAddress, InPath, InQuery};
+use super::extract::{ClientAddress, InPath, InQuery};
 use super::texts::check_texts;
 use crate::catalogue::{Catalogue, ListedRecording, RecordingInfo};
 use crate::computations::Purpose;

@@ -13,8 +13,9 @@ use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::body::{Body, OrderBody};
 use super::error::ApiError;
-use super::extract::{Body, Client, InPath, LeaseHeader, StopBody};
+use super::extract::{Client, InPath, LeaseHeader, StopBody};
 use super::file_check::check_files;
 use super::lease::random;
 use super::reply::{Accepted, Reply};
@@ -70,7 +71,7 @@ pub async fn one(
 pub async fn start(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
-    Body(request): Body<RunRequest>,
+    OrderBody(request): OrderBody<RunRequest>,
 ) -> Result<Accepted<RunView>, ApiError> {
     check_texts(&request.name, &request.note)?;
     let operator = daemon.read(|schedule| {
@@ -172,7 +173,7 @@ pub async fn clear(
 /// Predicts travel, current, heat and duration. Moves nothing.
 pub async fn plan(
     State(daemon): State<Arc<Daemon>>,
-    Body(order): Body<Order>,
+    OrderBody(order): OrderBody<Order>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     check_files(&daemon, order.files()).await?;
     let computed = worker::plan(&daemon, order).await?;

@@ -16,6 +16,9 @@ fn check(
 ) -> Result<(), ApiError> {
     match parsed(text) {
         Ok(_) | Err(DescriptionError::Empty(_)) => Ok(()),
-        Err(error) => Err(ApiError::bad_request(format!("{field}: {error}"))),
+        Err(error) => {
+            let refused = ApiError::bad_request(format!("{field}: {error}"));
+            Err(refused.at(Some(field.into())))
+        }
     }
 }

@@ -7,8 +7,9 @@ use axum::extract::State;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::body::Body;
 use super::error::ApiError;
-use super::extract::{Body, ClientAddress};
+use super::extract::ClientAddress;
 use super::file_check::check_files;
 use crate::computations::Purpose;
 use crate::shared::{Daemon, DaemonConfig};
