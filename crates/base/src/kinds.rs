@@ -1,11 +1,13 @@
 //! The kinds that a table with `kind = "..."` may name: those of this program, and those that another crate adds when it starts.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::{Arc, PoisonError, RwLock};
 
-use schemars::{Schema, SchemaGenerator};
-use serde::{Serialize, Serializer};
+use schemars::{JsonSchema, Schema, SchemaGenerator};
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::{Map, Value, json};
 
 /// A table of settings, without or with the key that names its kind.
@@ -93,6 +95,10 @@ impl<K: Kind> Kinds<K> {
     /// The schema of a table of any of the kinds.
     pub fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
         let tables = self.tables(generator);
+        if tables.is_empty() && self.others.is_empty() {
+            // No table is valid. A list of no kinds is no JSON schema; beside an enum, `list_added_kinds` adds it to another one.
+            return schemars::json_schema!({ "not": {} });
+        }
         schemars::json_schema!({ "oneOf": tables })
     }
 
@@ -143,33 +149,37 @@ fn schema_with_key<K: Kind>(key: &str, kind: &K, generator: &mut SchemaGenerator
     schema.to_value()
 }
 
-/// A kind whose settings are used through the trait object `S`.
-pub struct AddedKind<S: ?Sized> {
+/// A kind whose tables are read as an `R`.
+pub struct TableKind<R> {
     name: &'static str,
     schema: fn(&mut SchemaGenerator) -> Schema,
-    read: fn(Table) -> Result<Arc<S>, serde_json::Error>,
+    read: fn(&'static str, Table) -> Result<R, serde_json::Error>,
 }
 
-impl<S: ?Sized> AddedKind<S> {
-    /// The kind by its name, its schema, and the function that reads a table without the key that names the kind.
+/// A kind whose settings are used through the trait object `S`. [`added_kind!`](crate::added_kind) makes one.
+pub type AddedKind<S> = TableKind<Arc<S>>;
+
+impl<R> TableKind<R> {
+    /// The kind by its name, its schema, and the function that reads a table without the key that names the kind; it receives
+    /// the name as well.
     pub const fn new(
         name: &'static str,
         schema: fn(&mut SchemaGenerator) -> Schema,
-        read: fn(Table) -> Result<Arc<S>, serde_json::Error>,
+        read: fn(&'static str, Table) -> Result<R, serde_json::Error>,
     ) -> Self {
-        AddedKind { name, schema, read }
+        TableKind { name, schema, read }
     }
 }
 
-impl<S: ?Sized> Clone for AddedKind<S> {
+impl<R> Clone for TableKind<R> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<S: ?Sized> Copy for AddedKind<S> {}
+impl<R> Copy for TableKind<R> {}
 
-impl<S: ?Sized + 'static> Kind for AddedKind<S> {
+impl<R: 'static> Kind for TableKind<R> {
     fn name(&self) -> &'static str {
         self.name
     }
@@ -179,18 +189,53 @@ impl<S: ?Sized + 'static> Kind for AddedKind<S> {
     }
 }
 
-impl<S: ?Sized + 'static> Kinds<AddedKind<S>> {
-    /// The settings in a table.
-    pub fn read(&self, table: Table) -> Result<Added<S>, String> {
-        let mut settings = table.clone();
-        let kind = self.take(&mut settings)?;
-        let settings = (kind.read)(settings).map_err(|error| error.to_string())?;
-        Ok(Added {
-            kind: kind.name,
-            table,
-            settings,
-        })
+impl<R: 'static> Kinds<TableKind<R>> {
+    /// Reads a table by the kind that it names.
+    pub fn read(&self, table: Table) -> Result<R, String> {
+        self.read_named(table).map(|(_, read)| read)
     }
+
+    /// The name of the kind as well.
+    fn read_named(&self, mut table: Table) -> Result<(&'static str, R), String> {
+        let kind = self.take(&mut table)?;
+        let read = (kind.read)(kind.name, table).map_err(|error| error.to_string())?;
+        Ok((kind.name, read))
+    }
+}
+
+/// The kind `$name` with settings of the type `$settings`, which are read from their table and used through a trait object. The type is
+/// `Deserialize`, [`JsonSchema`] and what the trait object needs.
+#[macro_export]
+macro_rules! added_kind {
+    ($name:expr, $settings:ty) => {
+        $crate::kinds::AddedKind::new($name, $crate::kinds::schema_of::<$settings>, |_, table| {
+            Ok(::std::sync::Arc::new($crate::kinds::settings_in::<
+                $settings,
+            >(table)?))
+        })
+    };
+}
+
+/// The schema of settings.
+pub fn schema_of<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+    T::json_schema(generator)
+}
+
+/// The settings in a table.
+pub fn settings_in<T: DeserializeOwned>(table: Table) -> Result<T, serde_json::Error> {
+    serde_json::from_value(Value::Object(table))
+}
+
+/// A trait object whose kinds are registered. [`Added`] settings of it are read and described by these kinds.
+pub trait Registered: 'static {
+    /// Name of the schema.
+    const SCHEMA: &'static str;
+
+    /// Whether the schema is written where it is used, and not among the definitions: [`list_added_kinds`] needs the list itself.
+    const IS_INLINE: bool = true;
+
+    /// The kinds.
+    fn kinds() -> &'static Kinds<AddedKind<Self>>;
 }
 
 /// The settings of an added kind, with the table that they were read from.
@@ -204,6 +249,39 @@ impl<S: ?Sized> Added<S> {
     /// The name of the kind.
     pub fn kind(&self) -> &'static str {
         self.kind
+    }
+}
+
+impl<S: Registered + ?Sized> Added<S> {
+    /// The settings in a table that names their kind.
+    pub fn read(table: Table) -> Result<Self, String> {
+        let (kind, settings) = S::kinds().read_named(table.clone())?;
+        Ok(Added {
+            kind,
+            table,
+            settings,
+        })
+    }
+}
+
+impl<'de, S: Registered + ?Sized> Deserialize<'de> for Added<S> {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let table = Table::deserialize(from)?;
+        Added::read(table).map_err(D::Error::custom)
+    }
+}
+
+impl<S: Registered + ?Sized> JsonSchema for Added<S> {
+    fn schema_name() -> Cow<'static, str> {
+        S::SCHEMA.into()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        S::kinds().schema(generator)
+    }
+
+    fn inline_schema() -> bool {
+        S::IS_INLINE
     }
 }
 
@@ -245,10 +323,6 @@ impl<S: ?Sized> Serialize for Added<S> {
 
 #[cfg(test)]
 mod tests {
-    use std::borrow::Cow;
-
-    use schemars::JsonSchema;
-
     use super::*;
 
     trait Shape {
@@ -279,43 +353,60 @@ mod tests {
         }
     }
 
-    const PAIR: AddedKind<dyn Shape> = AddedKind::new("pair", Pair::json_schema, |table| {
-        let settings: Pair = serde_json::from_value(Value::Object(table))?;
-        Ok(Arc::new(settings))
-    });
+    const PAIR: AddedKind<dyn Shape> = crate::added_kind!("pair", Pair);
 
     const fn square(name: &'static str) -> AddedKind<dyn Shape> {
-        AddedKind::new(name, Square::json_schema, |table| {
-            let settings: Square = serde_json::from_value(Value::Object(table))?;
-            Ok(Arc::new(settings))
-        })
+        crate::added_kind!(name, Square)
     }
 
     fn table(text: &str) -> Table {
         serde_json::from_str(text).expect("an object")
     }
 
+    trait Tile: Shape {}
+
+    impl Tile for Square {}
+
+    static TILES: Kinds<AddedKind<dyn Tile>> =
+        Kinds::new("kind", const { &[crate::added_kind!("square", Square)] });
+
+    impl Registered for dyn Tile {
+        const SCHEMA: &'static str = "Tile";
+
+        fn kinds() -> &'static Kinds<AddedKind<Self>> {
+            &TILES
+        }
+    }
+
     #[test]
     fn added_kind_is_read_and_written() {
-        let kinds = Kinds::new("kind", const { &[square("square")] });
         let tile = table(r#"{"kind": "tile", "side_m": 0.5}"#);
-        let why = kinds.read(tile.clone()).expect_err("unknown");
+        let read = |table: &Table| -> Result<Added<dyn Tile>, String> {
+            let read = serde_json::from_value(Value::Object(table.clone()));
+            read.map_err(|error| error.to_string())
+        };
+        let why = read(&tile).expect_err("unknown");
         assert_eq!(why, "`kind` is \"tile\"; choose one of square");
-        kinds.add(square("tile")).expect("new");
-        let read = kinds.read(tile.clone()).expect("known");
-        assert_eq!((read.kind(), read.area_m2()), ("tile", 0.25));
+        TILES.add(crate::added_kind!("tile", Square)).expect("new");
+        let known = read(&tile).expect("known");
+        assert_eq!((known.kind(), known.area_m2()), ("tile", 0.25));
         assert_eq!(
-            serde_json::to_value(&read).expect("JSON"),
+            serde_json::to_value(&known).expect("JSON"),
             Value::Object(tile)
         );
-        let why = kinds
-            .read(table(r#"{"side_m": 0.5}"#))
-            .expect_err("no kind");
+        let why = read(&table(r#"{"side_m": 0.5}"#)).expect_err("no kind");
         assert_eq!(why, "`kind` is null; choose one of square, tile");
-        let why = kinds
-            .read(table(r#"{"kind": "tile"}"#))
-            .expect_err("no side");
+        let why = read(&table(r#"{"kind": "tile"}"#)).expect_err("no side");
         assert!(why.contains("side_m"), "{why}");
+        let schema = schemars::schema_for!(Added<dyn Tile>).to_value();
+        assert_eq!(schema["oneOf"].as_array().map(Vec::len), Some(2));
+    }
+
+    #[test]
+    fn no_table_is_valid_without_kinds() {
+        let none: Kinds<AddedKind<dyn Shape>> = Kinds::new("kind", &[]);
+        let schema = none.schema(&mut SchemaGenerator::default());
+        assert_eq!(schema.to_value(), json!({ "not": {} }));
     }
 
     #[test]
@@ -347,22 +438,14 @@ mod tests {
             radius_m: f64,
         },
         #[schemars(untagged)]
-        Added(AddedShape),
+        Added(Added<dyn Shape>),
     }
 
-    struct AddedShape;
+    impl Registered for dyn Shape {
+        const SCHEMA: &'static str = "Shape";
 
-    impl JsonSchema for AddedShape {
-        fn schema_name() -> Cow<'static, str> {
-            "AddedShape".into()
-        }
-
-        fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-            SHAPES.schema(generator)
-        }
-
-        fn inline_schema() -> bool {
-            true
+        fn kinds() -> &'static Kinds<AddedKind<Self>> {
+            &SHAPES
         }
     }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::Section;
 use super::error::ControllerError;
 use super::law::ControlDesign;
-use super::laws::{self, LawSettings};
+use super::laws::LawSettings;
 use super::section_settings::{SectionSettings, checked_sections};
 use super::transfer::{
     Cascade, Domain, SsFile, TfFile, TransferError, TransferSettings, TransferTable, ZpkFile,
@@ -36,8 +36,6 @@ struct LawFile {
     #[serde(rename = "title")]
     _title: String,
     /// The law.
-    #[serde(deserialize_with = "laws::deserialize")]
-    #[schemars(schema_with = "laws::schema")]
     law: LawSettings,
 }
 

@@ -58,7 +58,7 @@ macro_rules! excitations {
                     ExcitationKind::Chirp => &ChirpDesign,
                     $(ExcitationKind::$kind => &self.$table,)*
                     ExcitationKind::Own => match &self.own_excitation {
-                        Some(own) => own.design(),
+                        Some(own) => &**own,
                         None => &ChirpDesign,
                     },
                 }

@@ -1,13 +1,9 @@
 //! Excitations of other crates.
 
-use std::borrow::Cow;
-use std::sync::Arc;
-
-use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
-use serde::de::{DeserializeOwned, Error};
-use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::Value;
+use bench_base::added_kind;
+use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Registered};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 
 use super::design::ExcitationDesign;
 
@@ -18,18 +14,14 @@ type Design = dyn ExcitationDesign + Send + Sync;
 static EXCITATIONS: Kinds<AddedKind<Design>> = Kinds::new("kind", &[]);
 
 /// An excitation of another crate.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OwnExcitation(Added<Design>);
+pub type OwnExcitation = Added<Design>;
 
-impl OwnExcitation {
-    /// The name of the kind.
-    pub fn kind(&self) -> &'static str {
-        self.0.kind()
-    }
+impl Registered for Design {
+    const SCHEMA: &'static str = "OwnExcitation";
+    const IS_INLINE: bool = false;
 
-    /// The settings.
-    pub fn design(&self) -> &dyn ExcitationDesign {
-        &*self.0
+    fn kinds() -> &'static Kinds<AddedKind<Design>> {
+        &EXCITATIONS
     }
 }
 
@@ -92,30 +84,5 @@ pub fn register_excitation<E>(kind: &'static str) -> Result<(), KindExists>
 where
     E: ExcitationDesign + DeserializeOwned + JsonSchema + Send + Sync + 'static,
 {
-    EXCITATIONS.add(AddedKind::new(kind, E::json_schema, |table| {
-        let settings: E = serde_json::from_value(Value::Object(table))?;
-        Ok(Arc::new(settings))
-    }))
-}
-
-impl<'de> Deserialize<'de> for OwnExcitation {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let table = Table::deserialize(from)?;
-        let read = EXCITATIONS.read(table).map(OwnExcitation);
-        read.map_err(D::Error::custom)
-    }
-}
-
-impl JsonSchema for OwnExcitation {
-    fn schema_name() -> Cow<'static, str> {
-        "OwnExcitation".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        if EXCITATIONS.all().is_empty() {
-            // No table is valid. A list of no kinds is no JSON schema.
-            return json_schema!({ "not": {} });
-        }
-        EXCITATIONS.schema(generator)
-    }
+    EXCITATIONS.add(added_kind!(kind, E))
 }

@@ -142,14 +142,14 @@ macro_rules! plant_models {
             pub fn model(&self) -> &'static str {
                 match self {
                     $(PlantSettings::$variant(_) => $name,)*
-                    PlantSettings::Own(own) => own.0.kind(),
+                    PlantSettings::Own(own) => own.kind(),
                 }
             }
 
             fn as_model(&self) -> &dyn PlantModel {
                 match self {
                     $(PlantSettings::$variant(settings) => settings,)*
-                    PlantSettings::Own(own) => &*own.0,
+                    PlantSettings::Own(own) => &**own,
                 }
             }
 
@@ -163,7 +163,7 @@ macro_rules! plant_models {
                     $(PlantSettings::$variant(_) => {
                         $settings::deserialize(table).map(PlantSettings::$variant)
                     })*
-                    PlantSettings::Own(own) => own.with_table(table).map(PlantSettings::Own),
+                    PlantSettings::Own(own) => own::with_table(own, table).map(PlantSettings::Own),
                 }
             }
         }

@@ -1,12 +1,10 @@
 //! Models of other crates.
 
-use std::borrow::Cow;
-use std::sync::Arc;
-
-use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema, SchemaGenerator};
+use bench_base::added_kind;
+use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Registered, Table};
+use schemars::JsonSchema;
+use serde::Deserialize;
 use serde::de::{DeserializeOwned, Error};
-use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 
 use super::{MODELS, PlantModel};
@@ -18,8 +16,15 @@ static PLANTS: Kinds<AddedKind<dyn PlantModel>> = Kinds::beside(KEY, MODELS);
 const KEY: &str = "model";
 
 /// A model of another crate.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OwnPlant(pub(super) Added<dyn PlantModel>);
+pub type OwnPlant = Added<dyn PlantModel>;
+
+impl Registered for dyn PlantModel {
+    const SCHEMA: &'static str = "OwnPlant";
+
+    fn kinds() -> &'static Kinds<AddedKind<Self>> {
+        &PLANTS
+    }
+}
 
 /// Adds a model that a configuration may name as `model` in its table `[plant]`. Call it before the command line's `main`.
 ///
@@ -61,42 +66,12 @@ pub fn register_plant<P>(model: &'static str) -> Result<(), KindExists>
 where
     P: PlantModel + DeserializeOwned + JsonSchema + 'static,
 {
-    PLANTS.add(AddedKind::new(model, P::json_schema, |table| {
-        let settings: P = serde_json::from_value(Value::Object(table))?;
-        Ok(Arc::new(settings))
-    }))
+    PLANTS.add(added_kind!(model, P))
 }
 
-impl<'de> Deserialize<'de> for OwnPlant {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let table = Table::deserialize(from)?;
-        PLANTS.read(table).map(OwnPlant).map_err(D::Error::custom)
-    }
-}
-
-impl OwnPlant {
-    /// The same model with the settings of a table without its name.
-    pub(super) fn with_table(&self, table: &Value) -> serde_json::Result<OwnPlant> {
-        let mut table = Table::deserialize(table)?;
-        table.insert(KEY.into(), Value::String(self.0.kind().into()));
-        PLANTS
-            .read(table)
-            .map(OwnPlant)
-            .map_err(serde_json::Error::custom)
-    }
-}
-
-impl JsonSchema for OwnPlant {
-    fn schema_name() -> Cow<'static, str> {
-        "OwnPlant".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        PLANTS.schema(generator)
-    }
-
-    /// [`list_added_kinds`](bench_base::kinds::list_added_kinds) needs the list itself.
-    fn inline_schema() -> bool {
-        true
-    }
+/// The same model with the settings of a table without its name.
+pub(super) fn with_table(own: &OwnPlant, table: &Value) -> serde_json::Result<OwnPlant> {
+    let mut table = Table::deserialize(table)?;
+    table.insert(KEY.into(), Value::String(own.kind().into()));
+    OwnPlant::read(table).map_err(serde_json::Error::custom)
 }

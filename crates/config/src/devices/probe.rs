@@ -6,23 +6,22 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use bench_base::kinds::{Kind, KindExists, Kinds, Table};
+use bench_base::kinds::{KindExists, Kinds, Table, TableKind, settings_in};
 use bench_hal::serial::{Mounting, PortSettings, Protocol, ascii, capancdt, optoncdt};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::de::{DeserializeOwned, Error as _};
 use serde::ser::{Error as _, Serializer};
 use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::Value;
 
 /// The devices that read the stage by the `kind` of their table.
-static PROBES: Kinds<ProbeKind> = Kinds::new(
+static PROBES: Kinds<TableKind<ProbeDevice>> = Kinds::new(
     "kind",
     const {
         &[
-            ProbeKind::SIMULATED,
-            ProbeKind::serial::<capancdt::Settings>("capancdt"),
-            ProbeKind::serial::<optoncdt::Settings>("optoncdt"),
-            ProbeKind::serial::<ascii::Settings>("ascii"),
+            TableKind::new(SIMULATED, SimulatedTable::json_schema, read_simulated),
+            serial::<capancdt::Settings>("capancdt"),
+            serial::<optoncdt::Settings>("optoncdt"),
+            serial::<ascii::Settings>("ascii"),
         ]
     },
 );
@@ -81,7 +80,7 @@ impl<P> ProtocolSettings for P where
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn register_probe<P: ProtocolSettings>(kind: &'static str) -> Result<(), KindExists> {
-    PROBES.add(ProbeKind::serial::<P>(kind))
+    PROBES.add(serial::<P>(kind))
 }
 
 /// The device that reads the stage.
@@ -132,38 +131,24 @@ struct SerialTable<P> {
 #[serde(deny_unknown_fields)]
 struct SimulatedTable {}
 
-/// A device that a configuration may name.
-#[derive(Clone, Copy)]
-struct ProbeKind {
-    name: &'static str,
-    schema: fn(&mut SchemaGenerator) -> Schema,
-    read: fn(&'static str, Table) -> Result<ProbeDevice, serde_json::Error>,
+/// The name of the kind of the simulated probe.
+const SIMULATED: &str = "simulated";
+
+/// A probe on a serial port with the protocol `P`.
+const fn serial<P: ProtocolSettings>(kind: &'static str) -> TableKind<ProbeDevice> {
+    TableKind::new(kind, SerialTable::<P>::json_schema, read_serial::<P>)
 }
 
-impl ProbeKind {
-    const SIMULATED: ProbeKind = ProbeKind {
-        name: "simulated",
-        schema: SimulatedTable::json_schema,
-        read: |_, table| {
-            serde_json::from_value::<SimulatedTable>(Value::Object(table))?;
-            Ok(ProbeDevice::Simulated)
-        },
-    };
-
-    const fn serial<P: ProtocolSettings>(name: &'static str) -> ProbeKind {
-        ProbeKind {
-            name,
-            schema: SerialTable::<P>::json_schema,
-            read: read_serial::<P>,
-        }
-    }
+fn read_simulated(_: &'static str, table: Table) -> Result<ProbeDevice, serde_json::Error> {
+    let SimulatedTable {} = settings_in(table)?;
+    Ok(ProbeDevice::Simulated)
 }
 
 fn read_serial<P: ProtocolSettings>(
     kind: &'static str,
     table: Table,
 ) -> Result<ProbeDevice, serde_json::Error> {
-    let table: SerialTable<P> = serde_json::from_value(Value::Object(table))?;
+    let table: SerialTable<P> = settings_in(table)?;
     // With all defaults, so that a recording has each setting.
     let settings = table_of(&table.protocol)?;
     Ok(ProbeDevice::Serial(SerialDevice {
@@ -183,21 +168,10 @@ fn table_of(settings: &impl Serialize) -> Result<Table, serde_json::Error> {
     Ok(table)
 }
 
-impl Kind for ProbeKind {
-    fn name(&self) -> &'static str {
-        self.name
-    }
-
-    fn schema(&self, generator: &mut SchemaGenerator) -> Schema {
-        (self.schema)(generator)
-    }
-}
-
 impl<'de> Deserialize<'de> for ProbeDevice {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let mut table = Table::deserialize(from)?;
-        let kind = PROBES.take(&mut table).map_err(D::Error::custom)?;
-        (kind.read)(kind.name, table).map_err(D::Error::custom)
+        let table = Table::deserialize(from)?;
+        PROBES.read(table).map_err(D::Error::custom)
     }
 }
 
@@ -226,7 +200,7 @@ impl ProbeDevice {
     /// The name of the kind, as in a configuration.
     pub fn kind(&self) -> &'static str {
         match self {
-            ProbeDevice::Simulated => ProbeKind::SIMULATED.name,
+            ProbeDevice::Simulated => SIMULATED,
             ProbeDevice::Serial(device) => device.kind,
         }
     }

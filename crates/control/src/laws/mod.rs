@@ -8,12 +8,10 @@ mod repetitive;
 pub use matrices::StateSpaceLaw;
 pub use repetitive::RepetitiveLaw;
 
-use std::sync::Arc;
-
-use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::de::{Deserialize, DeserializeOwned, Deserializer, Error};
-use serde_json::Value;
+use bench_base::added_kind;
+use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Registered};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 
 use super::Section;
 use super::law::{ControlDesign, ControlLaw};
@@ -23,8 +21,8 @@ static LAWS: Kinds<AddedKind<dyn ControlLawSettings>> = Kinds::new(
     "kind",
     const {
         &[
-            law::<StateSpaceLaw>("state_space"),
-            law::<RepetitiveLaw>("repetitive"),
+            added_kind!("state_space", StateSpaceLaw),
+            added_kind!("repetitive", RepetitiveLaw),
         ]
     },
 );
@@ -83,22 +81,19 @@ pub fn register_law<L>(kind: &'static str) -> Result<(), KindExists>
 where
     L: ControlLawSettings + DeserializeOwned + JsonSchema + 'static,
 {
-    LAWS.add(law::<L>(kind))
-}
-
-/// A law that a file may name.
-const fn law<L>(name: &'static str) -> AddedKind<dyn ControlLawSettings>
-where
-    L: ControlLawSettings + DeserializeOwned + JsonSchema + 'static,
-{
-    AddedKind::new(name, L::json_schema, |table| {
-        let settings: L = serde_json::from_value(Value::Object(table))?;
-        Ok(Arc::new(settings))
-    })
+    LAWS.add(added_kind!(kind, L))
 }
 
 /// The settings of a law of any kind.
 pub(super) type LawSettings = Added<dyn ControlLawSettings>;
+
+impl Registered for dyn ControlLawSettings {
+    const SCHEMA: &'static str = "LawSettings";
+
+    fn kinds() -> &'static Kinds<AddedKind<Self>> {
+        &LAWS
+    }
+}
 
 impl ControlDesign for LawSettings {
     fn law(&self, period_s: f64) -> Box<dyn ControlLaw> {
@@ -108,15 +103,4 @@ impl ControlDesign for LawSettings {
     fn sections(&self) -> Option<&[Section]> {
         (**self).sections()
     }
-}
-
-/// Reads the table `[law]`.
-pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<LawSettings, D::Error> {
-    let table = Table::deserialize(from)?;
-    LAWS.read(table).map_err(D::Error::custom)
-}
-
-/// The schema of the table `[law]`.
-pub(super) fn schema(generator: &mut SchemaGenerator) -> Schema {
-    LAWS.schema(generator)
 }

@@ -72,7 +72,7 @@ macro_rules! references {
             pub fn design(&self) -> &dyn ReferenceDesign {
                 match self {
                     $(ReferenceSettings::$kind(settings) => settings,)*
-                    ReferenceSettings::Own(own) => own.design(),
+                    ReferenceSettings::Own(own) => &**own,
                 }
             }
         }

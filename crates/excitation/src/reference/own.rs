@@ -1,13 +1,9 @@
 //! References of other crates.
 
-use std::borrow::Cow;
-use std::sync::Arc;
-
-use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Table};
-use schemars::{JsonSchema, Schema, SchemaGenerator};
-use serde::de::{DeserializeOwned, Error};
-use serde::{Deserialize, Deserializer, Serialize};
-use serde_json::Value;
+use bench_base::added_kind;
+use bench_base::kinds::{Added, AddedKind, KindExists, Kinds, Registered};
+use schemars::JsonSchema;
+use serde::de::DeserializeOwned;
 
 use super::{KINDS, ReferenceDesign};
 
@@ -18,18 +14,13 @@ type Design = dyn ReferenceDesign + Send + Sync;
 static REFERENCES: Kinds<AddedKind<Design>> = Kinds::beside("kind", KINDS);
 
 /// A reference of another crate.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OwnReference(Added<Design>);
+pub type OwnReference = Added<Design>;
 
-impl OwnReference {
-    /// The name of the kind.
-    pub fn kind(&self) -> &'static str {
-        self.0.kind()
-    }
+impl Registered for Design {
+    const SCHEMA: &'static str = "OwnReference";
 
-    /// The settings.
-    pub fn design(&self) -> &dyn ReferenceDesign {
-        &*self.0
+    fn kinds() -> &'static Kinds<AddedKind<Design>> {
+        &REFERENCES
     }
 }
 
@@ -77,33 +68,5 @@ pub fn register_reference<R>(kind: &'static str) -> Result<(), KindExists>
 where
     R: ReferenceDesign + DeserializeOwned + JsonSchema + Send + Sync + 'static,
 {
-    REFERENCES.add(AddedKind::new(kind, R::json_schema, |table| {
-        let settings: R = serde_json::from_value(Value::Object(table))?;
-        Ok(Arc::new(settings))
-    }))
-}
-
-impl<'de> Deserialize<'de> for OwnReference {
-    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
-        let table = Table::deserialize(from)?;
-        REFERENCES
-            .read(table)
-            .map(OwnReference)
-            .map_err(D::Error::custom)
-    }
-}
-
-impl JsonSchema for OwnReference {
-    fn schema_name() -> Cow<'static, str> {
-        "OwnReference".into()
-    }
-
-    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
-        REFERENCES.schema(generator)
-    }
-
-    /// [`list_added_kinds`](bench_base::kinds::list_added_kinds) needs the list itself.
-    fn inline_schema() -> bool {
-        true
-    }
+    REFERENCES.add(added_kind!(kind, R))
 }
