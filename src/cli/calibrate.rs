@@ -160,7 +160,7 @@ fn plan_text(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> Strin
     );
     let chirp = format!(
         "then, for the delay: {}; expected travel {:.0} um",
-        config.chosen_excitation().describe(),
+        config.excitation_text(),
         plan.chirp.travel_m * 1e6
     );
     let chirp = if with_delay {

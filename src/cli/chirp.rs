@@ -78,7 +78,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     if args.plan {
         warn(&warnings(&config));
         warn(&check_calibration(&config, args.order.rig.stage(&config))?);
-        let mut plan = ExcitationPlan::new(&config, expected);
+        let mut plan = ExcitationPlan::new(&config, expected)?;
         plan.motor = args.order.rig.motor_summary(&Plan::chirp(config))?;
         print_result(args.order.bench.json, &plan, plan_output::text)?;
         return Ok(Exit::Done);
@@ -150,7 +150,7 @@ fn analysed(
 
 /// The plan of the run, printed before it starts.
 fn plan_text(config: &Config, expected: &Extremes) -> String {
-    let excitation = config.chosen_excitation().describe();
+    let excitation = config.excitation_text();
     let travel_um = expected.travel_m * 1e6;
     let plan = format!("{excitation}; expected travel {travel_um:.0} um");
     wrap(&plan, 0) + &unmodelled_text(config)

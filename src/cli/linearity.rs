@@ -100,8 +100,8 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
 
 /// The excitation and its extremes at each amplitude, printed before the first run.
 fn plan_text(plans: &[AmplitudePlan]) -> String {
-    let excitation = plans.first().map(|plan| plan.config.chosen_excitation());
-    let excitation = excitation.map_or(String::new(), |chosen| wrap(&chosen.describe(), 0));
+    let excitation = plans.first().map(|plan| plan.config.excitation_text());
+    let excitation = excitation.map_or(String::new(), |text| wrap(&text, 0));
     let amplitudes = plans.iter().map(|plan| {
         let line = expected_text(plan.scale, &plan.predicted);
         wrap(&line, 2)

@@ -54,12 +54,13 @@ fn loop_margins(config: &Config) -> Result<Margins, ExperimentError> {
     Ok(margins)
 }
 
-/// Number of ticks of the longer one of both runs.
+/// Number of ticks of the longer one of both runs; an excitation without settings has none.
 pub fn longest_ticks(config: &Config) -> u64 {
     let control_s = config.control.settle_s + config.control.duration_s;
     let control_ticks = (control_s * config.servo.rate_hz).ceil() as u64;
-    let excitation = config.chosen_excitation().build();
-    excitation.ticks().max(control_ticks)
+    let excitation = config.chosen_excitation().ok();
+    let excitation_ticks = excitation.map_or(0, |chosen| chosen.build().ticks());
+    excitation_ticks.max(control_ticks)
 }
 
 /// Amplifier and probe must both be devices, or both simulated.

@@ -151,7 +151,7 @@ fn ended_closed_loop_returns_to_rest_and_then_disarms() {
 #[test]
 fn finish_request_fades_an_excitation_without_a_step() {
     let config = stage();
-    let excitation = config.chosen_excitation().build();
+    let excitation = config.chosen_excitation().expect("settings").build();
     let rig = SimulatedRig::new(&config).expect("a valid plant");
     let mut bench = Bench::around(&config, rig).with_ramps(RAMP_TICKS);
     bench.request(Request::Arm);

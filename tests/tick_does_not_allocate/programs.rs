@@ -84,7 +84,12 @@ pub fn programs(config: &Config) -> Vec<(String, Box<dyn Program>)> {
     for &kind in ExcitationKind::ALL {
         programs.push((
             format!("{kind:?} from its settings"),
-            Box::new(Excite(short(config, kind).chosen_excitation().build())),
+            Box::new(Excite(
+                short(config, kind)
+                    .chosen_excitation()
+                    .expect("settings")
+                    .build(),
+            )),
         ));
     }
     let mut campaign = config.campaign.clone();

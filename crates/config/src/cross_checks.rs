@@ -3,8 +3,8 @@
 use super::command_checks::command_checks;
 use super::purpose::Purpose;
 use super::{
-    CalibrationSettings, ChirpSettings, Config, ExcitationKind, IdentifySettings, MotorSettings,
-    monitor_checks, mounting_checks, relations,
+    CalibrationSettings, ChirpSettings, Config, IdentifySettings, MotorSettings, monitor_checks,
+    mounting_checks, relations,
 };
 use bench_base::finding::Finding;
 
@@ -132,12 +132,12 @@ fn band(config: &Config, errors: &mut Errors) {
 
 /// The length and the settings of the chosen excitation.
 fn excitation(config: &Config, errors: &mut Errors) {
-    let has_table = config.excitations.own_excitation.is_some();
-    let is_own = config.excitation.kind == ExcitationKind::Own;
-    errors.require(has_table || !is_own, "excitation.kind", || {
-        "needs the table [own_excitation]; add it with `kind = NAME`, or choose another kind".into()
-    });
-    let chosen = config.chosen_excitation();
+    let Ok(chosen) = config.chosen_excitation() else {
+        errors.require(false, "excitation.kind", || {
+            "needs the table [own_excitation]; add it with `kind = NAME`, or choose another kind".into()
+        });
+        return;
+    };
     let length = chosen.design.length(&chosen.shared);
     let (value, ticks) = (length.value, length.ticks);
     errors.require(ticks <= MAX_TICKS, length.key, || {

@@ -13,7 +13,9 @@ use super::interlock::InterlockSettings;
 use super::rig::{AmplifierSettings, MotorSettings, ProbeSettings};
 use super::servo::LoopSettings;
 use super::sim::SimSettings;
-use bench_excitation::{ChirpSettings, ChosenExcitation, ExcitationTables, Limits, SharedSettings};
+use bench_excitation::{
+    ChirpSettings, ChosenExcitation, ExcitationError, ExcitationTables, Limits, SharedSettings,
+};
 use bench_identify::IdentifySettings;
 
 /// All settings of a run.
@@ -60,13 +62,24 @@ pub struct Config {
 
 impl Config {
     /// The excitation of `excitation.kind`.
-    pub fn chosen_excitation(&self) -> ChosenExcitation<'_> {
-        ChosenExcitation {
-            design: self.excitations.design(self.excitation.kind),
+    ///
+    /// # Errors
+    /// When the kind has no settings, which the check of a configuration refuses.
+    pub fn chosen_excitation(&self) -> Result<ChosenExcitation<'_>, ExcitationError> {
+        Ok(ChosenExcitation {
+            design: self.excitations.design(self.excitation.kind)?,
             shared: SharedSettings {
                 chirp: &self.chirp,
                 rate_hz: self.servo.rate_hz,
             },
+        })
+    }
+
+    /// Text that describes the excitation, or why there is none.
+    pub fn excitation_text(&self) -> String {
+        match self.chosen_excitation() {
+            Ok(chosen) => chosen.describe(),
+            Err(error) => error.to_string(),
         }
     }
 

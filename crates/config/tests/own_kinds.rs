@@ -143,7 +143,7 @@ fn own_plant_reference_and_excitation_are_loaded_checked_and_recorded() {
         config.control.reference.design().describe(),
         "a pulse of 0.00001 m"
     );
-    assert_eq!(config.chosen_excitation().describe(), "a kick of 100 ticks");
+    assert_eq!(config.excitation_text(), "a kick of 100 ticks");
     // w^2 = k/m, residue 1/m.
     let model = ModalModel::of(&build(&config.plant).expect("built")).expect("a mode");
     assert!((model.modes[0].omega_rad_s - (5e4_f64 / 2.0).sqrt()).abs() < 1e-9);

@@ -75,6 +75,11 @@ pub enum ExcitationError {
         /// The setting to lower.
         setting: &'static str,
     },
+    /// The kind `own` without its table.
+    #[error(
+        "excitation.kind is \"own\", which needs the table [own_excitation]; add it with `kind = NAME`, or choose another kind"
+    )]
+    NoOwnTable,
     /// Some lines are too small compared with others.
     #[error(
         "chirp.amplitude goes from {least_a:.3e} to {most_a:.3e} A within the band; lines below 1/{max_span} of the largest cannot be distinguished from lines that are not excited; raise the smallest amplitude, or lower the largest"

@@ -4,6 +4,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::check::ExcitationError;
 use super::chirp::ChirpDesign;
 use super::design::ExcitationDesign;
 use super::multisine::MultisineSettings;
@@ -52,16 +53,22 @@ macro_rules! excitations {
         }
 
         impl ExcitationTables {
-            /// The settings of a kind. An own excitation without its table, which the check of a configuration refuses, is a chirp.
-            pub fn design(&self, kind: ExcitationKind) -> &dyn ExcitationDesign {
-                match kind {
+            /// The settings of a kind.
+            ///
+            /// # Errors
+            /// When the kind is `own` and its table is absent; the check of a configuration refuses that.
+            pub fn design(
+                &self,
+                kind: ExcitationKind,
+            ) -> Result<&dyn ExcitationDesign, ExcitationError> {
+                Ok(match kind {
                     ExcitationKind::Chirp => &ChirpDesign,
                     $(ExcitationKind::$kind => &self.$table,)*
-                    ExcitationKind::Own => match &self.own_excitation {
-                        Some(own) => &**own,
-                        None => &ChirpDesign,
-                    },
-                }
+                    ExcitationKind::Own => {
+                        let own = self.own_excitation.as_ref();
+                        &**own.ok_or(ExcitationError::NoOwnTable)?
+                    }
+                })
             }
         }
     };
@@ -74,4 +81,21 @@ excitations! {
     SteppedSine(stepped_sine: SteppedSineSettings),
     /// Periodic pseudo-random binary sequence; settings in `[prbs]`.
     Prbs(prbs: PrbsSettings),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_profile::profile;
+
+    #[test]
+    fn own_excitation_without_its_table_is_refused() {
+        let tables = profile().excitations;
+        assert!(tables.own_excitation.is_none());
+        let refused = tables.design(ExcitationKind::Own).err();
+        assert_eq!(refused, Some(ExcitationError::NoOwnTable));
+        for kind in ExcitationKind::ALL {
+            assert!(tables.design(*kind).is_ok(), "{}", kind.name());
+        }
+    }
 }

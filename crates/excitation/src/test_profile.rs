@@ -22,7 +22,7 @@ impl Profile {
     /// The excitation of `kind`.
     pub fn chosen_excitation(&self) -> ChosenExcitation<'_> {
         ChosenExcitation {
-            design: self.excitations.design(self.kind),
+            design: self.excitations.design(self.kind).expect("a table"),
             shared: SharedSettings {
                 chirp: &self.chirp,
                 rate_hz: 1.0 / self.limits.period_s,

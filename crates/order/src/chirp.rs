@@ -94,7 +94,7 @@ impl ChirpOrder {
         if kind == ExcitationKind::Chirp {
             return Ok(());
         }
-        let (name, chosen) = (kind.name(), config.chosen_excitation());
+        let (name, chosen) = (kind.name(), config.chosen_excitation()?);
         let key = chosen.design.length(&chosen.shared).key;
         let unused = match (&self.duration, self.sweep) {
             (Some(duration), _) => {

@@ -3,6 +3,7 @@
 use crate::plan::PlanError;
 use bench_control::ControllerError;
 use bench_control::measured::MeasuredLoopError;
+use bench_excitation::ExcitationError;
 use bench_identify::{IdentificationError, IdentifyError};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;
@@ -26,6 +27,9 @@ pub enum AnalysisError {
     /// The controller of a closed loop is not known, or its reference did not sweep the band.
     #[error(transparent)]
     Loop(#[from] ClosedLoopError),
+    /// The excitation has no settings.
+    #[error(transparent)]
+    Excitation(#[from] ExcitationError),
     /// No program ran.
     #[error(
         "no program ran in this recording, so it contains no excitation to analyse; choose another recording"

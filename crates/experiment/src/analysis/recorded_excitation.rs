@@ -189,7 +189,7 @@ fn open_loop(
     band_hz: (f64, f64),
     config: &Config,
 ) -> Result<ResponseEstimate, AnalysisError> {
-    let pattern = config.chosen_excitation().pattern();
+    let pattern = config.chosen_excitation()?.pattern();
     let (frf, linearity) = match segments(signals, &pattern, band_hz)? {
         Segments::Lines(frf, linearity) => (frf, linearity.map(|boxed| *boxed)),
         Segments::Record(signals) => (response(&signals, band_hz, &config.identify)?, None),

@@ -9,7 +9,7 @@ use super::prediction::extremes;
 use crate::errors::ExperimentError;
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
-use bench_excitation::{CurrentLimit, shaped_amplitude};
+use bench_excitation::{ChosenExcitation, CurrentLimit, shaped_amplitude};
 use bench_identify::frf_csv;
 use bench_plant::{LoopPlant, ModalModel};
 
@@ -82,7 +82,7 @@ pub enum AmplitudePlanError {
 /// # Errors
 /// If the model cannot be analysed.
 pub fn default_amplitude(config: Config) -> Result<Config, AmplitudePlanError> {
-    if config.chosen_excitation().design.is_shaped_by_default() {
+    if chosen(&config)?.design.is_shaped_by_default() {
         shape_amplitude(config, &ResponseSource::Model)
     } else {
         Ok(config)
@@ -98,7 +98,7 @@ pub fn shape_amplitude(
     mut config: Config,
     source: &ResponseSource,
 ) -> Result<Config, AmplitudePlanError> {
-    let design = config.chosen_excitation().design;
+    let design = chosen(&config)?.design;
     if !design.has_amplitude_curve() {
         return Err(AmplitudePlanError::OneAmplitude(design.amplitude_key()));
     }
@@ -117,6 +117,10 @@ pub fn shape_amplitude(
     Ok(config)
 }
 
+fn chosen(config: &Config) -> Result<ChosenExcitation<'_>, ExperimentError> {
+    Ok(config.chosen_excitation()?)
+}
+
 /// The permitted travel of a shaped excitation in metres: `shape.travel_m`, or a third of the soft limit.
 pub(crate) fn shape_travel_m(config: &Config) -> f64 {
     let default_m = config.interlock.soft_limit_m / 3.0;
@@ -125,7 +129,7 @@ pub(crate) fn shape_travel_m(config: &Config) -> f64 {
 
 /// Lowers all amplitudes of an excitation until it moves the stage by at most `travel_m`, by the model.
 pub(crate) fn limit_travel(config: &mut Config, travel_m: f64) -> Result<(), ExperimentError> {
-    let excitation = config.chosen_excitation().build();
+    let excitation = chosen(config)?.build();
     let ratio = (travel_m / extremes(&excitation, config)?.travel_m).min(1.0);
     for point in &mut config.chirp.amplitude {
         point.current_a *= ratio;

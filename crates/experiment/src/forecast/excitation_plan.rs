@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::motor_forecast::MotorSummary;
+use crate::errors::ExperimentError;
 use bench_config::Config;
 use bench_excitation::{AmplitudePoint, Extremes};
 
@@ -39,21 +40,24 @@ pub struct PlanLimits {
 
 impl ExcitationPlan {
     /// The plan of the configured excitation with its extremes.
-    pub fn new(config: &Config, expected: Extremes) -> ExcitationPlan {
-        let chosen = config.chosen_excitation();
+    ///
+    /// # Errors
+    /// When the excitation has no settings.
+    pub fn new(config: &Config, expected: Extremes) -> Result<ExcitationPlan, ExperimentError> {
+        let chosen = config.chosen_excitation()?;
         let amplitude = if chosen.design.has_amplitude_curve() {
             config.chirp.amplitude.clone()
         } else {
             Vec::new()
         };
-        ExcitationPlan {
+        Ok(ExcitationPlan {
             excitation: chosen.describe(),
             expected,
             limits: PlanLimits::of(config),
             motor: None,
             probe: config.probe.device.scale_text(),
             amplitude,
-        }
+        })
     }
 }
 

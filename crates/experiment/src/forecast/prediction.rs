@@ -19,7 +19,9 @@ pub fn rig_model(config: &Config) -> Result<DiscretePlant, ExperimentError> {
 pub fn predicted_extremes(config: &Config) -> Result<Extremes, ExperimentError> {
     let model = rig_model(config)?;
     let limits = config.excitation_limits();
-    let checked = config.chosen_excitation().check(&limits, positions(&model));
+    let checked = config
+        .chosen_excitation()?
+        .check(&limits, positions(&model));
     Ok(checked?)
 }
 

@@ -308,7 +308,7 @@ impl Plan {
     pub fn program(&self) -> Result<Box<dyn Program>, PlanError> {
         let (config, period_s) = (&self.config, self.config.servo.period_s());
         Ok(match self.kind {
-            RunKind::Chirp => Box::new(Excite(config.chosen_excitation().build())),
+            RunKind::Chirp => Box::new(Excite(config.chosen_excitation()?.build())),
             RunKind::Control => Box::new(self.control_program()?),
             RunKind::Calibrate => {
                 Box::new(Excite(Staircase::new(&config.calibrate.steps(), period_s)))

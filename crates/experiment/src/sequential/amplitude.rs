@@ -21,7 +21,7 @@ pub(super) fn first_config(base: &Config, shot: &Shot) -> Result<Config, Experim
     let mut config = shot.config(base, base.chirp.amplitude.clone());
     let travel_m = shape_travel_m(base);
     let limit = current_limit(base);
-    let predicted = extremes(&config.chosen_excitation().build(), &config)?;
+    let predicted = extremes(&config.chosen_excitation()?.build(), &config)?;
     let factor = travel_m / predicted.travel_m;
     for point in &mut config.chirp.amplitude {
         let limit_a = limit.at_a(point.frequency_hz);

@@ -64,7 +64,7 @@ impl AmplitudeFiles {
 /// The excitation, and the conditions of the runs.
 fn subtitle(config: &Config) -> String {
     joined(&[
-        &config.chosen_excitation().describe(),
+        &config.excitation_text(),
         &plant_conditions(&config.plant, &[]),
     ])
 }

@@ -63,7 +63,7 @@ impl<'a> BenchRun<'a> {
             title: config.title.clone(),
             excitation: match analysis.closed {
                 Some(_) => config.swept_reference_text(),
-                None => config.chosen_excitation().describe(),
+                None => config.excitation_text(),
             },
             rate_hz: config.servo.rate_hz,
             magnitude_axis: MagnitudeAxis::default(),
@@ -128,7 +128,7 @@ impl<'a> BenchRun<'a> {
     /// The amplitude of an excitation in open loop: one, or the smallest and the largest within its band. All frequencies of a
     /// multisine together reach the largest one.
     fn amplitude(&self) -> Option<String> {
-        let chosen = self.config.chosen_excitation();
+        let chosen = self.config.chosen_excitation().ok()?;
         if self.analysis.closed.is_some() || !chosen.design.has_amplitude_curve() {
             return None;
         }
