@@ -123,6 +123,74 @@ fn rejects_array_in_place_of_an_object() {
     assert!(daemon.state()["run"].is_null());
 }
 
+#[test]
+fn refused_order_names_the_field_that_is_wrong() {
+    let daemon = Daemon::start();
+    let lease = daemon.take_lease("anna");
+    let token = format!("Bearer {}", daemon.token());
+    let headers = [
+        ("Authorization", token.as_str()),
+        ("Bench-Lease", lease.as_str()),
+    ];
+    for (body, status, place) in [
+        ("{\"command\":\"chirp\",", 400, &["line 1 column 19"][..]),
+        (
+            "{\"command\":\"chirp\",\"durration\":\"2s\"}",
+            422,
+            &["durration"],
+        ),
+        (
+            "{\"command\":\"campaign\",\"threads\":1025}",
+            422,
+            &["threads"],
+        ),
+        (
+            "{\"command\":\"control\",\"slow\":true,\"fast\":true}",
+            422,
+            &["slow", "fast"],
+        ),
+        (
+            "{\"command\":\"control\",\"args\":[\"--slow\"]}",
+            422,
+            &["args"],
+        ),
+    ] {
+        for path in ["/api/v1/plan", "/api/v1/runs"] {
+            let answer = daemon.raw("POST", path, &headers, body.as_bytes());
+            let error = &answer.json()["error"];
+            assert_eq!(answer.status, status, "{path} {body}: {error}");
+            let named = error["where"].as_str().expect("a place");
+            assert!(place.contains(&named), "{path} {body}: {error}");
+            assert!(error["remedy"].is_string(), "{path} {body}: {error}");
+        }
+    }
+    assert_eq!(daemon.get("/api/v1/runs")["finished"], json!([]));
+}
+
+/// Bodies of requests are refused as described, and every field of an error is described.
+#[test]
+fn description_has_the_refusals_of_each_body_and_the_fields_of_an_error() {
+    let daemon = Daemon::start();
+    let description = daemon.get("/api/v1/openapi.json");
+    for path in ["/api/v1/runs", "/api/v1/plan", "/api/v1/tune"] {
+        let responses = &description["paths"][path]["post"]["responses"];
+        for status in ["400", "408", "413", "415", "422", "4XX", "503"] {
+            let schema = &responses[status]["content"]["application/json"]["schema"];
+            assert_eq!(
+                schema["$ref"], "#/components/schemas/ErrorBody",
+                "{path} {status}: {responses}"
+            );
+        }
+    }
+    let fields = &description["components"]["schemas"]["ErrorFields"]["properties"];
+    let fields = fields.as_object().expect("fields");
+    let names: Vec<&String> = fields.keys().collect();
+    assert_eq!(names, ["message", "kind", "where", "remedy", "defects"]);
+    for (name, field) in fields {
+        assert!(field["description"].is_string(), "{name}: {field}");
+    }
+}
+
 /// Any JSON, with the names of the interface.
 fn any_json() -> impl Strategy<Value = Value> {
     let leaf = prop_oneof![
