@@ -113,3 +113,70 @@ fn roots(input: &VerdictInput<'_>, zeros: &[UncertainZero]) -> Roots {
         zeros: zeros.iter().map(|zero| zero.s).collect(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_plant::zeros::ModalTerm;
+
+    /// A datum whose response has the power of its noise times a ratio.
+    fn datum(frequency_hz: f64, power_ratio: f64) -> FrfDatum {
+        FrfDatum {
+            frequency_hz,
+            spread_hz: 0.0,
+            response: Complex::new(0.0, 2.0),
+            variance: 4.0 / power_ratio,
+        }
+    }
+
+    #[test]
+    fn datum_is_significant_above_twenty_times_the_power_of_its_noise() {
+        // |2 j|^2 = 20 x 0.2, without rounding.
+        assert_eq!(SIGNIFICANT_POWER * 0.2, 4.0);
+        for (power_ratio, expected) in [(19.9, false), (20.0, false), (20.1, true)] {
+            assert_eq!(is_significant(&datum(1.0, power_ratio)), expected);
+        }
+        let none = FrfDatum {
+            response: Complex::new(0.0, 0.0),
+            variance: 0.0,
+            ..datum(1.0, 1.0)
+        };
+        assert!(!is_significant(&none));
+    }
+
+    #[test]
+    fn data_are_those_from_the_first_to_the_last_significant_one() {
+        for (power_ratios, expected) in [
+            (vec![1.0, 30.0, 1.0, 30.0, 1.0], vec![1.0, 2.0, 3.0]),
+            (vec![1.0, 1.0, 30.0], vec![2.0]),
+            (vec![30.0, 1.0], vec![0.0]),
+            (vec![1.0, 1.0], vec![]),
+            (vec![], vec![]),
+        ] {
+            let data = power_ratios.iter().zip(0..);
+            let data = data.map(|(ratio, hz)| datum(f64::from(hz), *ratio));
+            let range = significant_range(data.collect());
+            let found: Vec<f64> = range.iter().map(|datum| datum.frequency_hz).collect();
+            assert_eq!(found, expected);
+        }
+    }
+
+    #[test]
+    fn magnitude_beyond_the_data_is_that_of_the_fit_in_equal_ratios() {
+        // G = 1/(s^2 + 2 x 0.1 x 10 s + 100) at ln w = ln 5 + 0.002 k, below ln w = ln 5 + 0.0211.
+        let mode = ModalTerm {
+            omega_rad_s: 10.0,
+            damping_ratio: 0.1,
+            residue_per_kg: 1.0,
+        };
+        let sum = ModalSum::new(vec![mode], 0.0).expect("a sum of modes");
+        let points = fitted_magnitude(&sum, 5.0, 5.0 * 0.0211_f64.exp());
+        assert_eq!(points.len(), 9);
+        for ((omega, height), k) in points.into_iter().zip(1..) {
+            let expected = 5.0 * (0.002 * f64::from(k)).exp();
+            assert!((omega / expected - 1.0).abs() < 1e-14, "{k}: {omega}");
+            let closed_form = -(100.0 - omega * omega).hypot(2.0 * omega).ln();
+            assert!((height - closed_form).abs() < 1e-13, "{k}: {height}");
+        }
+    }
+}

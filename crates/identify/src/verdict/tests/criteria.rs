@@ -112,12 +112,26 @@ fn every_pair_in_noise_must_lie_far_off_the_axis() {
 }
 
 #[test]
+fn pair_in_noise_is_far_off_the_axis_from_exactly_six_standard_deviations() {
+    // 3 rad/s with a standard deviation of 0.5 rad/s: without rounding.
+    let zero = UncertainZero {
+        s: Complex::new(3.0, 100.0),
+        ..cnmp_zero(0.5)
+    };
+    let (cnmp, why) = evaluate(&[zero], &OPPOSITE, phase_drop(0.0, 0.0));
+    assert_eq!(cnmp, Cnmp::Detected, "{why}");
+}
+
+#[test]
 fn only_neighbours_of_opposite_signs_are_opposite() {
     let evaluated = |signs: &[f64]| evaluate(&[cnmp_zero(0.0)], signs, phase_drop(350.0, 0.0));
     for signs in [vec![1.0, -1.0], vec![-2.0, 3.0], vec![1.0, 2.0, -1e-9]] {
         assert_eq!(evaluated(&signs).0, Cnmp::Detected, "{signs:?}");
     }
-    for signs in [vec![], vec![1.0], vec![1.0, 1.0], vec![-1.0, -2.0, -3.0]] {
+    let equal = [vec![1.0, 1.0], vec![-1.0, -2.0, -3.0]];
+    // Without a residue a mode has no sign.
+    let none = [vec![], vec![1.0], vec![1.0, 0.0], vec![-1.0, 0.0]];
+    for signs in equal.into_iter().chain(none) {
         let (cnmp, why) = evaluated(&signs);
         assert_eq!(cnmp, Cnmp::Undecided, "{signs:?}");
         assert_eq!(why, NO_OPPOSITE_NEIGHBOURS);
@@ -140,6 +154,9 @@ fn reason_of_a_detection_states_pairs_signs_and_phase() {
         why(1, 350.0),
         "1 pair of CNMP zeros, residues of opposite signs (+-+), and 354 degrees more phase lag than a minimum-phase system of this magnitude"
     );
+    // Half a turn for each pair confirms them.
+    assert!(why(1, 180.0).contains("and 184 degrees more phase lag"));
+    assert!(why(2, 360.0).contains("and 364 degrees more phase lag"));
     assert_eq!(
         why(2, 350.0),
         "2 pairs of CNMP zeros, residues of opposite signs (+-+); the response around the zeros is noise, so that the phase does not confirm them"

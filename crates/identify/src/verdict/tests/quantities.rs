@@ -2,7 +2,7 @@
 
 use super::stage::{Case, Stage, index, pair};
 use crate::modal::Parameter;
-use crate::verdict::decisive_quantities;
+use crate::verdict::{decisive_quantities, zeros};
 
 #[test]
 fn certain_verdict_has_no_decisive_quantities() {
@@ -67,4 +67,24 @@ fn residue_that_changes_the_number_of_pairs_is_decisive_by_itself() {
     for (i, derivative) in quantity.gradient.iter().enumerate() {
         assert_eq!(*derivative, if i == at { 1.0 } else { 0.0 });
     }
+}
+
+#[test]
+fn residue_that_moves_only_zeros_on_the_left_is_not_decisive() {
+    // The zeros of one mode satisfy y^2 = 100^2 + r/R: at 105 rad/s, outside of the band, and with the sign changed at 94.7 rad/s,
+    // within it. Both pairs have the real part -c/2.
+    let stage = Stage::with_one_mode(105.0);
+    let residue = stage.residue(0);
+    let case = Case {
+        up_to_rad_s: 102.0,
+        ..Case::of(&stage).with_sigma(Parameter::Residue(0), residue / 1.5)
+    };
+    let mut changed = case.fit.clone();
+    changed.parameters.modes[0].residue_per_kg = -residue;
+    for (fit, is_covered) in [(&case.fit, false), (&changed, true)] {
+        let found = zeros(fit).expect("zeros");
+        assert_eq!(found.len(), 1);
+        assert!(found[0].s.re < 0.0 && case.input().covers(found[0].s.norm()) == is_covered);
+    }
+    assert!(decisive_quantities(&case.input()).unwrap().is_empty());
 }

@@ -78,6 +78,14 @@ impl Stage {
         }
     }
 
+    /// A mode at 100 rad/s; zeros at -c/2 +- j `im`.
+    pub(super) fn with_one_mode(im_rad_s: f64) -> Stage {
+        Stage {
+            omega_rad_s: vec![100.0],
+            roots: vec![u(Complex::new(-0.5 * DAMPING_RAD_S, im_rad_s))],
+        }
+    }
+
     /// G(s), from its roots.
     pub(super) fn response(&self, s: Complex<f64>) -> Complex<f64> {
         let poles: Complex<f64> = self.omega_rad_s.iter().map(|w| u(s) + w * w).product();
@@ -136,7 +144,8 @@ impl Stage {
         omega.map(|omega| self.datum(omega)).collect()
     }
 
-    fn datum(&self, omega_rad_s: f64) -> FrfDatum {
+    /// The exact response at a frequency.
+    pub(super) fn datum(&self, omega_rad_s: f64) -> FrfDatum {
         FrfDatum {
             frequency_hz: hertz(omega_rad_s),
             spread_hz: 0.0,
