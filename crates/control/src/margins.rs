@@ -336,4 +336,119 @@ mod tests {
             assert!((found.upper_gain_margin_db.unwrap() - upper_db).abs() < 1e-8);
         }
     }
+
+    #[test]
+    fn gain_margin_of_a_loop_through_minus_one_is_neither_upper_nor_lower() {
+        // L = -1 + j ln w is -1 at w = 1.
+        let found = of(&|w| Complex::new(-1.0, libm::log(w)), &grid(0.3, 5.0, &[]));
+        assert_eq!(found.phase_crossings.len(), 1);
+        // An error of 1e-16 in w leaves |L| = 1.
+        assert_eq!(found.gain_margin_db.map(f64::abs), Some(0.0));
+        assert_eq!(found.upper_gain_margin_db, None);
+        assert_eq!(found.lower_gain_margin_db, None);
+        assert!(found.modulus_margin < 1e-9);
+    }
+
+    #[test]
+    fn crossing_of_the_negative_axis_without_response_has_no_gain_margin() {
+        // L = g (-1 + j ln w): the sign of L below 1e-9 is that of rounding.
+        for (gain, count) in [(0.9e-9, 0), (1.1e-9, 1)] {
+            let l = |w: f64| Complex::new(-1.0, libm::log(w)) * gain;
+            let found = of(&l, &grid(0.3, 5.0, &[]));
+            assert_eq!(found.phase_crossings.len(), count, "{gain}");
+        }
+    }
+
+    fn crossing(rad_s: f64, phase_margin_deg: f64) -> Crossing {
+        Crossing {
+            rad_s,
+            phase_margin_deg,
+        }
+    }
+
+    #[test]
+    fn delay_margin_is_the_least_of_all_crossings_with_margins_of_a_whole_turn() {
+        // 90 deg at 10 rad/s: 157 ms; -90 deg at 100 rad/s, 270 deg of delay: 47 ms; 180 deg at 50 rad/s: 63 ms.
+        let crossings = [
+            crossing(10.0, 90.0),
+            crossing(100.0, -90.0),
+            crossing(50.0, 180.0),
+        ];
+        let found = delay_margin(&crossings).expect("a delay margin");
+        assert_eq!(found.rad_s, 100.0);
+        let expected = 1.5 * std::f64::consts::PI / 100.0;
+        assert!((found.delay_s / expected - 1.0).abs() < 1e-14, "{found:?}");
+    }
+
+    #[test]
+    fn delay_has_no_effect_on_a_crossing_at_rest() {
+        assert_eq!(delay_margin(&[crossing(0.0, 30.0)]), None);
+        let found = delay_margin(&[crossing(0.0, 0.0), crossing(2.0, 90.0)]);
+        assert_eq!(found.map(|margin| margin.rad_s), Some(2.0));
+    }
+
+    #[test]
+    fn grid_has_four_hundred_points_per_decade_in_equal_ratios() {
+        let grid = grid(0.5, 50.0, &[]);
+        assert_eq!(grid.len(), 801);
+        for (k, w) in grid.iter().enumerate() {
+            let expected = 0.5 * 10_f64.powf(k as f64 / 400.0);
+            assert!((w / expected - 1.0).abs() < 1e-13, "{k}: {w}");
+        }
+    }
+
+    #[test]
+    fn points_around_a_resonance_are_a_fortieth_of_their_distance_from_it_apart() {
+        // w (1 + zeta sinh x) in steps of 1/40 of x has the slope w zeta cosh x, the distance from the pole at w (j - zeta).
+        for (w, zeta) in [(517.0, 1e-3), (3.0, 0.1), (40.0, 0.4)] {
+            let points: Vec<f64> = around((w, zeta)).collect();
+            let distance = |at: f64| libm::hypot(at - w, zeta * w);
+            for pair in points.windows(2) {
+                let (near, far) = (distance(pair[0]), distance(pair[1]));
+                let spacing = 40.0 * (pair[1] - pair[0]);
+                // Between the distances of both, except next to the resonance, where the distance is least between them.
+                let (least, largest) = (near.min(far), near.max(far));
+                assert!(
+                    spacing > 0.999 * least && spacing < 1.001 * largest,
+                    "{pair:?}"
+                );
+            }
+            // To a quarter of its frequency, or to its width, and at most one step of e^(1/40) beyond.
+            let reach = w * zeta.max(0.25);
+            for end in [w - points[0], points[points.len() - 1] - w] {
+                assert!(end > 0.9999 * reach && end < 1.04 * reach, "{end} {reach}");
+            }
+            assert_eq!(points[points.len() / 2], w);
+        }
+    }
+
+    #[test]
+    fn grid_has_the_points_around_its_resonances_within_its_limits() {
+        let (w, zeta) = (100.0, 1e-4);
+        let grid = grid(99.0, 1e3, &[(w, zeta), (5e3, 1e-3)]);
+        assert!(grid.windows(2).all(|pair| pair[0] < pair[1]));
+        assert!(grid[0] == 99.0 && grid[grid.len() - 1] <= 1e3);
+        let inside = around((w, zeta)).filter(|at| *at >= 99.0);
+        assert!(inside.into_iter().all(|at| grid.contains(&at)));
+        // 400 for the decade, and 40 for each of the e-folds of 1 % and of 25 % over 1e-4, on either side of it.
+        let logarithmic = 400.0 * (1e3_f64 / 99.0).log10();
+        let folds = (0.01 / zeta).asinh() + (0.25 / zeta).asinh();
+        let expected = logarithmic + 40.0 * folds;
+        assert!(
+            (grid.len() as f64 - expected).abs() < 4.0,
+            "{} {expected}",
+            grid.len()
+        );
+    }
+
+    #[test]
+    fn undamped_resonance_has_points_down_to_a_millionth_of_its_frequency() {
+        let points: Vec<f64> = around((10.0, 0.0)).collect();
+        let middle = points.len() / 2;
+        let spacing = points[middle + 1] - points[middle];
+        assert!(
+            (spacing / (10.0 * 1e-6 / 40.0) - 1.0).abs() < 1e-3,
+            "{spacing}"
+        );
+    }
 }

@@ -236,3 +236,6 @@ fn delay_margin_s(crossing: &MeasuredCrossing) -> (f64, Estimate) {
 fn smallest(estimates: impl Iterator<Item = (f64, Estimate)>) -> Option<(f64, Estimate)> {
     estimates.min_by(|a, b| a.1.value.abs().total_cmp(&b.1.value.abs()))
 }
+
+#[cfg(test)]
+mod tests;
