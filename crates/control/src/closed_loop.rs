@@ -431,3 +431,6 @@ fn pair([c0, c1, c2]: &[f64; 3]) -> Option<(f64, f64)> {
     let w = (c0 / c2).sqrt();
     (*c2 != 0.0 && w > 0.0).then(|| (w, (c1 / (2.0 * c2 * w)).abs()))
 }
+
+#[cfg(test)]
+mod tests;
