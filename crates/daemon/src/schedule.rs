@@ -493,4 +493,6 @@ fn may_begin(entry: &RunEntry, lease: &Lease) -> bool {
 #[cfg(test)]
 mod hold_tests;
 #[cfg(test)]
+mod rule_tests;
+#[cfg(test)]
 mod tests;
