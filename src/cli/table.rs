@@ -65,9 +65,7 @@ pub(super) fn figure_sentence(figures: &[Figure]) -> String {
 
 /// Text of a page for a terminal, which may lack the typographic minus sign and the Greek letter.
 pub(super) fn terminal(text: &str) -> String {
-    text.replace('\u{2212}', "-")
-        .replace('–', "-")
-        .replace('µ', "u")
+    text.replace(['\u{2212}', '–'], "-").replace('µ', "u")
 }
 
 /// `Overshoot` as `overshoot`; an abbreviation such as `RMS` stays.

@@ -32,7 +32,7 @@ fn page_of_a_step_has_the_figures_of_the_run_and_of_the_model() {
     }
     for figures in ["measured", "predicted"] {
         let settling_ms = number(&run[figures]["settling_time_s"]) * 1e3;
-        let cell = format!("<td class=\"n\">{settling_ms:.1}</td>");
+        let cell = format!("<td class=\"n\">{settling_ms:.1} ms</td>");
         assert!(page.contains(&cell), "{figures}: {cell}");
     }
 }

@@ -58,7 +58,7 @@ fn step_leaves_plots_and_a_page_beside_its_recording() {
     let modulus = number(&run["predicted"]["modulus_margin"]);
     for part in [
         "2 % of the step".to_string(),
-        format!("<td class=\"n\">{settling_ms:.1}</td>"),
+        format!("<td class=\"n\">{settling_ms:.1} ms</td>"),
         format!("modulus margin {modulus:.3} at "),
         "phase margin 34.5°".into(),
         "Spectrum of the error".into(),

@@ -134,7 +134,7 @@ fn page_of_a_calibration_has_the_compliance_of_the_command_and_of_the_model() {
     let run = bench.json("calibrate --no-delay");
     let page = page_of(&bench, path(&run));
     let model_um = 1e6 * number(&run["calibration"]["chain"]["model_m_per_a"]);
-    let cell = format!("<td class=\"n\">{model_um:.3}</td>");
+    let cell = format!("<td class=\"n\">{model_um:.3} µm/A</td>");
     has(
         &page,
         &[
