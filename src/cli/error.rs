@@ -16,7 +16,7 @@ use bench_experiment::{
 };
 use bench_experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
 use bench_identify::IdentifyError;
-use bench_identify::external_csv::ExternalCsvError;
+use bench_external::ExternalCsvError;
 use bench_order::{ColumnsError, refused_option, usage_message};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;

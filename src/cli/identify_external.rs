@@ -11,7 +11,6 @@ use super::linearity_output;
 use super::modal_output;
 use super::output::print_result;
 use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFiles};
-use bench_identify::external_csv;
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::{Distortion, DistortionSource};
@@ -69,7 +68,7 @@ pub(super) fn run(
     json: bool,
 ) -> Result<Exit, CliError> {
     let columns = options.columns(path)?;
-    let signals = external_csv::read(path, &columns)?;
+    let signals = bench_external::read(path, &columns)?;
     signals.check()?;
     let identification = options.identification(&signals)?;
     let analysis = identification.run(&signals.input, &signals.output);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bench_identify::external_csv::{self, Columns, Sampling};
+use bench_external::{Columns, Sampling};
 use bench_identify::frf_csv;
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};
@@ -40,7 +40,7 @@ fn naive_rows(text: &str) -> usize {
 
 fn external(path: &Path, bytes: &[u8], columns: &Columns) -> bool {
     std::fs::write(path, bytes).expect("a file");
-    let Ok(signals) = external_csv::read(path, columns) else {
+    let Ok(signals) = bench_external::read(path, columns) else {
         return false;
     };
     assert!(signals.rate_hz > 0.0 && signals.rate_hz.is_finite());

@@ -22,7 +22,7 @@
 //! | the excess delay of a response over its model | [`delay`] |
 //! | modes with confidence intervals | [`modal`] |
 //! | whether there are CNMP zeros | [`verdict`] |
-//! | external records as CSV, FRFs as CSV | [`external_csv`], [`frf_csv`] |
+//! | FRFs as CSV | [`frf_csv`] |
 //!
 //! Sign convention of all estimators: y = H u, so a lag of the output is a negative phase.
 
@@ -33,7 +33,6 @@ pub mod delay;
 mod error;
 mod estimator;
 mod excited_band;
-pub mod external_csv;
 mod fft;
 mod frf;
 pub mod frf_csv;

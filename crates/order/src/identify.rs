@@ -10,7 +10,7 @@ use super::figure_options::ResponseFigureOptions;
 use super::path_text::path_text;
 use bench_base::quantity::{Dimension, Frequency, Time};
 use bench_experiment::{AnalysisError, ExperimentError};
-use bench_identify::external_csv::{self, Columns, ExternalCsvError, Sampling};
+use bench_external::{Columns, ExternalCsvError, Sampling};
 use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
@@ -266,5 +266,5 @@ fn period_samples(text: &str, rate_hz: f64) -> Option<usize> {
 }
 
 fn names(path: &Path) -> Result<String, ExternalCsvError> {
-    Ok(external_csv::names(path)?.join(", "))
+    Ok(bench_external::names(path)?.join(", "))
 }

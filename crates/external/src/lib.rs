@@ -3,14 +3,16 @@
 //! Columns are separated by commas, semicolons or tabs, whichever is most frequent in the first line. Input and output may have
 //! any units: the [`Signals`] have them as well, and a residue is output per input per second squared.
 
+#![deny(unsafe_code)]
+
 mod error;
 
 use std::path::Path;
 
 pub use error::{ColumnsError, DataError, ExternalCsvError};
 
-use super::Signals;
 use bench_base::input_file::{self, MAX_RECORD_BYTES};
+use bench_identify::Signals;
 
 /// Largest deviation of a time step from the median step, as a ratio: that of times rounded to a few digits.
 const MAX_IRREGULARITY: f64 = 0.1;

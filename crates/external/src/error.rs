@@ -167,7 +167,7 @@ fn number_remedy(text: &str) -> &'static str {
 mod tests {
     use std::path::Path;
 
-    use super::super::{Numbers, Table};
+    use crate::{Numbers, Table};
     use super::*;
 
     /// The error of a table with the columns t, u and y.
