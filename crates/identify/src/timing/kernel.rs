@@ -65,6 +65,12 @@ impl Place {
         }
     }
 
+    /// The indices of the samples among `count` of them; beyond the ends that of the outermost one.
+    pub(super) fn indices_within(&self, count: usize) -> [usize; TAPS] {
+        let last = count as i64 - 1;
+        std::array::from_fn(|tap| self.first.saturating_add(tap as i64).clamp(0, last) as usize)
+    }
+
     fn between(&self, below: f64, above: f64) -> f64 {
         below + (above - below) * self.share
     }
