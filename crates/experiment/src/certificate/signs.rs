@@ -7,7 +7,6 @@ use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use bench_identify::SIGMAS_95;
 use bench_identify::modal::FittedMode;
 use bench_plant::{ModalModel, Sign};
 
@@ -51,7 +50,7 @@ impl SignCheck {
         let limit_hz = HIGHEST * expected.last().map_or(0.0, |(hz, _)| *hz);
         let found: Vec<(f64, char)> = measured
             .iter()
-            .map(|mode| (mode.frequency_hz().value, sign(mode)))
+            .map(|mode| (mode.frequency_hz().value, mode.certain_sign()))
             .filter(|(hz, _)| *hz > 0.0 && *hz <= limit_hz)
             .collect();
         let pairs = matched(&frequencies(&expected), &frequencies(&found));
@@ -98,16 +97,6 @@ fn visible(model: &ModalModel, (from_hz, to_hz): (f64, f64)) -> Vec<(f64, char)>
 
 fn frequencies(modes: &[(f64, char)]) -> Vec<f64> {
     modes.iter().map(|(hz, _)| *hz).collect()
-}
-
-/// The sign of a residue; `?` if it is not certain.
-fn sign(mode: &FittedMode) -> char {
-    let residue = mode.residue_per_kg;
-    if residue.value.abs() > SIGMAS_95 * residue.sigma {
-        mode.sign()
-    } else {
-        '?'
-    }
 }
 
 /// The index of a found frequency for each expected one, both rising; `None` if there are too few. Dynamic programming: `best[i]` is

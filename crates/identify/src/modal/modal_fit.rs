@@ -50,6 +50,16 @@ impl FittedMode {
         Sign::of(self.residue_per_kg.value).symbol()
     }
 
+    /// The sign of the residue; `?` if its 95 % confidence interval contains 0.
+    pub fn certain_sign(&self) -> char {
+        let residue = self.residue_per_kg;
+        if residue.value.abs() > residue.half_width_95() {
+            self.sign()
+        } else {
+            '?'
+        }
+    }
+
     /// Undamped natural frequency in hertz.
     pub fn frequency_hz(&self) -> Estimate {
         self.omega_rad_s.scaled(0.5 * std::f64::consts::FRAC_1_PI)

@@ -10,7 +10,7 @@ use bench_identify::verdict::UncertainZero;
 /// The column that a narrow table can leave out.
 pub const OTHER_SIGN: &str = "Probability of the other sign";
 
-/// The modes with their 95 % confidence intervals.
+/// The modes with their 95 % confidence intervals. A sign is `?` if the interval of the residue contains 0.
 pub fn mode_table(modes: &[FittedMode], residue_unit: &str) -> Table {
     let residue = format!("Residue ({residue_unit})");
     let columns = [
@@ -24,12 +24,12 @@ pub fn mode_table(modes: &[FittedMode], residue_unit: &str) -> Table {
 }
 
 fn mode_row(mode: &FittedMode) -> Vec<String> {
-    let sign = if mode.sign() == '+' { "+" } else { "\u{2212}" };
+    let sign = mode.certain_sign().to_string().replace('-', "\u{2212}");
     vec![
         interval_of(mode.frequency_hz()),
         interval_of(mode.damping_ratio),
         interval_of(mode.residue_per_kg),
-        sign.into(),
+        sign,
         percent(mode.sign_error_probability()),
     ]
 }
