@@ -15,8 +15,8 @@ use bench_experiment::{
     AnalysisError, FrfError, MarginError, MotorError, PlanError, RemoteError, RunError,
 };
 use bench_experiment::{ErrorKind, ErrorObject, ExperimentError, option_in};
-use bench_identify::IdentifyError;
 use bench_external::ExternalCsvError;
+use bench_identify::IdentifyError;
 use bench_order::{ColumnsError, refused_option, usage_message};
 use bench_plant::PlantError;
 use bench_recording::RecordingError;

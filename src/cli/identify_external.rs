@@ -10,7 +10,9 @@ use super::exit::Exit;
 use super::linearity_output;
 use super::modal_output;
 use super::output::print_result;
+use super::table::labelled;
 use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFiles};
+use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::{Distortion, DistortionSource};
@@ -32,6 +34,8 @@ struct Report {
     lost_records: u64,
     truncated: bool,
     rate_hz: f64,
+    /// Whether the rate was given, the times are regular, or both columns were resampled.
+    times: TimeBase,
     band_hz: (f64, f64),
     /// Hold and lag of the input that were assumed; 0 without them.
     hold_s: f64,
@@ -68,7 +72,7 @@ pub(super) fn run(
     json: bool,
 ) -> Result<Exit, CliError> {
     let columns = options.columns(path)?;
-    let signals = bench_external::read(path, &columns)?;
+    let Record { signals, times } = bench_external::read(path, &columns)?;
     signals.check()?;
     let identification = options.identification(&signals)?;
     let analysis = identification.run(&signals.input, &signals.output);
@@ -81,6 +85,7 @@ pub(super) fn run(
         output: &columns.output,
         rate_hz: signals.rate_hz,
         samples: signals.len(),
+        times,
         magnitude_axis,
     };
     let results = ResultFiles {
@@ -114,6 +119,7 @@ impl Report {
             lost_records: 0,
             truncated: false,
             rate_hz: record.rate_hz,
+            times: record.times,
             band_hz: analysis.band_hz,
             hold_s: analysis.input_path.hold_s,
             input_lag_s: analysis.input_path.lag_s,
@@ -136,7 +142,7 @@ impl Report {
         let coherence = self.coherence_median.unwrap_or(0.0);
         let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "{}{}\n{}  residues   in `{output}`/(`{input}` s^2) instead of the 1/kg in the table\n  fit        reduced chi-square {chi2:.3}\n{}",
+            "{}{}\n{}  residues   in `{output}`/(`{input}` s^2)\n  fit        reduced chi-square {chi2:.3}\n{}",
             self.record_text(),
             response_text(&self.frf_csv, self.frequencies, coherence),
             pages_text(&self.pages),
@@ -147,14 +153,23 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
             self.output,
+            self.times_text(),
             self.input_path_text()
         )
+    }
+
+    /// Irregular times, if the file has them.
+    fn times_text(&self) -> String {
+        match self.times {
+            TimeBase::Resampled { .. } => labelled("times", &self.times.to_string()),
+            TimeBase::Given | TimeBase::Regular => String::new(),
+        }
     }
 
     /// The averaged periods and the distortion of a periodic record.

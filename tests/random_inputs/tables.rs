@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use bench_external::{Columns, Sampling};
+use bench_external::{Columns, Record, Sampling};
 use bench_identify::frf_csv;
 
 use crate::random_inputs::damage::{check_damaged, check_damaged_text};
@@ -40,7 +40,7 @@ fn naive_rows(text: &str) -> usize {
 
 fn external(path: &Path, bytes: &[u8], columns: &Columns) -> bool {
     std::fs::write(path, bytes).expect("a file");
-    let Ok(signals) = bench_external::read(path, columns) else {
+    let Ok(Record { signals, .. }) = bench_external::read(path, columns) else {
         return false;
     };
     assert!(signals.rate_hz > 0.0 && signals.rate_hz.is_finite());
@@ -61,7 +61,10 @@ fn damaged_external_record_is_refused_or_finite() {
         output: "y".into(),
         sampling,
     };
-    let timed = columns(Sampling::TimeColumn("t".into()));
+    let timed = columns(Sampling::TimeColumn {
+        name: "t".into(),
+        unit: None,
+    });
     let at_rate = columns(Sampling::RateHz(1000.0));
     check_damaged("external record", &[valid.as_bytes()], |bytes| {
         let is_timed = external(&path, bytes, &timed);

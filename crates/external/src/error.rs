@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use super::content::ForeignFormat;
+
 /// Why a file cannot be read as a record. Messages state file, line, value and remedy.
 #[derive(Debug, Error)]
 #[non_exhaustive]
@@ -54,12 +56,56 @@ pub enum ColumnsError {
         /// Names of the columns of the file.
         available: Vec<String>,
     },
+    /// The columns have no names, and no such number.
+    #[error(
+        "{path} has no line with the names of its columns; select a column by its number, from 1 to {columns}, in place of `{name}`",
+        path = .path.display()
+    )]
+    NoNames {
+        /// The file.
+        path: PathBuf,
+        /// The given name.
+        name: String,
+        /// Number of columns.
+        columns: usize,
+    },
 }
 
 /// Why a file is not a table of numbers with regular times. Lines are those of the file, from 1.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum DataError {
+    /// The file has another format than text.
+    #[error("{path} is {}, not a table of text; {}", .format.name(), .format.remedy(), path = .path.display())]
+    Foreign {
+        /// The file.
+        path: PathBuf,
+        /// Its format.
+        format: ForeignFormat,
+    },
+    /// No line has two numbers.
+    #[error(
+        "{path} has no lines with numbers in at least two columns; a record is a table with one sample per line",
+        path = .path.display()
+    )]
+    NoColumns {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The unit of the times is not known, and they are no seconds by their size.
+    #[error(
+        "{path}: the times in column `{column}` have steps of {step}, and neither the name nor a line of units states their unit; \
+         give --time-unit s, ms, us or ns, or --rate HZ if it counts the samples",
+        path = .path.display()
+    )]
+    NoTimeUnit {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column of times.
+        column: String,
+        /// Step in the unit of the file.
+        step: f64,
+    },
     /// The text is not a table.
     #[error(
         "{path}{}: {reason}; repair the file: a record is a table with one sample per line",
@@ -167,19 +213,18 @@ fn number_remedy(text: &str) -> &'static str {
 mod tests {
     use std::path::Path;
 
-    use crate::{Numbers, Table};
     use super::*;
+    use crate::TimeUnit;
+    use crate::table::Table;
 
     /// The error of a table with the columns t, u and y.
     fn error_of(rows: &str) -> ExternalCsvError {
-        let table = Table {
-            path: Path::new("data.csv"),
-            text: format!("t,u,y\n{rows}").into_bytes(),
-        };
-        let rate_hz = |Numbers { lines, values }: Numbers| table.rate_hz("t", &values[2], &lines);
-        let numbers = table.numbers(&["u", "y", "t"]);
-        let rate_hz = numbers.and_then(|numbers| Ok(rate_hz(numbers)?));
-        rate_hz.expect_err("an invalid table")
+        let names = ["u", "y", "t"].map(String::from);
+        let table = Table::of(Path::new("data.csv"), format!("t,u,y\n{rows}"));
+        let record = table.and_then(|table| {
+            table.numbers_and_times([&names[0], &names[1]], &names[2], Some(TimeUnit::S))
+        });
+        record.map(drop).expect_err("an invalid table")
     }
 
     #[test]
@@ -257,11 +302,10 @@ mod tests {
 
     #[test]
     fn error_of_an_unknown_column_holds_the_available_ones() {
-        let table = Table {
-            path: Path::new("data.csv"),
-            text: b"t,u,y\n0,1,2\n".to_vec(),
-        };
-        let error = table.numbers(&["u", "v"]).err().expect("no column v");
+        let table = Table::of(Path::new("data.csv"), "t,u,y\n0,1,2\n1,2,3\n".into());
+        let names = ["u", "v"].map(String::from);
+        let found = table.and_then(|table| table.numbers([&names[0], &names[1]]));
+        let error = found.expect_err("no column v");
         assert_eq!(
             error.to_string(),
             "data.csv has no column `v`; choose one of t, u, y"

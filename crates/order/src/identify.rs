@@ -10,7 +10,7 @@ use super::figure_options::ResponseFigureOptions;
 use super::path_text::path_text;
 use bench_base::quantity::{Dimension, Frequency, Time};
 use bench_experiment::{AnalysisError, ExperimentError};
-use bench_external::{Columns, ExternalCsvError, Sampling};
+use bench_external::{Columns, ExternalCsvError, Sampling, TimeUnit};
 use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
@@ -66,7 +66,7 @@ pub struct ExternalOptions {
     /// Output column: the displacement or a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     pub output: Option<String>,
-    /// Time column, in seconds; the times must be equally spaced
+    /// Time column: numbers, or dates such as 2026-11-26T12:40:48.002Z. Times that are not equally spaced are taken as true
     #[arg(
         long,
         value_name = "COLUMN",
@@ -74,6 +74,9 @@ pub struct ExternalOptions {
         conflicts_with = "rate"
     )]
     pub time: Option<String>,
+    /// Unit of the times [default: that in the name of the column (time_ms, "t [us]") or in a line of units, otherwise s]
+    #[arg(long, value_name = "UNIT", requires = "time", value_enum)]
+    pub time_unit: Option<TimeUnit>,
     /// Sampling rate, for a CSV file without a time column
     #[arg(
         long,
@@ -145,7 +148,10 @@ impl ExternalOptions {
 
     fn sampling(&self, path: &Path) -> Result<Sampling, ColumnsError> {
         match (&self.time, &self.rate) {
-            (Some(time), _) => Ok(Sampling::TimeColumn(time.clone())),
+            (Some(time), _) => Ok(Sampling::TimeColumn {
+                name: time.clone(),
+                unit: self.time_unit,
+            }),
             (None, Some(rate)) => Ok(Sampling::RateHz(checked_rate_hz(rate.si())?)),
             (None, None) => {
                 let names = names(path)?;

@@ -5,6 +5,7 @@ use super::distortion_plot::distortion_plot;
 use super::page::{delay_ms, named};
 use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
+use bench_external::TimeBase;
 use bench_identify::ExternalAnalysis;
 use bench_identify::Unit;
 use bench_identify::modal::MeasurementChain;
@@ -24,6 +25,8 @@ pub struct ExternalRecord<'a> {
     pub rate_hz: f64,
     /// Number of samples.
     pub samples: usize,
+    /// The times of the file.
+    pub times: TimeBase,
     /// Axis of the magnitudes.
     pub magnitude_axis: MagnitudeAxis,
 }
@@ -74,6 +77,7 @@ impl<'a> ExternalRecord<'a> {
             ("Output", Some(self.output.to_string())),
             ("Samples", Some(self.samples.to_string())),
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
+            ("Times", Some(self.times.to_string())),
             (
                 "Hold of the input",
                 milliseconds(self.analysis.input_path.hold_s),

@@ -1,0 +1,488 @@
+//! The times of samples: their unit, and whether they are regular.
+//!
+//! ```text
+//! d_k = t_k - (t + k T)            deviation from the regular times of least squares
+//! |d_k| < 0.75 digits of the file  regular times, rounded: the period is T, which is more exact than that of both ends
+//! larger                           irregular times, which are true: the samples are resampled
+//! a step of 1.5 median steps       a gap, refused
+//! ```
+
+use std::fmt;
+
+use jiff::civil::DateTime;
+use jiff::{Timestamp, tz};
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// Largest deviation of a step from the median step, as a ratio.
+const MAX_IRREGULARITY: f64 = 0.5;
+/// Largest deviation of a rounded time from the line through all of them, as a ratio of its last digit: half a digit, and some more
+/// because the line has an error as well.
+const ROUNDED: f64 = 0.75;
+/// A deviation from regular times of this ratio of the period changes nothing: at half the rate it turns the phase by 0.02 degrees.
+const NEGLIGIBLE: f64 = 1e-4;
+/// A longer step is probably not in seconds, if the file does not say so.
+const LONGEST_STEP: f64 = 0.5;
+
+/// A unit of time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum TimeUnit {
+    /// Seconds.
+    S,
+    /// Milliseconds.
+    Ms,
+    /// Microseconds.
+    Us,
+    /// Nanoseconds.
+    Ns,
+    /// Minutes.
+    Min,
+}
+
+impl TimeUnit {
+    /// Length in seconds.
+    pub fn seconds(self) -> f64 {
+        match self {
+            TimeUnit::S => 1.0,
+            TimeUnit::Ms => 1e-3,
+            TimeUnit::Us => 1e-6,
+            TimeUnit::Ns => 1e-9,
+            TimeUnit::Min => 60.0,
+        }
+    }
+
+    /// The unit that a name or a cell of units states: `time_ms`, `Time [ms]`, `t (us)`, `ns`.
+    ///
+    /// ```
+    /// use bench_external::TimeUnit;
+    /// assert_eq!(TimeUnit::stated_in("timestamp_ns"), Some(TimeUnit::Ns));
+    /// assert_eq!(TimeUnit::stated_in("Time [s, rel.]"), Some(TimeUnit::S));
+    /// assert_eq!(TimeUnit::stated_in("time"), None);
+    /// ```
+    pub fn stated_in(text: &str) -> Option<TimeUnit> {
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        words
+            .rev()
+            .find_map(|word| match word.to_lowercase().as_str() {
+                "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::S),
+                "ms" | "msec" | "millisecond" | "milliseconds" => Some(TimeUnit::Ms),
+                "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" => {
+                    Some(TimeUnit::Us)
+                }
+                "ns" | "nsec" | "nanosecond" | "nanoseconds" => Some(TimeUnit::Ns),
+                "min" | "minute" | "minutes" => Some(TimeUnit::Min),
+                _ => None,
+            })
+    }
+}
+
+/// What the times of a record are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum TimeBase {
+    /// The rate was given.
+    Given,
+    /// Regular times, apart from their rounding.
+    Regular,
+    /// Irregular times, at which the samples were measured; the signals are resampled at regular ones.
+    Resampled {
+        /// Largest deviation from regular times in seconds.
+        largest_deviation_s: f64,
+    },
+}
+
+impl fmt::Display for TimeBase {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            TimeBase::Given => f.write_str("the given rate"),
+            TimeBase::Regular => f.write_str("regular times"),
+            TimeBase::Resampled {
+                largest_deviation_s,
+            } => write!(
+                f,
+                "the times deviate by up to {:.3} ms from regular ones, and are taken as true: both columns are resampled",
+                1e3 * largest_deviation_s
+            ),
+        }
+    }
+}
+
+/// A time as written, exact also for nanoseconds since 1970.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stamp {
+    whole: i128,
+    fraction: f64,
+    /// Digits after the point; `None` for a number with an exponent.
+    decimals: Option<u32>,
+    /// Whether it is a date, whose unit is the second.
+    is_date: bool,
+}
+
+/// Whether a cell is a date with a time.
+pub(crate) fn is_stamp(cell: &str) -> bool {
+    date(cell).is_some()
+}
+
+/// Nanoseconds since 1970 of a date, with or without the offset of its zone.
+fn date(cell: &str) -> Option<i128> {
+    // Cheap to refuse: a date has at least `2026-11-26T12:40`.
+    if cell.len() < 16 || !cell.is_char_boundary(10) || !cell[..10].contains('-') {
+        return None;
+    }
+    let timestamp = cell.parse::<Timestamp>().ok().or_else(|| {
+        let civil: DateTime = cell.parse().ok()?;
+        tz::TimeZone::UTC.to_timestamp(civil).ok()
+    });
+    timestamp.map(Timestamp::as_nanosecond)
+}
+
+impl Stamp {
+    /// The time in a cell, with this decimal separator.
+    pub fn parse(cell: &str, decimal_comma: bool) -> Option<Stamp> {
+        let point = if decimal_comma { ',' } else { '.' };
+        Stamp::decimal(cell, point)
+            .or_else(|| Stamp::date(cell))
+            .or_else(|| Stamp::floating(&cell.replacen(point, ".", 1)))
+    }
+
+    fn decimal(cell: &str, point: char) -> Option<Stamp> {
+        let (whole, digits) = cell.split_once(point).unwrap_or((cell, ""));
+        if !digits.bytes().all(|byte| byte.is_ascii_digit()) || digits.len() > 18 {
+            return None;
+        }
+        let sign = if whole.starts_with('-') { -1.0 } else { 1.0 };
+        let whole = match whole {
+            "" | "-" | "+" if !digits.is_empty() => 0,
+            whole => whole.parse().ok()?,
+        };
+        let fraction = if digits.is_empty() {
+            0.0
+        } else {
+            sign * format!("0.{digits}").parse::<f64>().ok()?
+        };
+        Some(Stamp {
+            whole,
+            fraction,
+            decimals: Some(digits.len() as u32),
+            is_date: false,
+        })
+    }
+
+    fn date(cell: &str) -> Option<Stamp> {
+        const NS_PER_S: i128 = 1_000_000_000;
+        let ns = date(cell)?;
+        let digits = cell.rsplit_once(['.', ',']).map_or(0, |(_, rest)| {
+            rest.bytes().take_while(u8::is_ascii_digit).count() as u32
+        });
+        Some(Stamp {
+            whole: ns.div_euclid(NS_PER_S),
+            fraction: ns.rem_euclid(NS_PER_S) as f64 * 1e-9,
+            decimals: Some(digits),
+            is_date: true,
+        })
+    }
+
+    fn floating(text: &str) -> Option<Stamp> {
+        let number: f64 = text.parse().ok()?;
+        // Beyond 2^63 no clock counts.
+        if !(number.abs() < 9.2e18) {
+            return None;
+        }
+        Some(Stamp {
+            whole: number.trunc() as i128,
+            fraction: number.fract(),
+            decimals: None,
+            is_date: false,
+        })
+    }
+
+    /// The time from another one, in the unit of both.
+    fn since(&self, start: &Stamp) -> f64 {
+        (self.whole - start.whole) as f64 + (self.fraction - start.fraction)
+    }
+}
+
+/// Why times are refused. Places are indices of samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum TimeDefect {
+    TooFew,
+    /// The unit is not stated, and the steps are long for seconds.
+    NoUnit {
+        step: f64,
+    },
+    NotRising {
+        at: usize,
+        time_s: f64,
+        previous_s: f64,
+    },
+    Gap {
+        at: usize,
+        step_s: f64,
+        median_s: f64,
+    },
+}
+
+/// Times in seconds from the first one.
+#[derive(Debug)]
+pub(crate) struct Times {
+    pub time_s: Vec<f64>,
+    /// Of regular times that of least squares, of others the mean one.
+    pub period_s: f64,
+    pub base: TimeBase,
+}
+
+impl Times {
+    /// The times of some stamps, in a unit if it is known.
+    pub fn new(stamps: &[Stamp], unit: Option<TimeUnit>) -> Result<Times, TimeDefect> {
+        let [first, _, ..] = stamps else {
+            return Err(TimeDefect::TooFew);
+        };
+        let unit = if first.is_date {
+            Some(TimeUnit::S)
+        } else {
+            unit
+        };
+        let unit_s = unit.map_or(1.0, TimeUnit::seconds);
+        let stamps_s = stamps.iter().map(|stamp| unit_s * stamp.since(first));
+        let time_s: Vec<f64> = stamps_s.collect();
+        check_rising(&time_s)?;
+        let line = Line::through(&time_s);
+        if unit.is_none() && line.period_s >= LONGEST_STEP {
+            let step = line.period_s;
+            return Err(TimeDefect::NoUnit { step });
+        }
+        let largest_s = line.largest_deviation_s(&time_s);
+        let rounding_s = ROUNDED * unit_s * rounding(stamps);
+        if largest_s <= rounding_s.max(NEGLIGIBLE * line.period_s) {
+            return Ok(Times {
+                time_s,
+                period_s: line.period_s,
+                base: TimeBase::Regular,
+            });
+        }
+        check_gaps(&time_s)?;
+        let mean_s = time_s[time_s.len() - 1] / (time_s.len() - 1) as f64;
+        Ok(Times {
+            time_s,
+            period_s: mean_s,
+            base: TimeBase::Resampled {
+                largest_deviation_s: largest_s,
+            },
+        })
+    }
+}
+
+/// The line of least squares through times.
+struct Line {
+    start_s: f64,
+    period_s: f64,
+}
+
+impl Line {
+    fn through(time_s: &[f64]) -> Line {
+        let centre = (time_s.len() - 1) as f64 / 2.0;
+        let mean_s = time_s.iter().sum::<f64>() / time_s.len() as f64;
+        let places = || (0..time_s.len()).map(|k| k as f64 - centre);
+        let squares: f64 = places().map(|place| place * place).sum();
+        let products: f64 = places()
+            .zip(time_s)
+            .map(|(place, t)| place * (t - mean_s))
+            .sum();
+        let period_s = products / squares;
+        Line {
+            start_s: mean_s - period_s * centre,
+            period_s,
+        }
+    }
+
+    fn largest_deviation_s(&self, time_s: &[f64]) -> f64 {
+        let regular = (0..time_s.len()).map(|k| self.start_s + k as f64 * self.period_s);
+        let deviations = regular.zip(time_s).map(|(regular, t)| (t - regular).abs());
+        deviations.fold(0.0, f64::max)
+    }
+}
+
+fn check_gaps(time_s: &[f64]) -> Result<(), TimeDefect> {
+    let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let median_s = median(&steps_s);
+    let limit_s = MAX_IRREGULARITY * median_s;
+    let gap = steps_s
+        .iter()
+        .position(|step_s| (step_s - median_s).abs() > limit_s);
+    match gap {
+        Some(k) if steps_s[k] <= 0.0 => Err(TimeDefect::NotRising {
+            at: k + 1,
+            time_s: time_s[k + 1],
+            previous_s: time_s[k],
+        }),
+        Some(k) => Err(TimeDefect::Gap {
+            at: k + 1,
+            step_s: steps_s[k],
+            median_s,
+        }),
+        None => Ok(()),
+    }
+}
+
+/// A time before the one of the line above is an error; equal ones may be rounded, but not all of them.
+fn check_rising(time_s: &[f64]) -> Result<(), TimeDefect> {
+    let constant = time_s.iter().all(|t| *t == time_s[0]);
+    let falls = time_s
+        .windows(2)
+        .position(|pair| constant || !(pair[1] >= pair[0]));
+    match falls {
+        Some(k) => Err(TimeDefect::NotRising {
+            at: k + 1,
+            time_s: time_s[k + 1],
+            previous_s: time_s[k],
+        }),
+        None => Ok(()),
+    }
+}
+
+/// One digit of the finest stamp: times with fewer digits at the end of a number have lost zeros.
+fn rounding(stamps: &[Stamp]) -> f64 {
+    let digits = stamps.iter().map(|stamp| stamp.decimals);
+    let most = digits
+        .collect::<Option<Vec<u32>>>()
+        .and_then(|digits| digits.into_iter().max());
+    most.map_or(0.0, |digits| 0.1_f64.powi(digits as i32))
+}
+
+/// The median of at least one value.
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(cells: &[String], unit: Option<TimeUnit>) -> Result<Times, TimeDefect> {
+        let stamps: Vec<Stamp> = cells
+            .iter()
+            .map(|cell| Stamp::parse(cell, false).unwrap_or_else(|| panic!("{cell}")))
+            .collect();
+        Times::new(&stamps, unit)
+    }
+
+    /// The period of samples at 500 Hz whose times a function writes.
+    fn period_s(unit: Option<TimeUnit>, write: impl Fn(usize) -> String) -> f64 {
+        let cells: Vec<String> = (0..100).map(write).collect();
+        let times = times(&cells, unit).unwrap_or_else(|defect| panic!("{defect:?}"));
+        assert_eq!(times.base, TimeBase::Regular, "{}", cells[1]);
+        times.period_s
+    }
+
+    #[test]
+    fn times_of_every_unit_and_form_are_exact() {
+        let (s, ms, ns) = (Some(TimeUnit::S), Some(TimeUnit::Ms), Some(TimeUnit::Ns));
+        for found in [
+            period_s(s, |k| format!("{}", k as f64 * 0.002)),
+            period_s(None, |k| format!("{}", k as f64 * 0.002)),
+            period_s(s, |k| format!("-{}", 10.0 - k as f64 * 0.002)),
+            period_s(ms, |k| format!("{}", 2 * k)),
+            // Doubles of this size are 256 ns apart.
+            period_s(ns, |k| {
+                format!("{}", 1_700_000_000_000_000_000_u64 + 2_000_000 * k as u64)
+            }),
+            period_s(s, |k| format!("1700000000.{:09}", 2_000_000 * k)),
+            period_s(s, |k| format!("{:e}", k as f64 * 0.002)),
+            period_s(None, |k| format!("2026-11-26T12:40:48.{:03}Z", 2 * k)),
+            period_s(None, |k| format!("2026-11-26 12:40:48.{:06}", 2000 * k)),
+            period_s(None, |k| format!("2026-11-26T12:40:48.{:03}+01:00", 2 * k)),
+        ] {
+            assert!((found / 0.002 - 1.0).abs() < 1e-9, "{found}");
+        }
+    }
+
+    #[test]
+    fn rounded_times_are_regular() {
+        // 1.5 kHz in milliseconds: steps of 0 and 1 ms.
+        let cells: Vec<String> = (0..1000)
+            .map(|k| format!("{:.3}", k as f64 / 1500.0))
+            .collect();
+        let times = times(&cells, Some(TimeUnit::S)).unwrap_or_else(|defect| panic!("{defect:?}"));
+        assert_eq!(times.base, TimeBase::Regular);
+        // The slope through n times with uniform errors of one digit q: q/sqrt(12) sqrt(12/n^3), 3 sigma.
+        let limit = 3.0 * 1e-3 * 1500.0 / 1000_f64.powf(1.5);
+        assert!(
+            (times.period_s * 1500.0 - 1.0).abs() < limit,
+            "{}",
+            times.period_s
+        );
+    }
+
+    #[test]
+    fn drift_and_jitter_are_true_times() {
+        let drift = |k: usize| 0.002 * k as f64 + 1e-8 * (k * k) as f64;
+        let cells: Vec<String> = (0..1000).map(|k| format!("{:.9}", drift(k))).collect();
+        let times = times(&cells, Some(TimeUnit::S)).unwrap_or_else(|defect| panic!("{defect:?}"));
+        let TimeBase::Resampled {
+            largest_deviation_s,
+        } = times.base
+        else {
+            panic!("{:?}", times.base);
+        };
+        // c k^2 deviates most from its line of least squares at the ends: c n^2/6, with n = 999.
+        assert!(
+            (largest_deviation_s / 1.6634e-3 - 1.0).abs() < 3e-3,
+            "{largest_deviation_s}"
+        );
+    }
+
+    #[test]
+    fn gaps_and_times_that_fall_are_refused_with_their_place() {
+        let cells = |times: &[f64]| times.iter().map(|t| format!("{t}")).collect::<Vec<_>>();
+        let unit = Some(TimeUnit::S);
+        let gap = times(&cells(&[0.0, 0.1, 0.2, 0.45, 0.55]), unit).err();
+        assert!(
+            matches!(gap, Some(TimeDefect::Gap { at: 3, .. })),
+            "{gap:?}"
+        );
+        let falls = times(&cells(&[0.0, 0.1, 0.05]), unit).err();
+        assert!(
+            matches!(falls, Some(TimeDefect::NotRising { at: 2, .. })),
+            "{falls:?}"
+        );
+        let equal = times(&cells(&[1.0, 1.0, 1.0]), unit).err();
+        assert!(
+            matches!(equal, Some(TimeDefect::NotRising { .. })),
+            "{equal:?}"
+        );
+        assert_eq!(times(&cells(&[1.0]), unit).err(), Some(TimeDefect::TooFew));
+    }
+
+    #[test]
+    fn long_steps_without_a_unit_are_refused() {
+        let cells: Vec<String> = (0..10).map(|k| format!("{}", 2 * k)).collect();
+        assert_eq!(
+            times(&cells, None).err(),
+            Some(TimeDefect::NoUnit { step: 2.0 })
+        );
+        let times = times(&cells, Some(TimeUnit::S)).unwrap_or_else(|defect| panic!("{defect:?}"));
+        assert_eq!(times.period_s, 2.0);
+    }
+
+    #[test]
+    fn units_are_read_from_names() {
+        for (name, unit) in [
+            ("time_ms", Some(TimeUnit::Ms)),
+            ("t (us)", Some(TimeUnit::Us)),
+            ("Time [µs]", Some(TimeUnit::Us)),
+            ("ns", Some(TimeUnit::Ns)),
+            ("time/s", Some(TimeUnit::S)),
+            ("seconds", Some(TimeUnit::S)),
+            ("elapsed_min", Some(TimeUnit::Min)),
+            ("time", None),
+            ("t", None),
+            ("sample", None),
+        ] {
+            assert_eq!(TimeUnit::stated_in(name), unit, "{name}");
+        }
+    }
+}
