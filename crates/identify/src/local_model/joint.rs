@@ -32,10 +32,10 @@ use nalgebra::Complex;
 
 use super::frf_data::of_spectra;
 use super::local::{collect, h1};
-use super::model::{self, FittedModel};
+use super::model;
 use super::record_spectra::RecordSpectra;
-use super::spectra::Spectra;
-use super::window::{LocalFit, Window};
+use super::spectra::{Place, Spectra};
+use super::window::{FittedModel, LocalFit, Window};
 use crate::fft::RealFft;
 use crate::{EstimatorSettings, Frf, IdentifyError, Signals, SignalsError, band};
 
@@ -170,12 +170,12 @@ impl Spectra for Ratio<'_> {
 
     fn fit(
         &self,
-        position: f64,
-        half_width: f64,
+        place: Place,
         settings: &EstimatorSettings,
+        max_poles: usize,
     ) -> Option<LocalFit> {
-        let input = Side::fit(self.input, position, half_width, settings)?;
-        let output = Side::fit(self.output, position, half_width, settings)?;
+        let input = Side::fit(self.input, place, settings, max_poles)?;
+        let output = Side::fit(self.output, place, settings, max_poles)?;
         ratio_fit(&input, &output)
     }
 
@@ -201,13 +201,13 @@ struct Side {
 impl Side {
     fn fit(
         spectra: &RecordSpectra,
-        position: f64,
-        half_width: f64,
+        place: Place,
         settings: &EstimatorSettings,
+        max_poles: usize,
     ) -> Option<Side> {
-        let window = spectra.window(position, half_width);
+        let window = spectra.window(place);
         Some(Side {
-            model: model::fit(&window, settings)?,
+            model: model::fit(&window, settings, max_poles)?,
             window,
         })
     }

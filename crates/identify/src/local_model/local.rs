@@ -37,11 +37,14 @@ use core::ops::RangeInclusive;
 use super::frf_data;
 use super::noise_floor::NoiseFloor;
 use super::record_spectra::RecordSpectra;
-use super::spectra::Spectra;
+use super::spectra::{Place, Spectra};
 use crate::estimator::{hv, inverse};
 use crate::{
     Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, LocalModel, Signals, band,
 };
+
+/// The response is estimated with the pole of one mode at most.
+const ONE_POLE: usize = 1;
 
 /// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` that have input, with its data for a fit.
 ///
@@ -153,11 +156,18 @@ fn point(
     floor: &NoiseFloor<'_>,
 ) -> Option<FrfPoint> {
     let half_width = settings.half_width(position, spectra.bin_hz());
-    let fit = spectra.fit(position, half_width, settings)?;
+    let fit_over = |half_width| {
+        let place = Place {
+            position,
+            half_width,
+        };
+        spectra.fit(place, settings, ONE_POLE)
+    };
+    let fit = fit_over(half_width)?;
     if !fit.encloses_input {
         return None;
     }
-    let wider = spectra.fit(position, 2.0 * half_width, settings)?;
+    let wider = fit_over(2.0 * half_width)?;
     let bias = (wider.response - fit.response) / bias_ratio(settings.curve);
     Some(FrfPoint {
         frequency_hz: position * spectra.bin_hz(),

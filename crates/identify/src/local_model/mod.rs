@@ -13,6 +13,7 @@ mod least_squares;
 pub mod local;
 mod model;
 mod noise_floor;
+mod rational;
 mod record_spectra;
 mod settings;
 mod spectra;

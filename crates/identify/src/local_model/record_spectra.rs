@@ -3,7 +3,7 @@
 use nalgebra::Complex;
 
 use super::model;
-use super::spectra::Spectra;
+use super::spectra::{Place, Spectra};
 use super::window::{LocalFit, Window};
 use crate::fft::RealFft;
 use crate::{EstimatorSettings, Signals};
@@ -65,7 +65,11 @@ impl RecordSpectra {
     }
 
     /// The bins around a position; bin 0, which holds the probe's offset, is excluded.
-    pub(super) fn window(&self, position: f64, half_width: f64) -> Window {
+    pub(super) fn window(&self, place: Place) -> Window {
+        let Place {
+            position,
+            half_width,
+        } = place;
         let low = (position - half_width).floor().max(0.0) as usize + 1;
         let high = ((position + half_width).ceil() as usize - 1).min(self.last_bin());
         let x: Vec<f64> = (low..=high)
@@ -95,11 +99,11 @@ impl Spectra for RecordSpectra {
 
     fn fit(
         &self,
-        position: f64,
-        half_width: f64,
+        place: Place,
         settings: &EstimatorSettings,
+        max_poles: usize,
     ) -> Option<LocalFit> {
-        Some(model::fit(&self.window(position, half_width), settings)?.fit)
+        Some(model::fit(&self.window(place), settings, max_poles)?.fit)
     }
 
     fn input_cross(&self, bin: usize) -> Complex<f64> {

@@ -5,15 +5,22 @@ use nalgebra::Complex;
 use super::window::LocalFit;
 use crate::EstimatorSettings;
 
+/// A neighbourhood, in bins.
+#[derive(Clone, Copy)]
+pub(super) struct Place {
+    pub(super) position: f64,
+    pub(super) half_width: f64,
+}
+
 /// Spectra of an input U, an output Y and an instrument R, which is independent of the noise; in open loop R is U.
 pub(super) trait Spectra {
     /// Width of a bin in hertz.
     fn bin_hz(&self) -> f64;
     /// The highest bin below the Nyquist frequency.
     fn last_bin(&self) -> usize;
-    /// The response in the middle of a neighbourhood, position and half-width in bins; `None` where the instrument has no
-    /// energy.
-    fn fit(&self, position: f64, half_width: f64, settings: &EstimatorSettings)
+    /// The response in the middle of a neighbourhood, by a local model with at most `max_poles` poles; `None` where the instrument has
+    /// no energy.
+    fn fit(&self, place: Place, settings: &EstimatorSettings, max_poles: usize)
     -> Option<LocalFit>;
     /// U conj(R) of a bin.
     fn input_cross(&self, bin: usize) -> Complex<f64>;

@@ -33,6 +33,24 @@ pub(super) struct LocalFit {
     pub(super) encloses_input: bool,
 }
 
+/// A local model with the linear solution that it was found by.
+pub(super) struct FittedModel {
+    pub(super) fit: LocalFit,
+    /// The last linear step; the residual is that of the model.
+    pub(super) linear: LeastSquares,
+}
+
+impl LocalFit {
+    /// Fisher's F of this model against a simpler one: the power that its additional parameters explain over that of the remaining
+    /// noise.
+    pub(super) fn f_statistic(&self, simple: &LocalFit) -> f64 {
+        let explained =
+            (simple.residual_power - self.residual_power) / (simple.freedom - self.freedom);
+        // 0/0 where the simpler model explains everything: f64::max returns the 0.
+        (explained * self.freedom / self.residual_power).max(0.0)
+    }
+}
+
 impl Window {
     /// Number of bins.
     pub(super) fn len(&self) -> usize {
@@ -42,6 +60,11 @@ impl Window {
     /// Whether there is input in the middle, or on both sides of it: no estimate beyond the outermost excited bin.
     pub(super) fn encloses_input(&self) -> bool {
         self.excited_x().any(|x| x <= 0.0) && self.excited_x().any(|x| x >= 0.0)
+    }
+
+    /// Number of bins that have input.
+    pub(super) fn excited(&self) -> usize {
+        self.excited_x().count()
     }
 
     /// The distances of the bins that have input.
@@ -64,7 +87,7 @@ impl Window {
     /// The highest degree for which more than twice as many bins are excited as there are unknowns.
     pub(super) fn degree(&self, model: LocalModel, transient: bool) -> usize {
         let max_degree = if model == LocalModel::Constant { 0 } else { 2 };
-        let excited = self.excited_x().count();
+        let excited = self.excited();
         let polynomials = if transient { 2 } else { 1 };
         (1..=max_degree)
             .rev()
