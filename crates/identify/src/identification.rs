@@ -30,6 +30,8 @@ pub struct ExternalAnalysis {
     pub verdict: Verdict,
     /// The hold and the lag of the input that were assumed.
     pub input_path: InputPath,
+    /// The chain from the input to the force that follows from them.
+    pub chain: MeasurementChain,
     /// The analysed band in hertz.
     pub band_hz: (f64, f64),
     /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
@@ -227,7 +229,7 @@ fn analyse(
     repetition: Option<Repetition>,
     input_path: InputPath,
 ) -> Result<ExternalAnalysis, IdentificationError> {
-    let chain = MeasurementChain::Input(input_path);
+    let chain = input_path.chain(signals.rate_hz);
     signals.check()?;
     // The lines of a periodic record are estimated one by one.
     let stray_lines = match repetition {
@@ -265,6 +267,7 @@ fn analyse(
         fit,
         verdict,
         input_path,
+        chain,
         band_hz,
         judged_up_to_rad_s,
         periodic,

@@ -12,11 +12,11 @@ const FAR_RAD_S: f64 = 1e6;
 /// The signal path between set-point and reading, without the mechanics.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
-    /// Hold, motor, amplifier and delays of a bench; input in amperes. Exact, aliasing included.
+    /// A command held over each period, amplifier, motor and delays; input in amperes for a bench. Exact, aliasing included.
     Bench(SignalPath),
     /// No chain: the input is a force in newtons, or another input unit.
     Direct,
-    /// Hold and lag between the recorded input and the force.
+    /// Lag between the measured input and the force, or a hold that is not a period of the samples. Without aliasing.
     Input(InputPath),
 }
 
@@ -33,7 +33,30 @@ pub struct InputPath {
     pub lag_s: f64,
 }
 
+/// Aliases, turned by the sampling frequency times a change of the delay, are the same below this angle.
+const ALIAS_PHASE_RAD: f64 = 0.1;
+/// A hold that differs from a period by less than this ratio is one: the times of a file are rounded.
+const HOLD_ROUNDING: f64 = 1e-6;
+/// Lag of a held input without one, as a ratio of the period: the exact discretisation contains a lag. It delays the response by itself,
+/// which the fitted delay removes, and changes its magnitude by (w tau)^2/2: 5e-8 at the Nyquist frequency.
+const LEAST_LAG_RATIO: f64 = 1e-4;
+
 impl InputPath {
+    /// The chain of signals with this many samples per second. A sample held for its period is observed exactly, aliases included.
+    pub fn chain(&self, rate_hz: f64) -> MeasurementChain {
+        let held_periods = self.hold_s * rate_hz;
+        if (held_periods - 1.0).abs() > HOLD_ROUNDING {
+            return MeasurementChain::Input(*self);
+        }
+        let lag_s = self.lag_s.max(LEAST_LAG_RATIO * self.hold_s);
+        MeasurementChain::Bench(SignalPath {
+            period_s: self.hold_s,
+            amplifier_bandwidth_hz: 1.0 / (2.0 * std::f64::consts::PI * lag_s),
+            force_constant_n_per_a: 1.0,
+            delays_s: vec![0.0],
+        })
+    }
+
     fn response(&self, s: Complex<f64>) -> Complex<f64> {
         let held = s * self.hold_s;
         let hold = if held.norm() > 0.0 {
@@ -190,6 +213,17 @@ impl Nodes {
         )
     }
 
+    /// Whether the aliases of the chain with this delay differ from those of the nodes: by 0.1 rad and more.
+    pub(super) fn have_other_aliases(&self, delay_s: f64) -> bool {
+        let MeasurementChain::Bench(path) = &self.chain else {
+            return false;
+        };
+        let sampling_rad_s = 2.0 * std::f64::consts::PI / path.period_s;
+        // The whole delay is not negative.
+        let least_s = self.delay_s - path.mean_delay_s();
+        (delay_s.max(least_s) - self.delay_s).abs() * sampling_rad_s > ALIAS_PHASE_RAD
+    }
+
     /// The response of a mode of residue 1, its own excluded.
     pub(super) fn mode(&self, term: &ModalTerm) -> NodeResponse {
         let mode = self.chain.observed(term.omega_rad_s, term.damping_ratio);
@@ -268,14 +302,48 @@ impl MeasurementChain {
         ObservedMode { mode, plant }
     }
 
-    /// The response of the mechanics alone in m/N: the data without hold, motor, amplifier and delays, and without another
-    /// delay of `delay_s`. Aliases are not removed.
-    pub(crate) fn mechanics(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
-        let nodes = self.nodes(data, delay_s);
-        let chain = nodes.constant(&nodes.delays(delay_s));
+    /// The response at s = j w from the samples of the command to the force and, with a delay of `delay_s` beyond that of the chain, to
+    /// the reading, without aliases: that of a signal that is continuous in time.
+    fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
+        let delay = unit_phasor(-s.im * delay_s);
+        match self {
+            MeasurementChain::Direct => delay,
+            MeasurementChain::Input(path) => path.response(s) * delay,
+            MeasurementChain::Bench(path) => {
+                let bandwidth_rad_s = 2.0 * std::f64::consts::PI * path.amplifier_bandwidth_hz;
+                let held = InputPath {
+                    hold_s: path.period_s,
+                    lag_s: 1.0 / bandwidth_rad_s,
+                };
+                let delays = path.delays_s.iter();
+                let mean: Complex<f64> = delays.map(|delay_s| unit_phasor(-s.im * delay_s)).sum();
+                let share = path.force_constant_n_per_a / path.delays_s.len() as f64;
+                held.response(s) * mean * share * delay
+            }
+        }
+    }
+
+    /// The response of the mechanics alone in m/N, of data that were measured through this chain: without hold, motor, amplifier and
+    /// delays, and without the aliases that the fit `through_chain`, of the mechanics `fitted`, has at the data.
+    ///
+    /// ```text
+    /// G = (H - alias)/P,    alias = H_fit - P G_fit,    P the chain without aliases
+    /// ```
+    pub(crate) fn mechanics(
+        &self,
+        data: &[FrfDatum],
+        delay_s: f64,
+        fitted: &[Complex<f64>],
+        through_chain: &[Complex<f64>],
+    ) -> Vec<Complex<f64>> {
+        let fits = fitted.iter().zip(through_chain);
         data.iter()
-            .zip(chain)
-            .map(|(datum, chain)| datum.response / chain)
+            .zip(fits)
+            .map(|(datum, (fitted, through_chain))| {
+                let s = Complex::new(0.0, datum.omega_rad_s());
+                let chain = self.continuous_response(s, delay_s);
+                (datum.response - through_chain) / chain + fitted
+            })
             .collect()
     }
 }

@@ -156,28 +156,50 @@ impl Search<'_, '_> {
     fn run(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let chain = problem.chain;
-        let nodes = &chain.nodes(data, self.parameters.delay_s);
-        let problem = Problem { chain, data, nodes };
-        let start = std::mem::take(&mut self.parameters);
-        let mut solution = refine(problem, start, pass.tolerance);
-        if !solution.parameters.modes.is_empty() {
-            self.orders.push(order(problem, &solution, f64::INFINITY));
+        let mut first_misfit = None;
+        for _ in 0..MAX_MODES {
+            let nodes = &chain.nodes(data, self.parameters.delay_s);
+            let problem = Problem { chain, data, nodes };
+            let start = std::mem::take(&mut self.parameters);
+            let solution = refine(problem, start, pass.tolerance);
+            if first_misfit.is_none() && !solution.parameters.modes.is_empty() {
+                self.orders.push(order(problem, &solution, f64::INFINITY));
+            }
+            let first = *first_misfit.get_or_insert(problem.misfit(solution.chi2));
+            self.add_modes(pass, problem, first, solution)?;
+            if !nodes.have_other_aliases(self.parameters.delay_s) {
+                break;
+            }
         }
-        let first_misfit = problem.misfit(solution.chi2);
+        self.done = pass.progress;
+        Ok(())
+    }
+
+    /// Adds modes to a solution until none is significant, or until its delay has moved so far that the nodes must be computed again.
+    fn add_modes(
+        &mut self,
+        pass: &Pass,
+        problem: Problem<'_>,
+        first_misfit: f64,
+        mut solution: Solution,
+    ) -> Result<(), FitError> {
         while solution.parameters.modes.len() < MAX_MODES {
-            self.report(
-                pass,
-                pass_progress(first_misfit, problem.misfit(solution.chi2)),
-            )?;
+            let fraction = pass_progress(first_misfit, problem.misfit(solution.chi2));
+            self.report(pass, fraction)?;
             let Some(next) = with_another_mode(problem, &solution, pass.tolerance) else {
                 break;
             };
             let evidence = evidence(problem, &solution, &next);
             self.orders.push(order(problem, &next, evidence));
             solution = next;
+            if problem
+                .nodes
+                .have_other_aliases(solution.parameters.delay_s)
+            {
+                break;
+            }
         }
         self.parameters = solution.parameters;
-        self.done = pass.progress;
         Ok(())
     }
 

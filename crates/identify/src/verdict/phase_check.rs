@@ -68,7 +68,12 @@ fn curve(input: &VerdictInput<'_>) -> Result<PhaseCurve, PlantError> {
         .iter()
         .map(|omega| sum.response(Complex::new(0.0, *omega)))
         .collect();
-    let mut measured = input.chain.mechanics(&data, parameters.delay_s);
+    let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
+    let through_chain = input.fit.response(input.chain, &frequency_hz);
+    let delay_s = parameters.delay_s;
+    let mut measured = input
+        .chain
+        .mechanics(&data, delay_s, &fitted, &through_chain);
     for ((measured, fitted), datum) in measured.iter_mut().zip(&fitted).zip(&data) {
         if !is_significant(datum) {
             *measured = *fitted;

@@ -8,7 +8,6 @@ use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
 use bench_identify::ExternalAnalysis;
 use bench_identify::Unit;
-use bench_identify::modal::MeasurementChain;
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +57,7 @@ impl<'a> ExternalRecord<'a> {
             frf: &analysis.frf,
             model: None,
             magnitude_axis: self.magnitude_axis,
-            chain: MeasurementChain::Input(analysis.input_path),
+            chain: analysis.chain.clone(),
             fit,
             signs: None,
             verdict: &analysis.verdict,
