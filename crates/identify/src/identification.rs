@@ -6,7 +6,7 @@ use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::periodic::{self, Periods, Repetition};
-use crate::plausibility::{describes, hint, implausible};
+use crate::plausibility::{describes, hint, implausible, unless_undetermined};
 use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
@@ -258,7 +258,7 @@ fn analyse(
             let scope = VerdictScope::up_to(judged_up_to_rad_s);
             let verdict = judge(&fit, &frf.data, &chain, scope)?;
             let hint = hint(&verdict, signals, repetition.is_some(), &fit);
-            verdict.with(hint)
+            unless_undetermined(verdict.with(hint), &fit)
         }
     };
     let verdict = verdict.with(listed(&stray_lines));

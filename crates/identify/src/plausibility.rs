@@ -1,6 +1,6 @@
 //! Signs that the columns of an external record are not input and output of a plant that was at rest.
 
-use crate::modal::{self, FitError, MeasurementChain, ModalFit};
+use crate::modal::{self, FitError, MeasurementChain, ModalFit, ModeGroup};
 use crate::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
 use crate::{Frf, FrfDatum, Signals, record_check};
 
@@ -141,23 +141,43 @@ pub(super) fn hint(
     not_a_sum_of_modes(fit).or_else(|| begins_within_excitation(signals, is_periodic))
 }
 
+/// A verdict that was decided from modes that are not determined, and whose residues cancel, is undecided.
+pub(super) fn unless_undetermined(verdict: Verdict, fit: &Result<ModalFit, FitError>) -> Verdict {
+    let undetermined = fit.as_ref().ok().and_then(ModalFit::undetermined_modes);
+    let (true, Some(group)) = (verdict.cnmp != Cnmp::Undecided, undetermined) else {
+        return verdict;
+    };
+    Verdict {
+        cnmp: Cnmp::Undecided,
+        why: no_sum_of_modes(&cancelling(group)),
+        ..verdict
+    }
+}
+
+fn cancelling(group: ModeGroup) -> String {
+    let (low_hz, high_hz) = group.band_hz;
+    format!(
+        "the residues of {} modes from {low_hz:.2} to {high_hz:.2} Hz nearly cancel",
+        group.count
+    )
+}
+
 /// Modes whose residues nearly cancel take the place of what is no sum of modes.
 fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
     let found = match fit {
-        Ok(fit) => {
-            let (count, (low_hz, high_hz)) = fit.cancelling_modes()?;
-            format!(
-                "the residues of {count} modes from {low_hz:.2} to {high_hz:.2} Hz nearly cancel"
-            )
-        }
+        Ok(fit) => cancelling(fit.cancelling_modes()?),
         Err(FitError::Undetermined { modes }) if *modes > MANY_MODES => {
             format!("{modes} modes are needed")
         }
         Err(_) => return None,
     };
-    Some(format!(
-        "{found}: the response may be no sum of modes with real residues, as with a filter or an additional lag between the columns; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
-    ))
+    Some(no_sum_of_modes(&found))
+}
+
+fn no_sum_of_modes(found: &str) -> String {
+    format!(
+        "{found}: the response may be no sum of modes with real residues, as with damping that is not proportional, a filter or an additional lag between the columns; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
+    )
 }
 
 fn begins_within_excitation(signals: &Signals, is_periodic: bool) -> Option<String> {

@@ -3,6 +3,8 @@
 //! Modes are added one at a time. Two modes closer than their widths are therefore sometimes fitted by three or more, whose residues
 //! are large and nearly cancel. None of them can be removed alone. Here a cluster is replaced as a whole.
 
+use core::ops::Range;
+
 use super::parameters::ModalParameters;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
@@ -31,15 +33,10 @@ pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -
     })
 }
 
-/// The largest cluster of three or more modes whose residues cancel: number, lowest and highest frequency in hertz.
-pub(super) fn cancelling(modes: &[ModalTerm]) -> Option<(usize, (f64, f64))> {
-    let mut modes = modes.to_vec();
-    modes.sort_by(|a, b| a.omega_rad_s.total_cmp(&b.omega_rad_s));
-    let clusters = clusters(&modes).into_iter();
-    let largest = clusters.max_by_key(|cluster| cluster.count)?;
-    let last = largest.first + largest.count - 1;
-    let hz = |k: usize| modes[k].omega_rad_s / std::f64::consts::TAU;
-    (largest.count > 2).then(|| (largest.count, (hz(largest.first), hz(last))))
+/// The clusters of modes, of rising frequency, whose residues cancel: their indices.
+pub(super) fn cancelling(modes: &[ModalTerm]) -> Vec<Range<usize>> {
+    let indices = |cluster: Cluster| cluster.first..cluster.first + cluster.count;
+    clusters(modes).into_iter().map(indices).collect()
 }
 
 /// Neighbours in a list of modes of rising frequency.

@@ -32,7 +32,7 @@ use core::ops::ControlFlow;
 use error::report;
 pub use error::{FitError, Progress};
 pub use measurement_chain::{InputPath, MeasurementChain};
-pub use modal_fit::{FittedMode, ModalFit, UncertainPole};
+pub use modal_fit::{FittedMode, ModalFit, ModeGroup, UncertainPole};
 pub use parameters::{ModalParameters, Parameter};
 pub use search::ModelOrder;
 

@@ -1,5 +1,7 @@
 //! The result of a modal fit: modes, delay, poles and response.
 
+use core::ops::Range;
+
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
@@ -81,6 +83,17 @@ impl Serialize for FittedMode {
     }
 }
 
+/// Neighbouring modes of a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModeGroup {
+    /// Index of the lowest one.
+    pub first: usize,
+    /// Number of modes.
+    pub count: usize,
+    /// Frequencies of the lowest and the highest one in hertz.
+    pub band_hz: (f64, f64),
+}
+
 /// A pole with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UncertainPole {
@@ -149,9 +162,34 @@ impl ModalFit {
             .position(|free| *free == parameter)
     }
 
-    /// The number of neighbouring modes, three or more, whose residues nearly cancel, and their lowest and highest frequency in hertz.
-    pub fn cancelling_modes(&self) -> Option<(usize, (f64, f64))> {
-        cancelling(&self.parameters.modes)
+    /// The largest group of neighbouring modes, three or more, whose residues nearly cancel.
+    pub fn cancelling_modes(&self) -> Option<ModeGroup> {
+        let groups = self.cancelling_groups();
+        let largest = groups.into_iter().max_by_key(|group| group.count)?;
+        (largest.count > 2).then_some(largest)
+    }
+
+    /// Neighbouring modes whose residues nearly cancel and of which two or more are not determined: their intervals contain 0.
+    pub fn undetermined_modes(&self) -> Option<ModeGroup> {
+        let modes = self.modes();
+        let is_undetermined = |group: &ModeGroup| {
+            let group = &modes[group.first..group.first + group.count];
+            let uncertain = group.iter().filter(|mode| mode.certain_sign() == '?');
+            uncertain.count() >= 2
+        };
+        self.cancelling_groups().into_iter().find(is_undetermined)
+    }
+
+    /// The groups of neighbouring modes whose residues nearly cancel.
+    fn cancelling_groups(&self) -> Vec<ModeGroup> {
+        let modes = &self.parameters.modes;
+        let hz = |k: usize| modes[k].omega_rad_s / std::f64::consts::TAU;
+        let group = |indices: Range<usize>| ModeGroup {
+            first: indices.start,
+            count: indices.len(),
+            band_hz: (hz(indices.start), hz(indices.end - 1)),
+        };
+        cancelling(modes).into_iter().map(group).collect()
     }
 
     /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data

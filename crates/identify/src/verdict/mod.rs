@@ -54,7 +54,8 @@ pub const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
 
-const NO_PHASE_DROP: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
+const NO_PHASE: &str = "the response is not significant against its noise over the modes, so that its phase cannot be checked; increase the amplitude or the duration of the excitation";
+const TOO_FEW_MODES: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
 const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and increase the amplitude or the duration of the excitation";
 
@@ -147,7 +148,10 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         .or_else(|| uncertain_side(&zeros, input.certainty));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
-        None => evaluate(&zeros, &signs_of(input), phase_drop),
+        None => match phase_drop {
+            Some(phase_drop) => evaluate(&zeros, &signs_of(input), phase_drop),
+            None => (Cnmp::Undecided, no_phase_drop(modes.len()).into()),
+        },
     };
     Ok(Verdict {
         cnmp,
@@ -212,6 +216,14 @@ fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<Strin
     let mut complex = zeros.iter().filter(|zero| zero.s.im != 0.0);
     let zero = complex.find(|zero| !has_certain_side(zero, certainty))?;
     let real_part = zero.real_part();
+    if is_on_axis(zero) && real_part.half_width_95() < FIT_ACCURACY * zero.s.norm() {
+        return Some(format!(
+            "the zero {:.4} ± {:.4} rad/s at {:.2} Hz lies on the imaginary axis within the accuracy of a fit, 0.01 % of its frequency; a longer record does not decide: measure at another operating point",
+            Decimal(real_part.value),
+            real_part.half_width_95(),
+            hertz(zero.s.norm())
+        ));
+    }
     Some(format!(
         "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
         Decimal(real_part.value),
@@ -222,26 +234,23 @@ fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<Strin
 }
 
 fn has_certain_side(zero: &UncertainZero, certainty: Certainty) -> bool {
-    let off_axis = zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm();
     let right = zero.rhp_probability;
-    off_axis && (certainty.allows(right) || certainty.allows(1.0 - right))
+    !is_on_axis(zero) && (certainty.allows(right) || certainty.allows(1.0 - right))
+}
+
+/// Whether a zero is closer to the imaginary axis than a fit is accurate; also with a real part that is not finite.
+fn is_on_axis(zero: &UncertainZero) -> bool {
+    !(zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm())
 }
 
 /// The verdict from zeros that all have a certain side: the other two criteria must agree.
-fn evaluate(
-    zeros: &[UncertainZero],
-    signs: &[f64],
-    phase_drop: Option<PhaseDrop>,
-) -> (Cnmp, String) {
-    let Some(phase_drop) = phase_drop else {
-        return (Cnmp::Undecided, NO_PHASE_DROP.into());
-    };
+fn evaluate(zeros: &[UncertainZero], signs: &[f64], phase_drop: PhaseDrop) -> (Cnmp, String) {
     let pairs = cnmp_pairs(zeros);
     let agrees = phase_drop.deviation_deg() <= MAX_PHASE_DEVIATION_DEG;
     if !agrees {
         (Cnmp::Undecided, disagreement(phase_drop))
     } else if pairs == 0 {
-        (Cnmp::Excluded, NO_CNMP.into())
+        (Cnmp::Excluded, excluded(zeros))
     } else if let Some(zero) = unconfirmed(zeros, pairs, phase_drop) {
         (Cnmp::Undecided, unconfirmed_reason(zero))
     } else if !has_opposite_neighbours(signs) {
@@ -249,6 +258,23 @@ fn evaluate(
     } else {
         (Cnmp::Detected, detected(pairs, signs, phase_drop))
     }
+}
+
+/// Why there is no phase drop over this number of modes.
+fn no_phase_drop(modes: usize) -> &'static str {
+    if modes < 2 { TOO_FEW_MODES } else { NO_PHASE }
+}
+
+/// Why there are no CNMP zeros. A real zero right of the imaginary axis is none, but limits a controller as well.
+fn excluded(zeros: &[UncertainZero]) -> String {
+    let mut zeros = zeros.iter();
+    let Some(real) = zeros.find(|zero| zero.kind == ZeroKind::Rnmp) else {
+        return NO_CNMP.into();
+    };
+    format!(
+        "all complex zeros of the fit lie left of the imaginary axis, and the phase lag is that which the fit predicts; a real zero lies right of it, at {:.1} Hz: it is no CNMP zero, but limits the bandwidth of a controller in the same way",
+        hertz(real.s.re)
+    )
 }
 
 fn cnmp_pairs(zeros: &[UncertainZero]) -> usize {

@@ -187,7 +187,7 @@ fn zero_closer_to_the_axis_than_the_accuracy_of_a_fit_is_on_neither_side() {
     for (sign, decided) in [(1.0, Cnmp::Detected), (-1.0, Cnmp::Excluded)] {
         let verdict_at = |re: f64| Case::of(&Stage::with_pair(sign * re)).verdict();
         assert_eq!(verdict_at(1.01 * limit).cnmp, decided);
-        assert_undecided(&verdict_at(0.99 * limit), "either side of");
+        assert_undecided(&verdict_at(0.99 * limit), "within the accuracy of a fit");
     }
 }
 
@@ -259,7 +259,7 @@ fn requires_two_modes_for_the_phase() {
         ..Case::of(&Stage::with_pair(3.0))
     };
     let verdict = case.verdict();
-    assert_undecided(&verdict, super::NO_PHASE_DROP);
+    assert_undecided(&verdict, super::TOO_FEW_MODES);
     assert_eq!(verdict.phase_drop, None);
 }
 

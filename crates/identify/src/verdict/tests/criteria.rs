@@ -32,11 +32,11 @@ fn left_zero() -> UncertainZero {
     }
 }
 
-fn phase_drop(predicted_deg: f64, excess_deg: f64) -> Option<PhaseDrop> {
-    Some(PhaseDrop {
+fn phase_drop(predicted_deg: f64, excess_deg: f64) -> PhaseDrop {
+    PhaseDrop {
         drop_deg: predicted_deg + excess_deg,
         predicted_deg,
-    })
+    }
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn reasons_have_no_negative_zero() {
             predicted_deg,
             drop_deg,
         };
-        evaluate(&[left_zero()], &OPPOSITE, Some(phase_drop)).1
+        evaluate(&[left_zero()], &OPPOSITE, phase_drop).1
     };
     for why in [of_phases(-0.0, 350.0), of_phases(350.0, -0.3)] {
         assert!(why.contains(" 0") && !why.contains("-0"), "{why}");
@@ -82,8 +82,21 @@ fn reasons_have_no_negative_zero() {
         s: Complex::new(-1e-5, 100.0),
         ..left_zero()
     };
-    let why = uncertain_side(&[near_axis], Certainty::ONE_LOOK).expect("on no side");
-    assert!(why.contains("the zero 0.000 ±"), "{why}");
+    let uncertain = UncertainZero {
+        rhp_probability: 0.5,
+        covariance: [[0.01, 0.0], [0.0, 0.0]],
+        ..near_axis
+    };
+    let why_of = |zero| uncertain_side(&[zero], Certainty::ONE_LOOK).expect("on no side");
+    let [certain, uncertain] = [near_axis, uncertain].map(why_of);
+    assert!(uncertain.contains("the zero 0.000 ± 0.196"), "{uncertain}");
+    assert!(certain.contains("the zero 0.0000 ± 0.0000"), "{certain}");
+    // A longer record helps only where the interval is wider than the accuracy of a fit.
+    assert!(uncertain.contains("or the duration"), "{uncertain}");
+    assert!(
+        certain.contains("a longer record does not decide"),
+        "{certain}"
+    );
 }
 
 #[test]
@@ -216,4 +229,24 @@ fn residue_of_unknown_variance_has_no_sign() {
     let at = index(&case.fit, Parameter::Residue(0));
     case.fit.covariance[(at, at)] = f64::INFINITY;
     assert_eq!(signs_of(&case.input()).len(), 1);
+}
+
+#[test]
+fn a_real_zero_right_of_the_axis_is_stated() {
+    // At 2 pi 7.5 rad/s.
+    let zero = UncertainZero {
+        s: Complex::new(47.123_889_8, 0.0),
+        kind: ZeroKind::Rnmp,
+        ..left_zero()
+    };
+    let (cnmp, why) = evaluate(&[left_zero(), zero], &[1.0, 1.0], phase_drop(180.0, 0.0));
+    assert_eq!(cnmp, Cnmp::Excluded);
+    assert!(
+        why.starts_with("all complex zeros of the fit lie left"),
+        "{why}"
+    );
+    assert!(
+        why.contains("a real zero lies right of it, at 7.5 Hz"),
+        "{why}"
+    );
 }
