@@ -50,6 +50,32 @@ fn finds_exactly_the_modes_of_a_close_pair_with_their_signs() {
     }
 }
 
+/// Two modes closer than their widths: of one mode for both, a second beside it becomes a pair of large residues that cancel.
+#[test]
+fn separates_two_modes_within_one_peak() {
+    for (second, ratio) in [(2.4, 1.0015), (-1.1, 1.0015), (2.4, 1.003), (-2.4, 1.002)] {
+        let truth = [
+            term(35.7, 0.0023, 2.47),
+            term(99.3, 0.0013, 2.8),
+            term(99.3 * ratio, 0.001, second),
+        ];
+        let data = frf_data(&truth, 0.0, SIGMA_M_PER_N, 11);
+        let modes = fit(&data, &MeasurementChain::Direct).unwrap().modes();
+        assert_eq!(modes.len(), 3, "{second} {ratio}: {modes:?}");
+        for (mode, truth) in modes.iter().zip(truth) {
+            let errors = [
+                (mode.omega_rad_s, truth.omega_rad_s),
+                (mode.residue_per_kg, truth.residue_per_kg),
+            ];
+            for (found, truth) in errors {
+                let in_sigmas = (found.value - truth) / found.sigma;
+                // One of 24 normally distributed errors exceeds 5 sigma with a probability of 1 in 70,000.
+                assert!(in_sigmas.abs() < 5.0, "{second} {ratio}: {mode:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn separates_a_delay_of_many_milliseconds_from_the_modes() {
     for delay_s in [0.0, 1e-4, 1.7e-3, 6e-3, -2e-3] {

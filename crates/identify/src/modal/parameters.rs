@@ -11,6 +11,11 @@ const MAX_DAMPING_STEP: f64 = 0.7;
 /// Bounds of a damping ratio.
 const DAMPING_RATIO: (f64, f64) = (1e-6, 2.0);
 
+/// A mode is split for a residual at most this many half-widths away: beyond, a mode there is another one.
+const SPLIT_REACH: f64 = 3.0;
+/// Only a mode with a peak is split.
+const MAX_SPLIT_DAMPING: f64 = 0.2;
+
 /// A sum of modes with a delay.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModalParameters {
@@ -65,6 +70,29 @@ impl ModalParameters {
     pub(super) fn with_mode(mut self, mode: ModalTerm) -> ModalParameters {
         self.modes.push(mode);
         self
+    }
+
+    /// The parameters with the mode within [`SPLIT_REACH`] half-widths of a frequency replaced by two: one half-width to either side of it,
+    /// with half of its damping. `None` if there is no such mode.
+    pub(super) fn with_split_mode(&self, omega_rad_s: f64) -> Option<ModalParameters> {
+        let distance = |mode: &ModalTerm| {
+            let half_width_rad_s = mode.damping_ratio * mode.omega_rad_s;
+            (mode.omega_rad_s - omega_rad_s).abs() / half_width_rad_s
+        };
+        let near = |mode: &&ModalTerm| {
+            mode.damping_ratio < MAX_SPLIT_DAMPING && distance(mode) < SPLIT_REACH
+        };
+        let index = self.modes.iter().position(|mode| near(&mode))?;
+        let mut next = self.clone();
+        let one = next.modes[index];
+        let half = |side: f64| ModalTerm {
+            omega_rad_s: one.omega_rad_s * (1.0 + side * one.damping_ratio),
+            damping_ratio: 0.5 * one.damping_ratio,
+            residue_per_kg: 0.5 * one.residue_per_kg,
+        };
+        next.modes[index] = half(-1.0);
+        next.modes.push(half(1.0));
+        Some(next)
     }
 
     /// The free parameters, in the order of a covariance.

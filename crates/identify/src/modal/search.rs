@@ -14,6 +14,7 @@ use super::peaks::peak_starts;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
 use crate::FrfDatum;
+use bench_plant::zeros::ModalTerm;
 
 /// Largest number of modes.
 const MAX_MODES: usize = 24;
@@ -268,9 +269,26 @@ fn with_another_mode(
     }
     let candidates = candidates(problem, solution).into_iter().take(TRIALS);
     candidates
-        .map(|mode| solution.parameters.clone().with_mode(mode))
-        .map(|start| refine(problem, start, tolerance))
+        .map(|mode| best_with(problem, &solution.parameters, mode, tolerance))
         .find(significant)
+}
+
+/// The better solution of two: with a mode added, and, if a mode lies there already, with that one split.
+fn best_with(
+    problem: Problem<'_>,
+    parameters: &ModalParameters,
+    mode: ModalTerm,
+    tolerance: f64,
+) -> Solution {
+    let added = refine(problem, parameters.clone().with_mode(mode), tolerance);
+    match parameters.with_split_mode(mode.omega_rad_s) {
+        Some(start) => better(added, refine(problem, start, tolerance)),
+        None => added,
+    }
+}
+
+fn better(a: Solution, b: Solution) -> Solution {
+    if b.chi2 < a.chi2 { b } else { a }
 }
 
 /// The best solution with one mode, a free body included. All others build on it, so that all candidates are fitted.
