@@ -5,6 +5,7 @@
 mod comparisons;
 mod coverage;
 mod estimators;
+mod external_records;
 mod fit_intervals;
 mod frf_bias_and_coverage;
 mod frf_noise;
