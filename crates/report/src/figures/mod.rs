@@ -8,7 +8,7 @@ mod stage;
 mod tuning;
 
 pub use comparison::{difference_table, figure_table, frequencies};
-pub use control::{control_table, predicted_sine, step, tracking_figures, whole_run};
+pub use control::{control_table, predicted_sine, step, step_table, tracking_figures, whole_run};
 pub use margins::{loop_peaks, margins, measured_margins, swept_loop};
 pub use modal::{OTHER_SIGN, mode_table, zero_table};
 pub use stage::{stage_check_table, static_step_table};
@@ -167,6 +167,17 @@ impl Figure {
     /// Name and text, for a list of facts.
     pub fn pair(&self) -> (String, String) {
         (self.name.clone(), self.text())
+    }
+
+    /// Name and unit, for the head of a column: `Overshoot (%)`.
+    pub fn head(&self) -> String {
+        format!("{} ({})", self.name, self.unit)
+    }
+
+    /// The number without its unit, for a column with this head.
+    pub fn number(&self) -> String {
+        let number = |value| format!("{value:.*}", self.decimals);
+        self.value.map_or(self.absent.into(), number)
     }
 }
 

@@ -1,14 +1,14 @@
 //! One page for several recordings: their differences, their frequency responses and their steps.
 
 use super::run_differences::differences;
+use crate::figures::step_table;
 use crate::html::{document_with_plots, escaped, note, picture, section};
-use crate::table::Table;
 use crate::{
     ReportError, SignalsPlot, StepCurve, StepPlot, overlay_bode_svg, overlay_steps_svg,
     signals_svg, step_svg,
 };
 use bench_experiment::run_comparison::{Comparison, RunResult};
-use bench_experiment::{Extent, Overview, StepResponse, TrackingMetrics};
+use bench_experiment::{Extent, Overview, StepResponse};
 use bench_identify::{Frf, Unit};
 
 /// Most recordings on one page: their curves have 4 colours and 3 strokes, so those of more cannot be distinguished.
@@ -147,39 +147,6 @@ pub(super) fn signals_section(overview: &Overview) -> Result<String, ReportError
 }
 
 fn figures(steps: &[(&str, &StepResponse)]) -> String {
-    let columns = [
-        "Recording",
-        "Step (µm)",
-        "Settling to 2 % (ms)",
-        "by the model",
-        "Overshoot (%)",
-        "by the model",
-        "Mean error (µm)",
-        "Sigma of the error (µm)",
-    ];
-    let rows = steps.iter().map(|(name, step)| figure_row(name, step));
-    let table = Table::new(columns).with_rows(rows);
     let text = "A settling time is given if the band of 2 % is above three sigma of the error.";
-    note(text) + &table.html()
-}
-
-fn figure_row(name: &str, step: &StepResponse) -> Vec<String> {
-    let measured = step.metrics.and_then(|metrics| metrics.step);
-    let predicted = step.predicted.as_ref().map(|predicted| predicted.metrics);
-    let ms = |seconds: Option<f64>| seconds.map_or("none".into(), |s| format!("{:.1}", s * 1e3));
-    let percent = |value: Option<f64>| value.map_or("none".into(), |value| format!("{value:.1}"));
-    let um = |value: fn(&TrackingMetrics) -> f64| {
-        let value = step.metrics.as_ref().map(value);
-        value.map_or("none".into(), |metres| format!("{:.4}", metres * 1e6))
-    };
-    vec![
-        name.into(),
-        format!("{:.3}", step.height_m * 1e6),
-        ms(measured.and_then(|step| step.settling_time_s)),
-        ms(predicted.and_then(|step| step.settling_time_s)),
-        percent(measured.map(|step| step.overshoot_percent)),
-        percent(predicted.map(|step| step.overshoot_percent)),
-        um(|metrics| metrics.steady_state_mean_error_m),
-        um(|metrics| metrics.steady_state_sigma_m),
-    ]
+    note(text) + &step_table(steps).html()
 }
