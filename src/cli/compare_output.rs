@@ -6,6 +6,7 @@ use bench_experiment::run_comparison::{
 };
 use bench_identify::verdict::Cnmp;
 use bench_report::figures::{difference_table, figure_table, frequencies};
+use bench_report::table::Width;
 
 /// Tables of the differences, and what they mean.
 pub(super) fn text(comparison: &Comparison, page: Option<&str>) -> String {
@@ -79,7 +80,7 @@ fn settings_text(other: &RunDifferences) -> String {
 }
 
 fn modes_text(modes: &ModeDifferences) -> String {
-    let differences = difference_table(modes).without("If equal");
+    let differences = difference_table(modes, Width::Terminal);
     let differences = if differences.is_empty() {
         String::new()
     } else {

@@ -2,7 +2,8 @@
 
 use super::table::{result_table, wrap};
 use bench_experiment::outputs::ModalSummary;
-use bench_report::figures::{OTHER_SIGN, mode_table, zero_table};
+use bench_report::figures::{mode_table, zero_table};
+use bench_report::table::Width;
 
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
@@ -11,7 +12,8 @@ pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
     if summary.modes.is_empty() {
         return verdict;
     }
-    let modes = result_table(&mode_table(&summary.modes, residue_unit).without(OTHER_SIGN));
+    let modes = mode_table(&summary.modes, residue_unit, Width::Terminal);
+    let modes = result_table(&modes);
     let zeros = zero_table(&summary.zeros);
     let zeros = if zeros.is_empty() {
         "no zeros in the band of the verdict\n".into()

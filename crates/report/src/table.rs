@@ -2,6 +2,25 @@
 
 use crate::html::{escaped, table};
 
+/// How much room a table has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// A page has room for all columns.
+    Page,
+    /// A terminal has room for 80 characters, so that columns of less importance are left out.
+    Terminal,
+}
+
+impl Width {
+    /// A head or a cell that only a page has room for.
+    pub(crate) fn page_only<T>(self, cell: T) -> Option<T> {
+        match self {
+            Width::Page => Some(cell),
+            Width::Terminal => None,
+        }
+    }
+}
+
 /// Columns with their rows. Each row has a cell for each column.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
@@ -13,9 +32,9 @@ pub struct Table {
 
 impl Table {
     /// A table without rows.
-    pub fn new<const N: usize>(columns: [&str; N]) -> Table {
+    pub fn new<'a>(columns: impl IntoIterator<Item = &'a str>) -> Table {
         Table {
-            columns: columns.map(String::from).to_vec(),
+            columns: columns.into_iter().map(String::from).collect(),
             rows: Vec::new(),
         }
     }
@@ -29,17 +48,6 @@ impl Table {
     /// Whether there is nothing to show.
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
-    }
-
-    /// The table without a column.
-    pub fn without(mut self, column: &str) -> Table {
-        if let Some(index) = self.columns.iter().position(|name| name == column) {
-            self.columns.remove(index);
-            self.rows.iter_mut().for_each(|row| {
-                row.remove(index);
-            });
-        }
-        self
     }
 
     /// The first rows.
@@ -67,15 +75,6 @@ fn row_html(cells: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_column_is_left_out_of_head_and_rows() {
-        let row = ["1", "2", "3"].map(String::from).to_vec();
-        let table = Table::new(["a", "b", "c"]).with_rows([row]).without("b");
-        assert_eq!(table.columns, ["a", "c"]);
-        assert_eq!(table.rows, [["1", "3"]]);
-        assert_eq!(table.clone().without("unknown"), table);
-    }
 
     #[test]
     fn html_has_every_cell_escaped() {

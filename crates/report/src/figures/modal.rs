@@ -2,36 +2,32 @@
 
 use super::interval_of;
 use crate::number::{interval, percent};
-use crate::table::Table;
+use crate::table::{Table, Width};
 use bench_base::units::hz;
 use bench_identify::modal::{FittedMode, SIGMAS_95};
 use bench_identify::verdict::UncertainZero;
 
-/// The column that a narrow table can leave out.
-pub const OTHER_SIGN: &str = "Probability of the other sign";
-
 /// The modes with their 95 % confidence intervals. A sign is `?` if the interval of the residue contains 0.
-pub fn mode_table(modes: &[FittedMode], residue_unit: &str) -> Table {
+/// The probability of the other sign is for pages.
+pub fn mode_table(modes: &[FittedMode], residue_unit: &str, width: Width) -> Table {
     let residue = format!("Residue ({residue_unit})");
-    let columns = [
-        "Frequency (Hz)",
-        "Damping ratio",
-        &residue,
-        "Sign",
-        OTHER_SIGN,
-    ];
-    Table::new(columns).with_rows(modes.iter().map(mode_row))
+    let columns = ["Frequency (Hz)", "Damping ratio", &residue, "Sign"];
+    let columns = columns
+        .into_iter()
+        .chain(width.page_only("Probability of the other sign"));
+    Table::new(columns).with_rows(modes.iter().map(|mode| mode_row(mode, width)))
 }
 
-fn mode_row(mode: &FittedMode) -> Vec<String> {
+fn mode_row(mode: &FittedMode, width: Width) -> Vec<String> {
     let sign = mode.certain_sign().to_string().replace('-', "\u{2212}");
-    vec![
+    let mut cells = vec![
         interval_of(mode.frequency_hz()),
         interval_of(mode.damping_ratio),
         interval_of(mode.residue_per_kg),
         sign,
-        percent(mode.sign_error_probability()),
-    ]
+    ];
+    cells.extend(width.page_only(percent(mode.sign_error_probability())));
+    cells
 }
 
 /// The zeros; of a conjugate pair the one above the real axis.
@@ -60,4 +56,27 @@ fn zero_row(zero: &UncertainZero) -> Vec<String> {
         zero.kind.name().into(),
         percent(zero.rhp_probability),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench_identify::Estimate;
+
+    #[test]
+    fn terminal_has_all_columns_but_the_probability_of_the_other_sign() {
+        let estimate = |value: f64| Estimate { value, sigma: 0.01 };
+        let mode = FittedMode {
+            omega_rad_s: estimate(184.0),
+            damping_ratio: estimate(0.05),
+            residue_per_kg: estimate(-0.5),
+        };
+        let [page, terminal] =
+            [Width::Page, Width::Terminal].map(|w| mode_table(&[mode], "1/kg", w));
+        assert_eq!(page.columns[4], "Probability of the other sign");
+        // The residue is 50 sigma below 0.
+        assert_eq!(page.rows[0][3..], ["\u{2212}", "below 0.01 %"]);
+        assert_eq!(page.columns[..4], terminal.columns);
+        assert_eq!(page.rows[0][..4], terminal.rows[0]);
+    }
 }

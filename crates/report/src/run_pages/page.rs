@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use super::{Plot, RecordReport};
 use crate::figures::{interval_of, mode_table, zero_table};
 use crate::html::{document_with_plots, escaped, facts, note, section};
-use crate::table::Table;
+use crate::table::{Table, Width};
 use bench_base::decimal::Decimal;
 use bench_experiment::certificate::SIGNS_DIFFER;
 use bench_identify::modal::Estimate;
@@ -106,7 +106,7 @@ fn modes(report: &RecordReport<'_>) -> String {
     let Some(fit) = report.fit else {
         return String::new();
     };
-    let table = mode_table(&fit.modes(), &report.residue_unit);
+    let table = mode_table(&fit.modes(), &report.residue_unit, Width::Page);
     table_section("Modes", "± is the 95 % confidence interval.", &table)
 }
 

@@ -2,15 +2,12 @@
 
 use super::page::table_section;
 use super::run_facts::setting_row;
-use crate::figures::{difference_table, figure_table, frequencies};
+use crate::figures::{IF_EQUAL, difference_table, figure_table, frequencies};
 use crate::html::{note, section};
-use crate::table::Table;
+use crate::table::{Table, Width};
 use bench_experiment::run_comparison::{
     Comparison, FigureDifference, ModeDifferences, RunDifferences, RunHead,
 };
-
-const MODES_NOTE: &str = "± is the 95 % confidence interval of each value by itself. \"If equal\" is the probability of such a \
-    difference, or a larger one, if the values are equal. * is a significant difference.";
 
 /// All tables of a comparison.
 pub(super) fn differences(comparison: &Comparison) -> String {
@@ -72,14 +69,21 @@ fn remarks(other: &RunDifferences) -> String {
 }
 
 fn modes(modes: &ModeDifferences) -> String {
-    let table = difference_table(modes);
+    let table = difference_table(modes, Width::Page);
     if table.is_empty() {
         return String::new();
     }
-    note(MODES_NOTE)
+    note(&modes_note())
         + &table.html()
         + &unpaired("Only in the reference run", &modes.only_in_reference_hz)
         + &unpaired("Only in this run", &modes.only_in_other_hz)
+}
+
+fn modes_note() -> String {
+    format!(
+        "± is the 95 % confidence interval of each value by itself. \"{IF_EQUAL}\" is the probability of such a difference, or a \
+         larger one, if the values are equal. * is a significant difference."
+    )
 }
 
 fn unpaired(text: &str, frequencies_hz: &[f64]) -> String {
