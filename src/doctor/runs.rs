@@ -146,12 +146,16 @@ pub(super) fn refused(subject: Subject, why: &str, default_remedy: &str) -> Find
 mod tests {
     use super::*;
     use crate::doctor::Severity;
+    use bench_control::LoopMargins;
 
     fn margins(stable: bool) -> Margins {
         Margins {
-            modulus_margin: 0.5,
-            sensitivity_peak_db: 6.0,
-            sensitivity_peak_rad_s: 300.0,
+            loop_margins: LoopMargins {
+                modulus_margin: 0.5,
+                sensitivity_peak_db: 6.0,
+                sensitivity_peak_rad_s: 300.0,
+                ..LoopMargins::default()
+            },
             stable,
             ..Margins::default()
         }

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use bench_control::{Crossing, Margins};
+use bench_control::{Crossing, LoopMargins, Margins};
 use bench_report::{LoopPlot, loop_bode_svg};
 use nalgebra::Complex;
 
@@ -15,11 +15,14 @@ const CROSSOVER_HZ: f64 = 10.0;
 /// Of |L| = 10/f the only crossing, at a phase of -500 degrees: 40 degrees above -540.
 fn margins() -> Margins {
     Margins {
-        crossover_rad_s: Some(TAU * CROSSOVER_HZ),
-        phase_margin_deg: Some(40.0),
-        modulus_margin: 0.5,
-        sensitivity_peak_db: 6.0,
-        sensitivity_peak_rad_s: TAU * CROSSOVER_HZ,
+        loop_margins: LoopMargins {
+            crossover_rad_s: Some(TAU * CROSSOVER_HZ),
+            phase_margin_deg: Some(40.0),
+            modulus_margin: 0.5,
+            sensitivity_peak_db: 6.0,
+            sensitivity_peak_rad_s: TAU * CROSSOVER_HZ,
+            ..LoopMargins::default()
+        },
         stable: true,
         crossings: vec![Crossing {
             rad_s: TAU * CROSSOVER_HZ,

@@ -33,6 +33,7 @@ mod inverse;
 mod landmarks;
 mod law;
 mod laws;
+mod loop_margins;
 mod margins;
 pub mod measured;
 mod minimum_time;
@@ -58,8 +59,9 @@ pub use import_error::{FormatError, ImportError};
 pub use inverse::{InverseFilter, inverse_filter};
 pub use law::{ControlDesign, ControlLaw, LawInput, LinearLaw, OpenLoopPoles};
 pub use laws::{ControlLawSettings, RepetitiveLaw, StateSpaceLaw, register_law};
+pub use loop_margins::{Crossing, LoopMargins};
 pub use margins::grid;
-pub use margins::{Crossing, Margins, PhaseCrossing};
+pub use margins::{Margins, PhaseCrossing};
 pub use minimum_time::{
     MinimumTime, MinimumTimeError, StepLimits, StepPlant, StepTiming, minimum_time,
 };

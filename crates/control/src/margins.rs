@@ -7,20 +7,14 @@
 //! the modulus margin is 1/max |S| with S = 1/(1 + L); the sensitivity bandwidth is the lowest frequency
 //! at which |S| rises through 1/sqrt(2).
 
+use std::ops::Deref;
+
 use nalgebra::Complex;
 use serde::Serialize;
 
 use super::landmarks::{Landmarks, landmarks, phase_margin_deg};
+use super::loop_margins::{Crossing, LoopMargins};
 use bench_base::numeric::is_within;
-
-/// A frequency at which |L| passes through 1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Crossing {
-    /// Frequency in rad/s.
-    pub rad_s: f64,
-    /// 180 deg + arg L there, within +-180 deg.
-    pub phase_margin_deg: f64,
-}
 
 /// A frequency at which L crosses the negative real axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -40,39 +34,12 @@ pub struct DelayMargin {
     pub delay_s: f64,
 }
 
-/// Margins of a loop. `null` in JSON where there is no such crossing.
+/// Margins of a loop by its model. `null` in JSON where there is no such crossing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Margins {
-    /// Lowest frequency at which |L| falls through 1.
-    pub crossover_rad_s: Option<f64>,
-    /// Phase margin of smallest magnitude over all crossings of |L| = 1, in degrees.
-    pub phase_margin_deg: Option<f64>,
-    /// Frequency of this phase margin in rad/s.
-    pub phase_margin_rad_s: Option<f64>,
-    /// Smallest gain margin over all phase crossover frequencies, in dB.
-    pub gain_margin_db: Option<f64>,
-    /// Frequency of this gain margin in rad/s.
-    pub gain_margin_rad_s: Option<f64>,
-    /// Smallest positive gain margin in dB: the loop gain may rise by less.
-    pub upper_gain_margin_db: Option<f64>,
-    /// Its frequency in rad/s.
-    pub upper_gain_margin_rad_s: Option<f64>,
-    /// Largest negative gain margin in dB: the loop gain may fall by less.
-    pub lower_gain_margin_db: Option<f64>,
-    /// Its frequency in rad/s.
-    pub lower_gain_margin_rad_s: Option<f64>,
-    /// Smallest additional delay in seconds with which L reaches -1.
-    pub delay_margin_s: Option<f64>,
-    /// The crossing of |L| = 1 at which it does, in rad/s.
-    pub delay_margin_rad_s: Option<f64>,
-    /// 1/max |S|: the distance of L from -1.
-    pub modulus_margin: f64,
-    /// 20 log10 max |S|.
-    pub sensitivity_peak_db: f64,
-    /// Frequency of this peak in rad/s.
-    pub sensitivity_peak_rad_s: f64,
-    /// Lowest frequency at which |S| rises through 1/sqrt(2).
-    pub sensitivity_bandwidth_rad_s: Option<f64>,
+    /// The figures that measured margins have as well.
+    #[serde(flatten)]
+    pub loop_margins: LoopMargins<f64>,
     /// Whether all poles of the closed loop are stable.
     pub stable: bool,
     /// All crossings of |L| = 1.
@@ -81,6 +48,15 @@ pub struct Margins {
     pub phase_crossings: Vec<PhaseCrossing>,
     /// Whether sampling, delay and amplifier are neglected.
     pub continuous: bool,
+}
+
+/// The figures of the loop are read as if they were fields of the margins.
+impl Deref for Margins {
+    type Target = LoopMargins<f64>;
+
+    fn deref(&self) -> &LoopMargins<f64> {
+        &self.loop_margins
+    }
 }
 
 impl Margins {
@@ -124,7 +100,7 @@ pub(super) fn margins(response: &dyn Fn(f64) -> Complex<f64>, known: &Known<'_>)
     );
     let delay = delay_margin(&crossings);
     let peak = places.sensitivity_peak;
-    Margins {
+    let loop_margins = LoopMargins {
         crossover_rad_s: places.crossover_rad_s,
         phase_margin_deg: phase_margin.map(|crossing| crossing.phase_margin_deg),
         phase_margin_rad_s: phase_margin.map(|crossing| crossing.rad_s),
@@ -140,6 +116,9 @@ pub(super) fn margins(response: &dyn Fn(f64) -> Complex<f64>, known: &Known<'_>)
         sensitivity_peak_db: 20.0 * libm::log10(peak.value),
         sensitivity_peak_rad_s: peak.rad_s,
         sensitivity_bandwidth_rad_s: places.sensitivity_bandwidth_rad_s,
+    };
+    Margins {
+        loop_margins,
         stable: known.stable,
         crossings,
         phase_crossings,

@@ -1,58 +1,28 @@
 //! Margins and peaks of a measured loop with their standard deviations: formulas in the module's documentation.
 
+use std::ops::Deref;
+
 use nalgebra::Complex;
 use serde::Serialize;
 
 use super::measured_loop::MeasuredLoop;
 use crate::landmarks::{Landmarks, Peak, landmarks, peak, phase_margin_deg};
+use crate::loop_margins::{Crossing, LoopMargins};
 use bench_base::estimate::Estimate;
 
 /// Decibels of a natural logarithm.
 const DB_PER_NEPER: f64 = 20.0 / std::f64::consts::LN_10;
 
 /// A frequency at which the measured |L| passes through 1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct MeasuredCrossing {
-    /// Frequency in rad/s.
-    pub rad_s: Estimate,
-    /// 180 deg + arg L there, within +-180 deg.
-    pub phase_margin_deg: Estimate,
-}
+pub type MeasuredCrossing = Crossing<Estimate>;
 
 /// Margins of a measured loop within the measured band. In JSON each is an object of `value`, `low` and `high`, the limits of its
 /// 95 % confidence interval, and `null` where there is no such crossing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MeasuredMargins {
-    /// Lowest frequency in rad/s at which |L| falls through 1.
-    pub crossover_rad_s: Option<Estimate>,
-    /// Phase margin of smallest magnitude over all crossings of |L| = 1, in degrees.
-    pub phase_margin_deg: Option<Estimate>,
-    /// Frequency of this phase margin in rad/s.
-    pub phase_margin_rad_s: Option<f64>,
-    /// Smallest gain margin over all phase crossover frequencies, in dB.
-    pub gain_margin_db: Option<Estimate>,
-    /// Frequency of this gain margin in rad/s.
-    pub gain_margin_rad_s: Option<f64>,
-    /// Smallest positive gain margin in dB: the loop gain may rise by less.
-    pub upper_gain_margin_db: Option<Estimate>,
-    /// Its frequency in rad/s.
-    pub upper_gain_margin_rad_s: Option<f64>,
-    /// Largest negative gain margin in dB: the loop gain may fall by less.
-    pub lower_gain_margin_db: Option<Estimate>,
-    /// Its frequency in rad/s.
-    pub lower_gain_margin_rad_s: Option<f64>,
-    /// Smallest additional delay in seconds with which L reaches -1.
-    pub delay_margin_s: Option<Estimate>,
-    /// The crossing of |L| = 1 at which it does, in rad/s.
-    pub delay_margin_rad_s: Option<f64>,
-    /// 1/max |S|: the distance of L from -1.
-    pub modulus_margin: Estimate,
-    /// 20 log10 max |S|.
-    pub sensitivity_peak_db: Estimate,
-    /// Frequency of the largest |S| in rad/s.
-    pub sensitivity_peak_rad_s: f64,
-    /// Lowest frequency in rad/s at which |S| rises through 1/sqrt(2).
-    pub sensitivity_bandwidth_rad_s: Option<Estimate>,
+    /// The figures that a model has as well.
+    #[serde(flatten)]
+    pub loop_margins: LoopMargins<Estimate>,
     /// All crossings of |L| = 1.
     pub crossings: Vec<MeasuredCrossing>,
 }
@@ -66,6 +36,15 @@ pub struct LoopPeaks {
     pub control_peak_a_per_m: Estimate,
     /// max |P S| in metres per ampere, from a disturbance in amperes at the plant's input to the position.
     pub disturbance_peak_m_per_a: Estimate,
+}
+
+/// The figures of the loop are read as if they were fields of the margins.
+impl Deref for MeasuredMargins {
+    type Target = LoopMargins<Estimate>;
+
+    fn deref(&self) -> &LoopMargins<Estimate> {
+        &self.loop_margins
+    }
 }
 
 impl MeasuredMargins {
@@ -97,7 +76,7 @@ impl MeasuredMargins {
         let delay_margin = smallest(crossings.iter().map(delay_margin_s));
         let crossover = at(&crossings, places.crossover_rad_s);
         let modulus_margin = modulus_margin(measured, places.sensitivity_peak);
-        MeasuredMargins {
+        let loop_margins = LoopMargins {
             crossover_rad_s: crossover.map(|crossing| crossing.rad_s),
             phase_margin_deg: phase_margin.map(|(_, deg)| deg),
             phase_margin_rad_s: phase_margin.map(|(rad_s, _)| rad_s),
@@ -118,6 +97,9 @@ impl MeasuredMargins {
             sensitivity_bandwidth_rad_s: places
                 .sensitivity_bandwidth_rad_s
                 .map(|w| sensitivity_bandwidth(measured, w)),
+        };
+        MeasuredMargins {
+            loop_margins,
             crossings,
         }
     }

@@ -136,6 +136,7 @@ pub fn require_margins(
 mod tests {
     use super::*;
     use bench_config::{Purpose, Source, load};
+    use bench_control::LoopMargins;
 
     fn config(min_modulus_margin: f64) -> Config {
         load(&Source {
@@ -151,7 +152,10 @@ mod tests {
         let margins = closed_loop(&config(0.0)).unwrap().margins();
         Margins {
             stable,
-            modulus_margin,
+            loop_margins: LoopMargins {
+                modulus_margin,
+                ..margins.loop_margins
+            },
             ..margins
         }
     }

@@ -2,65 +2,68 @@
 
 use super::{Figure, Quantity, crossing_count};
 use bench_base::units::UM_PER_M;
-use bench_control::Margins;
 use bench_control::measured::{LoopPeaks, MeasuredMargins};
+use bench_control::{LoopMargins, Margins};
 use bench_experiment::outputs::LoopOutputs;
 
 const MS_PER_S: f64 = 1e3;
 
 /// The margins of a stable loop by its model.
 pub fn margins(margins: &Margins) -> Vec<Figure> {
-    margin_figures!(margins)
+    margin_figures(&margins.loop_margins, margins.crossings.len())
 }
 
 /// The margins of a stable loop with a measured plant, within the measured band.
 pub fn measured_margins(margins: &MeasuredMargins) -> Vec<Figure> {
-    let figures = margin_figures!(margins).into_iter();
+    let figures = margin_figures(&margins.loop_margins, margins.crossings.len()).into_iter();
     figures
         .map(|figure| figure.or("none in the band"))
         .collect()
 }
 
-/// The list of both: their fields have the same names, those of measured margins have standard deviations.
-macro_rules! margin_figures {
-    ($margins:ident) => {{
-        let m = $margins;
-        let crossings = crossing_count(m.crossings.len());
-        let mut figures = vec![
+fn margin_figures<Q: Copy + Into<Quantity>>(m: &LoopMargins<Q>, crossings: usize) -> Vec<Figure> {
+    let phase_margin = Figure::new("Phase margin", m.phase_margin_deg, "deg", 2)
+        .at(m.phase_margin_rad_s)
+        .remark(&crossing_count(crossings));
+    let delay_margin = Figure::new("Delay margin", m.delay_margin_s, "s", 3)
+        .times(MS_PER_S, "ms")
+        .at(m.delay_margin_rad_s);
+    [
+        vec![
             Figure::new("Crossover", m.crossover_rad_s, "rad/s", 2).in_hertz(),
-            Figure::new("Phase margin", m.phase_margin_deg, "deg", 2)
-                .at(m.phase_margin_rad_s)
-                .remark(&crossings),
-            Figure::new("Gain margin", m.gain_margin_db, "dB", 2).at(m.gain_margin_rad_s),
-        ];
-        // Without a lower one the gain margin is the upper one.
-        if m.lower_gain_margin_db.is_some() {
-            figures.extend([
-                Figure::new("Upper gain margin", m.upper_gain_margin_db, "dB", 2)
-                    .at(m.upper_gain_margin_rad_s),
-                Figure::new("Lower gain margin", m.lower_gain_margin_db, "dB", 2)
-                    .at(m.lower_gain_margin_rad_s),
-            ]);
-        }
-        figures.extend([
-            Figure::new("Delay margin", m.delay_margin_s, "s", 3)
-                .times(MS_PER_S, "ms")
-                .at(m.delay_margin_rad_s),
-            Figure::new("Modulus margin", m.modulus_margin, "", 4),
-            Figure::new("Peak of S", m.sensitivity_peak_db, "dB", 2)
-                .at(Some(m.sensitivity_peak_rad_s)),
-            Figure::new(
-                "Sensitivity bandwidth",
-                m.sensitivity_bandwidth_rad_s,
-                "rad/s",
-                2,
-            )
-            .in_hertz(),
-        ]);
-        figures
-    }};
+            phase_margin,
+        ],
+        gain_margins(m),
+        vec![delay_margin],
+        sensitivity_figures(m),
+    ]
+    .concat()
 }
-use margin_figures;
+
+/// The gain margin. Without a lower one it is the upper one.
+fn gain_margins<Q: Copy + Into<Quantity>>(m: &LoopMargins<Q>) -> Vec<Figure> {
+    let decibels =
+        |name, margin_db: Option<Q>, rad_s| Figure::new(name, margin_db, "dB", 2).at(rad_s);
+    let smallest = decibels("Gain margin", m.gain_margin_db, m.gain_margin_rad_s);
+    if m.lower_gain_margin_db.is_none() {
+        return vec![smallest];
+    }
+    let (upper_db, lower_db) = (m.upper_gain_margin_db, m.lower_gain_margin_db);
+    vec![
+        smallest,
+        decibels("Upper gain margin", upper_db, m.upper_gain_margin_rad_s),
+        decibels("Lower gain margin", lower_db, m.lower_gain_margin_rad_s),
+    ]
+}
+
+fn sensitivity_figures<Q: Copy + Into<Quantity>>(m: &LoopMargins<Q>) -> Vec<Figure> {
+    let bandwidth_rad_s = m.sensitivity_bandwidth_rad_s;
+    vec![
+        Figure::new("Modulus margin", m.modulus_margin, "", 4),
+        Figure::new("Peak of S", m.sensitivity_peak_db, "dB", 2).at(Some(m.sensitivity_peak_rad_s)),
+        Figure::new("Sensitivity bandwidth", bandwidth_rad_s, "rad/s", 2).in_hertz(),
+    ]
+}
 
 /// The margins of a loop that a swept reference has measured.
 pub fn swept_loop(outputs: &LoopOutputs) -> Vec<Figure> {

@@ -66,28 +66,23 @@ impl Quantity {
 
 impl From<f64> for Quantity {
     fn from(value: f64) -> Quantity {
-        Some(value).into()
-    }
-}
-
-impl From<Option<f64>> for Quantity {
-    fn from(value: Option<f64>) -> Quantity {
-        Quantity { value, sigma: None }
+        Quantity::new(value, None)
     }
 }
 
 impl From<Estimate> for Quantity {
     fn from(estimate: Estimate) -> Quantity {
-        Some(estimate).into()
+        Quantity::new(estimate.value, Some(estimate.sigma))
     }
 }
 
-impl From<Option<Estimate>> for Quantity {
-    fn from(estimate: Option<Estimate>) -> Quantity {
-        Quantity {
-            value: estimate.map(|estimate| estimate.value),
-            sigma: estimate.map(|estimate| estimate.sigma),
-        }
+impl<Q: Into<Quantity>> From<Option<Q>> for Quantity {
+    fn from(quantity: Option<Q>) -> Quantity {
+        let none = Quantity {
+            value: None,
+            sigma: None,
+        };
+        quantity.map_or(none, Q::into)
     }
 }
 
