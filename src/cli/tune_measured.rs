@@ -139,7 +139,7 @@ pub(super) fn text(frfs: &[FrfEvidence], remarks: &[String]) -> String {
     if frfs.is_empty() {
         return String::new();
     }
-    let legend = "lower margin: smallest |1 + L| - 2.448 sigma |C| over the measured frequencies; at each of them the true distance is larger with 95 %. modulus margin: of the measured response, ± 95 % confidence interval";
+    let legend = "Lower margin: smallest |1 + L| - 2.448 sigma |C| over the measured frequencies; at each of them the true distance is larger with 95 %. Modulus margin: of the measured response, ± 95 % confidence interval";
     let files = frfs.iter().map(|frf| {
         let line = format!("{}: {}, SHA-256 {}", frf.plant, frf.file, &frf.sha256);
         wrap(&line, 2)

@@ -10,7 +10,7 @@ use bench_report::figures::{binding_table, plant_table};
 /// The design as text.
 pub(super) fn text(certificate: &DesignCertificate, explain: bool, folder: &Path) -> String {
     let title = certificate.title();
-    let legend = "margin: modulus margin; slope, bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; rms: error and current under the disturbance and noise of the configuration; gain margin, phase: gain margin and phase margin";
+    let legend = "Margin: modulus margin; Slope, Bandwidth: slope bandwidth and sensitivity bandwidth in rad/s; |S| at 10: at 10 rad/s; |KS|: largest value; RMS: error and current under the disturbance and noise of the configuration; Gain margin, Phase: gain margin and phase margin";
     let folder = folder.display();
     let files = format!(
         "files: {folder}/controller.toml, certificate.json, report.html, loop.svg, nyquist.svg\nuse it: bench control --controller {folder}/controller.toml\n"

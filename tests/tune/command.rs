@@ -40,7 +40,7 @@ fn explains_what_limits_the_design() {
     for part in [
         "slope bandwidth",
         "modulus margin",
-        "requirement that limits",
+        "Requirement that limits",
         "goal",
     ] {
         assert!(answer.out.contains(part), "{part}: {}", answer.out);

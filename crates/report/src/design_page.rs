@@ -7,7 +7,7 @@ use bench_experiment::tuning::DesignCertificate;
 
 const FIGURES_NOTE: &str = "Margin: modulus margin, the smallest distance of L from -1 with everything that the plant lacks at its \
     most unfavourable phase. Slope: largest frequency w_s in rad/s with |S(jw)| ≤ 0.707 w/w_s for all w ≤ w_s. Bandwidth: in rad/s, up \
-    to it |S| ≤ 0.707. |S| at 10: at 10 rad/s. |KS|: its largest value. Rms: error and current under the disturbance and the noise. Gain \
+    to it |S| ≤ 0.707. |S| at 10: at 10 rad/s. |KS|: its largest value. RMS: error and current under the disturbance and the noise. Gain \
     margin, phase: without what the plant lacks.";
 const BINDING_NOTE: &str =
     "Requirements that are fulfilled with almost no slack, the tightest first.";

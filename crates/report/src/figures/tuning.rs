@@ -10,16 +10,16 @@ use bench_experiment::tuning::{FrfEvidence, ModeRole};
 /// The figures of each plant.
 pub fn plant_table(plants: &[PlantFigures]) -> Table {
     let columns = [
-        "plant",
-        "margin",
-        "slope",
-        "bandwidth",
+        "Plant",
+        "Margin",
+        "Slope",
+        "Bandwidth",
         "|S| at 10",
         "|KS| A/µm",
-        "rms µm",
-        "rms A",
-        "gain margin",
-        "phase deg",
+        "RMS µm",
+        "RMS A",
+        "Gain margin",
+        "Phase deg",
     ];
     Table::new(columns).with_rows(plants.iter().map(plant_row))
 }
@@ -48,10 +48,10 @@ fn optional(value: Option<f64>, digits: usize) -> String {
 /// The requirements that limit the design.
 pub fn binding_table(binding: &[Binding]) -> Table {
     let columns = [
-        "requirement that limits the design",
-        "plant",
+        "Requirement that limits the design",
+        "Plant",
         "rad/s",
-        "slack %",
+        "Slack %",
     ];
     Table::new(columns).with_rows(binding.iter().map(binding_row))
 }
@@ -69,14 +69,14 @@ fn binding_row(binding: &Binding) -> Vec<String> {
 /// The evidence of measured responses.
 pub fn frf_table(frfs: &[FrfEvidence]) -> Table {
     let columns = [
-        "plant",
-        "lower margin",
-        "at Hz",
-        "modulus margin",
-        "band Hz",
+        "Plant",
+        "Lower margin",
+        "At Hz",
+        "Modulus margin",
+        "Band Hz",
         "CNMP zeros",
-        "modes used with sign (Hz)",
-        "tolerated above µm/A",
+        "Modes used with sign (Hz)",
+        "Tolerated above µm/A",
     ];
     Table::new(columns).with_rows(frfs.iter().map(frf_row))
 }
