@@ -44,12 +44,34 @@ const REFUSALS: [(StatusCode, &str); 5] = [
 /// A JSON body.
 pub struct Body<T>(pub T);
 
-impl<S: Send + Sync, T: DeserializeOwned> FromRequest<S> for Body<T> {
+/// What a body contains.
+pub trait FromJson: DeserializeOwned {
+    /// Reads the object.
+    fn from_json(body: JsonBody) -> Result<Self, ApiError> {
+        body.object()
+    }
+}
+
+/// The answer names the option that is refused.
+impl FromJson for Order {
+    fn from_json(body: JsonBody) -> Result<Order, ApiError> {
+        Ok(Order::from_json(body.value).map_err(RequestError::from)?)
+    }
+}
+
+/// The answer names the field that is refused.
+impl FromJson for RunRequest {
+    fn from_json(body: JsonBody) -> Result<RunRequest, ApiError> {
+        Ok(RunRequest::from_json(body.value)?)
+    }
+}
+
+impl<S: Send + Sync, T: FromJson> FromRequest<S> for Body<T> {
     type Rejection = ApiError;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
-        let text = JsonText::receive(request, state).await?;
-        text.object().map(Body)
+        let body = JsonBody::receive(request, state).await?;
+        T::from_json(body).map(Body)
     }
 }
 
@@ -71,65 +93,22 @@ impl<T: JsonSchema> OperationInput for Body<T> {
     }
 }
 
-/// A JSON body with an order. If the order is refused, the answer names the field that is wrong.
-pub struct OrderBody<T>(pub T);
-
-/// What contains an order and is read from JSON.
-pub trait FromJson: Sized {
-    /// Reads it.
-    fn from_json(value: Value) -> Result<Self, RequestError>;
-}
-
-impl FromJson for Order {
-    fn from_json(value: Value) -> Result<Order, RequestError> {
-        Ok(Order::from_json(value)?)
-    }
-}
-
-impl FromJson for RunRequest {
-    fn from_json(value: Value) -> Result<RunRequest, RequestError> {
-        RunRequest::from_json(value)
-    }
-}
-
-impl<S: Send + Sync, T: FromJson> FromRequest<S> for OrderBody<T> {
-    type Rejection = ApiError;
-
-    async fn from_request(request: Request, state: &S) -> Result<Self, ApiError> {
-        let text = JsonText::receive(request, state).await?;
-        Ok(OrderBody(T::from_json(text.value)?))
-    }
-}
-
-impl<T: JsonSchema> OperationInput for OrderBody<T> {
-    fn operation_input(context: &mut GenContext, operation: &mut Operation) {
-        Body::<T>::operation_input(context, operation);
-    }
-
-    fn inferred_early_responses(
-        context: &mut GenContext,
-        operation: &mut Operation,
-    ) -> Vec<(Option<DescribedCode>, Described)> {
-        Body::<T>::inferred_early_responses(context, operation)
-    }
-}
-
 /// A body that is valid JSON.
-struct JsonText {
+pub struct JsonBody {
     bytes: Bytes,
     value: Value,
 }
 
-impl JsonText {
+impl JsonBody {
     /// Receives the body of a request.
-    async fn receive(request: Request, state: &(impl Send + Sync)) -> Result<JsonText, ApiError> {
+    async fn receive(request: Request, state: &(impl Send + Sync)) -> Result<JsonBody, ApiError> {
         let headers = request.headers().clone();
         let read = tokio::time::timeout(BODY_TIME, Bytes::from_request(request, state));
         let read = read.await.map_err(|_| too_late())?;
         let bytes = read.map_err(|rejection| not_received(&rejection))?;
         require_json(&headers)?;
         let value = serde_json::from_slice(&bytes).map_err(|error| not_json(&error))?;
-        Ok(JsonText { bytes, value })
+        Ok(JsonBody { bytes, value })
     }
 
     /// Reads the object. From the text, because a field that stands twice is refused there.
@@ -237,8 +216,8 @@ mod tests {
     async fn refusals(order: &Value) -> [(u16, Value); 2] {
         let (json, text) = (Some("application/json"), order.to_string());
         [
-            refusal::<OrderBody<RunRequest>>(json, text.clone()).await,
-            refusal::<OrderBody<Order>>(json, text).await,
+            refusal::<Body<RunRequest>>(json, text.clone()).await,
+            refusal::<Body<Order>>(json, text).await,
         ]
     }
 
@@ -298,7 +277,7 @@ mod tests {
         ] {
             let order = json!({ "command": "chirp", field: value });
             let (status, error) =
-                refusal::<OrderBody<RunRequest>>(Some("application/json"), order.to_string()).await;
+                refusal::<Body<RunRequest>>(Some("application/json"), order.to_string()).await;
             assert_eq!((status, &error["where"]), (422, &json!(field)), "{error}");
         }
     }
@@ -314,9 +293,9 @@ mod tests {
             ("{} x", "line 1 column 4"),
         ] {
             for (status, error) in [
-                refusal::<OrderBody<RunRequest>>(Some("application/json"), body).await,
-                refusal::<OrderBody<Order>>(Some("application/json"), body).await,
-                refusal::<Body<Value>>(Some("application/json"), body).await,
+                refusal::<Body<RunRequest>>(Some("application/json"), body).await,
+                refusal::<Body<Order>>(Some("application/json"), body).await,
+                refusal::<Body<Factors>>(Some("application/json"), body).await,
             ] {
                 let message = error["message"].as_str().expect("a message");
                 assert_eq!(status, 400, "{message}");
@@ -333,7 +312,7 @@ mod tests {
             (Some("text/plain"), "`text/plain`"),
             (Some("application/jsonp"), "`application/jsonp`"),
         ] {
-            let (status, error) = refusal::<OrderBody<Order>>(content_type, "{}").await;
+            let (status, error) = refusal::<Body<Order>>(content_type, "{}").await;
             let message = error["message"].as_str().expect("a message");
             assert_eq!((status, &error["where"]), (415, &json!("Content-Type")));
             assert!(message.contains(named), "{message}");
@@ -341,7 +320,7 @@ mod tests {
         }
         for content_type in ["application/json; charset=utf-8", "Application/x+JSON"] {
             // It is read: its order is what is refused.
-            let (status, _) = refusal::<OrderBody<Order>>(Some(content_type), "{}").await;
+            let (status, _) = refusal::<Body<Order>>(Some(content_type), "{}").await;
             assert_eq!(status, 422, "{content_type}");
         }
     }
@@ -352,6 +331,8 @@ mod tests {
         #[expect(dead_code, reason = "only whether it can be read is of interest")]
         gain: f64,
     }
+
+    impl FromJson for Factors {}
 
     #[tokio::test]
     async fn other_body_is_refused_without_the_words_of_the_library() {
@@ -373,7 +354,7 @@ mod tests {
     fn every_refusal_of_a_body_is_described_with_the_error_object() {
         let described = aide::generate::in_context(|context| {
             let mut operation = Operation::default();
-            OrderBody::<Order>::inferred_early_responses(context, &mut operation)
+            Body::<Order>::inferred_early_responses(context, &mut operation)
         });
         let codes: Vec<String> = described
             .iter()

@@ -10,7 +10,7 @@ use axum::response::{IntoResponse, NoContent, Response};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::body::Body;
+use super::body::{Body, FromJson};
 use super::download::OpenFile;
 use super::error::ApiError;
 use super::extract::{ClientAddress, InPath, InQuery};
@@ -146,6 +146,8 @@ pub struct Note {
     #[serde(default)]
     note: String,
 }
+
+impl FromJson for Note {}
 
 /// Changes name and note of a recording.
 pub async fn note(

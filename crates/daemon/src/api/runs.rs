@@ -13,7 +13,7 @@ use futures_util::stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::body::{Body, OrderBody};
+use super::body::{Body, FromJson};
 use super::error::ApiError;
 use super::extract::{Client, InPath, LeaseHeader, StopBody};
 use super::file_check::check_files;
@@ -71,7 +71,7 @@ pub async fn one(
 pub async fn start(
     State(daemon): State<Arc<Daemon>>,
     LeaseHeader(lease): LeaseHeader,
-    OrderBody(request): OrderBody<RunRequest>,
+    Body(request): Body<RunRequest>,
 ) -> Result<Accepted<RunView>, ApiError> {
     check_texts(&request.name, &request.note)?;
     let operator = daemon.read(|schedule| {
@@ -173,7 +173,7 @@ pub async fn clear(
 /// Predicts travel, current, heat and duration. Moves nothing.
 pub async fn plan(
     State(daemon): State<Arc<Daemon>>,
-    OrderBody(order): OrderBody<Order>,
+    Body(order): Body<Order>,
 ) -> Result<Json<serde_json::Value>, ApiError> {
     check_files(&daemon, order.files()).await?;
     let computed = worker::plan(&daemon, order).await?;
@@ -197,6 +197,8 @@ pub struct TuneRequest {
     #[serde(default = "half_second")]
     ramp_s: f64,
 }
+
+impl FromJson for TuneRequest {}
 
 fn one_factor() -> f64 {
     1.0

@@ -7,7 +7,7 @@ use axum::extract::State;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::body::Body;
+use super::body::{Body, FromJson};
 use super::error::ApiError;
 use super::extract::ClientAddress;
 use super::file_check::check_files;
@@ -95,6 +95,8 @@ pub struct NewConfig {
     #[serde(default)]
     sets: Vec<String>,
 }
+
+impl FromJson for NewConfig {}
 
 /// Checks a configuration. Nothing is changed.
 pub async fn check(

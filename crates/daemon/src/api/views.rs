@@ -3,6 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::body::FromJson;
 use crate::hold::Hold;
 use crate::lease::Lease;
 use crate::live::hub::{LoopView, Share, TripView};
@@ -178,6 +179,8 @@ pub struct Operator {
     /// Name of the operator.
     pub operator: String,
 }
+
+impl FromJson for Operator {}
 
 fn lease_view(lease: &Lease, now: Now) -> LeaseView {
     LeaseView {
