@@ -17,10 +17,10 @@
 //! | `plan` | what a run will do: settings, program, reference, and whether the loop is stable by the model |
 //! | `analysis` | what a recording shows of the stage: signals, frequency response, modes, verdict |
 //! | `errors` | why an experiment was refused or failed |
-//! | `forecast` | what a run will demand of rig and motor: travel, current, amplitudes, heat |
 //! | `live` | the open rig with its loop, recorder, supervisor and stop signals |
 //! | `replay` | the recorded readings through the same loop again |
 //! | `evidence` | certificates are issued, and compared with the rig of today before a loop closes |
+//! | `forecast` | what a run will do by the model, before it starts: travel, current, amplitudes, heat, response of the loop |
 //! | `run` | the runner of plans, on an own rig or on that of another process, and the summary of a run |
 //! | `calibration` | calibration by static steps and a short chirp |
 //! | `sequential` | short chirps until the verdict is certain |
@@ -61,8 +61,9 @@ pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,
 };
 pub use forecast::{
-    AmplitudePlanError, ExcitationPlan, MotorForecast, MotorSummary, PlanLimits, ResponseSource,
-    default_amplitude, extremes, predicted_extremes, rig_model, shape_amplitude,
+    AmplitudePlanError, ExcitationPlan, MotorForecast, MotorSummary, PlanLimits, PredictedSine,
+    PredictedStep, ResponseSource, default_amplitude, extremes, predicted_extremes, predicted_step,
+    rig_model, shape_amplitude,
 };
 pub use live::{
     DeviceNames, Feed, FeedSender, FeedSource, LiveRig, OpenBench, Opening, RecordingDefect,
@@ -77,9 +78,8 @@ pub use plan::{
 pub use replay::{Difference, ReplayError, Replayed, replay};
 pub use results::{
     BasicResults, ControlRun, ErrorSpectrum, Extent, LoopCurves, LoopModel, MeasuredLoopMargins,
-    Overview, PredictedSine, PredictedSpectrum, PredictedStep, RunFigures, SineResponse,
-    StepResponse, TrackingMetrics, control_run, measured_margins, overview, predicted_step,
-    run_figures, step_response, tracking_metrics,
+    Overview, PredictedSpectrum, RunFigures, SineResponse, StepResponse, TrackingMetrics,
+    control_run, measured_margins, overview, run_figures, step_response, tracking_metrics,
 };
 pub use run::{
     MotorHandling, PlannedRun, PlannedStageCheck, RigOwner, RunConditions, RunReport, RunSummary,

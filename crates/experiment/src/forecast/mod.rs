@@ -1,11 +1,14 @@
-//! What a run will demand of rig and motor, by the model, before it starts.
+//! What a run will do and demand of rig and motor, by the model, before it starts.
 //!
 //! First the extremes of an excitation (`prediction`) and the amplitudes that they allow (`amplitude_plan`), then the heat of the motor
-//! (`motor_forecast`) and the summary for the operator (`excitation_plan`).
+//! (`motor_forecast`) and the summary for the operator (`excitation_plan`). Of a closed loop the response to its reference
+//! (`predicted_step`, `predicted_sine`).
 
 mod amplitude_plan;
 mod excitation_plan;
 mod motor_forecast;
+mod predicted_sine;
+mod predicted_step;
 mod prediction;
 
 pub use amplitude_plan::{AmplitudePlanError, ResponseSource, default_amplitude, shape_amplitude};
@@ -13,4 +16,7 @@ pub(crate) use amplitude_plan::{limit_travel, shape_travel_m};
 pub use excitation_plan::{ExcitationPlan, PlanLimits};
 pub use motor_forecast::{MotorForecast, MotorSummary};
 pub(crate) use motor_forecast::{RESERVE, duration_text, predict};
+pub use predicted_sine::PredictedSine;
+pub(crate) use predicted_step::MAX_STEP_TICKS;
+pub use predicted_step::{PredictedStep, predicted_step};
 pub use prediction::{extremes, predicted_extremes, rig_model};

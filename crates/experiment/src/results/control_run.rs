@@ -1,7 +1,5 @@
 //! A recorded closed-loop run as its report shows it.
 
-use serde::Serialize;
-
 use super::closed_signals::ClosedSignals;
 use super::error_spectrum::{ErrorSpectrum, SpectrumModel, error_spectrum};
 use super::overview::{Overview, overview};
@@ -11,6 +9,7 @@ use super::step_response::{StepResponse, step_response};
 use super::tracking::{TrackingMetrics, steady_tick, tracking_metrics};
 use crate::analysis::Ending;
 use crate::errors::ExperimentError;
+use crate::forecast::PredictedSine;
 use crate::plan::{Plan, PlanError, closed_loop_of, swept_reference};
 use crate::run::TripSummary;
 use bench_base::units::{hz, rad_s};
@@ -60,35 +59,6 @@ pub struct LoopModel {
     pub margins: Margins,
     /// Least modulus margin with which it may run; 0 for none.
     pub min_modulus_margin: f64,
-}
-
-/// Gain and phase of T = L/(1 + L) by the model.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct PredictedSine {
-    /// |T|.
-    pub gain: f64,
-    /// Phase of T in degrees.
-    pub phase_deg: f64,
-}
-
-impl PredictedSine {
-    /// The response at the frequency of a sine reference; `None` for another reference, for an unstable loop, and with a feedforward
-    /// current, whose gain is 1 by the model.
-    pub fn of(
-        config: &Config,
-        closed_loop: &ClosedLoop,
-        margins: &Margins,
-    ) -> Option<PredictedSine> {
-        let frequency_hz = config.control.reference.design().sine_hz()?;
-        if !margins.stable || !config.control.feedforward.is_none() {
-            return None;
-        }
-        let response = closed_loop.complementary_sensitivity(rad_s(frequency_hz));
-        Some(PredictedSine {
-            gain: response.norm(),
-            phase_deg: libm::atan2(response.im, response.re).to_degrees(),
-        })
-    }
 }
 
 impl ControlRun {

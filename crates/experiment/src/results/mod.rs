@@ -17,7 +17,7 @@ mod tracking;
 
 pub use basic_results::BasicResults;
 pub(crate) use closed_signals::ClosedSignals;
-pub use control_run::{ControlRun, LoopModel, PredictedSine, control_run};
+pub use control_run::{ControlRun, LoopModel, control_run};
 pub(crate) use error_spectrum::error_spectrum;
 pub use error_spectrum::{ErrorSpectrum, PredictedSpectrum};
 pub(crate) use measured_margins::margins_around;
@@ -25,6 +25,6 @@ pub use measured_margins::{LoopCurves, MeasuredLoopMargins, measured_margins};
 pub use overview::{Extent, Overview, overview};
 pub use run_figures::{RunFigures, run_figures};
 pub use sine_response::SineResponse;
-pub use step_response::{PredictedStep, StepResponse, predicted_step, step_response};
+pub use step_response::{StepResponse, step_response};
 pub(crate) use tracking::steady_tick;
 pub use tracking::{TrackingMetrics, tracking_metrics};
