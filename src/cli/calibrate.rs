@@ -13,9 +13,8 @@ use super::table::wrap;
 use bench_base::decimal::Decimal;
 use bench_base::progress::Progress;
 use bench_config::{Config, warnings};
-use bench_excitation::Extremes;
 use bench_experiment::calibration::{self, CalibrationPlan};
-use bench_experiment::{PlanLimits, RunSummary, Runner};
+use bench_experiment::{CalibrationForecast, RunSummary, Runner};
 use bench_order::{CalibrateOrder, Order};
 use bench_rig::calibration::{
     AmplifierCalibration, Calibration, ChainCalibration, ProbeCalibration,
@@ -44,45 +43,6 @@ impl Args {
     }
 }
 
-/// The JSON object of `--plan`: the extremes of both runs.
-#[derive(Debug, Serialize)]
-struct PlanReport {
-    steps: Extremes,
-    chirp: Option<Extremes>,
-    expected: ExpectedExtremes,
-    limits: PlanLimits,
-}
-
-/// The larger ones of both runs, and their length.
-#[derive(Debug, Serialize)]
-struct ExpectedExtremes {
-    travel_m: f64,
-    current_a: f64,
-    thermal_current_a: f64,
-    duration_s: f64,
-}
-
-impl PlanReport {
-    fn new(plan: &CalibrationPlan, config: &Config, with_delay: bool) -> PlanReport {
-        let (steps, chirp) = (plan.steps, with_delay.then_some(plan.chirp));
-        let largest = |value: fn(&Extremes) -> f64| {
-            let chirp = chirp.as_ref().map_or(0.0, value);
-            value(&steps).max(chirp)
-        };
-        PlanReport {
-            expected: ExpectedExtremes {
-                travel_m: largest(|extremes| extremes.travel_m),
-                current_a: largest(|extremes| extremes.current_a),
-                thermal_current_a: largest(|extremes| extremes.thermal_current_a),
-                duration_s: steps.duration_s + chirp.map_or(0.0, |chirp| chirp.duration_s),
-            },
-            steps,
-            chirp,
-            limits: PlanLimits::of(config),
-        }
-    }
-}
-
 /// The JSON object of the command.
 #[derive(Debug, Serialize)]
 struct Report {
@@ -101,9 +61,10 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     check_target(args.order.write.as_deref())?;
     if args.plan {
         warn(&warnings(&config));
-        let report = PlanReport::new(&plan, &config, !args.order.no_delay);
+        let chirp = (!args.order.no_delay).then_some(plan.chirp);
+        let forecast = CalibrationForecast::new(&config, plan.steps, chirp);
         let text = plan_text(&plan, &config, !args.order.no_delay);
-        print_result(args.order.bench.json, &report, |_| text)?;
+        print_result(args.order.bench.json, &forecast, |_| text)?;
         return Ok(Exit::Done);
     }
     let setup = args.command().setup(&config)?;

@@ -1,22 +1,18 @@
 //! `bench control`: run the closed loop with a reference.
 
-use serde::Serialize;
-
 use super::analysis_output::analysis_exit;
 use super::chirp::outputs;
-use super::control_output::{self, ControlResult, PlanText, Predicted, Report};
+use super::control_output::{self, ControlResult, PlanText, Report};
 use super::error::CliError;
 use super::exit::Exit;
 use super::output::{print_result, print_text, warn};
 use super::plan_output;
 use super::run_options::{RunCommand, RunOptions, close, exit};
 use bench_config::warnings;
-use bench_control::{ClosedLoop, Margins, listed_poles};
-use bench_excitation::Extremes;
+use bench_control::listed_poles;
 use bench_experiment::evidence::{Evidence, require_evidence};
 use bench_experiment::{
-    CommandSummary, MotorSummary, Plan, PlanLimits, PredictedSine, Run, RunSummary, closed_loop,
-    predicted_step, require_margins,
+    ControlForecast, Plan, PredictedLoop, Run, RunSummary, closed_loop, require_margins,
 };
 use bench_order::{ControlOrder, Order, defaults_help};
 use bench_report::MagnitudeAxis;
@@ -53,7 +49,7 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     require_margins(&config, &margins, stage)?;
     let plan = Plan::control(config.clone())?.with_override(args.order.override_reason.clone());
     let evidence = require_evidence(&plan, stage, None)?;
-    let predicted = predicted(margins, &plan, &closed_loop);
+    let predicted = PredictedLoop::new(&plan, &closed_loop, margins);
     if args.plan {
         return print_plan(args, &plan, predicted, evidence);
     }
@@ -77,78 +73,30 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
     })
 }
 
-/// The JSON object of `--plan`.
-#[derive(Debug, Serialize)]
-struct PlanReport {
-    reference: String,
-    /// Extremes by the model; `None` if the loop of the model is unstable.
-    expected: Option<Extremes>,
-    limits: PlanLimits,
-    motor: Option<MotorSummary>,
-    /// Range and mounting of the probe; `None` for the simulated probe.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    probe: Option<String>,
-    predicted: Predicted,
-    /// Shaping, prefilter and feedforward.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    command: Option<CommandSummary>,
-    evidence: Evidence,
-}
-
 /// Prints what the run would do.
 fn print_plan(
     args: &Args,
     plan: &Plan,
-    predicted: Predicted,
+    predicted: PredictedLoop,
     evidence: Evidence,
 ) -> Result<Exit, CliError> {
-    let config = &plan.config;
-    let report = PlanReport {
-        reference: control_output::reference_text(config),
-        expected: plan.loop_extremes()?,
-        limits: PlanLimits::of(config),
-        motor: args.order.rig.motor_summary(plan)?,
-        probe: config.probe.device.scale_text(),
-        predicted,
-        command: plan.command_summary().cloned(),
-        evidence,
-    };
-    warn(&warnings(config));
-    warn(&report.evidence.defects);
-    print_result(args.order.bench.json, &report, |report| {
-        let command = report.command.as_ref().map(control_output::command_text);
-        let text = plan_output::control_text(
-            &(report.reference.clone() + &command.unwrap_or_default()),
-            report.expected.as_ref(),
-            &report.limits,
-            report.motor.as_ref(),
-        );
-        text + &plan_output::probe_text(report.probe.as_deref())
-            + &control_output::evidence_text(&report.evidence)
-            + &control_output::conditions_table(&report.evidence.conditions)
+    let mut forecast = ControlForecast::new(plan, predicted, evidence)?;
+    forecast.motor = args.order.rig.motor_summary(plan)?;
+    warn(&warnings(&plan.config));
+    warn(&forecast.evidence.defects);
+    print_result(args.order.bench.json, &forecast, |forecast| {
+        plan_output::control_text(forecast)
+            + &control_output::evidence_text(&forecast.evidence)
+            + &control_output::conditions_table(&forecast.evidence.conditions)
     })?;
     Ok(Exit::Done)
-}
-
-/// The margins and the response to the reference by the model.
-fn predicted(margins: Margins, plan: &Plan, closed_loop: &ClosedLoop) -> Predicted {
-    let step = if margins.stable {
-        predicted_step(plan, closed_loop).map(|step| step.metrics)
-    } else {
-        None
-    };
-    Predicted {
-        sine: PredictedSine::of(&plan.config, closed_loop, &margins),
-        margins,
-        step,
-    }
 }
 
 /// The result of a run: tracking, or responses of a swept reference.
 fn report(
     run: &mut Run,
     plan: &Plan,
-    predicted: Predicted,
+    predicted: PredictedLoop,
     evidence: Evidence,
     no_report: bool,
 ) -> Result<Report, CliError> {

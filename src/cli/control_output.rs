@@ -14,13 +14,13 @@ use super::run_options::run_text;
 use super::table::{figure_sentence, labelled, table};
 use bench_base::decimal::Decimal;
 use bench_config::Config;
-use bench_control::{Margins, Pole, StepMetrics};
+use bench_control::Pole;
 use bench_excitation::Extremes;
 use bench_experiment::evidence::{Agreement, Condition, Evidence};
 use bench_experiment::outputs::{AnalysisOutputs, ControlFiles, ExistingFile, ResultFiles};
 use bench_experiment::stage_check::RestAfterCheck;
 use bench_experiment::{
-    CommandSummary, Plan, PredictedSine, RunFigures, RunSummary, TrackingMetrics,
+    CommandSummary, Plan, PredictedLoop, RunFigures, RunSummary, TrackingMetrics,
     abandon_on_signal, control_run, run_figures, tracking_metrics,
 };
 use bench_recording::Recording;
@@ -32,7 +32,7 @@ use bench_report::run_pages::{ControlReport, write_control_page};
 pub(super) struct Report {
     #[serde(flatten)]
     pub run: RunSummary,
-    pub predicted: Predicted,
+    pub predicted: PredictedLoop,
     /// Shaping, prefilter and feedforward.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub command: Option<CommandSummary>,
@@ -46,18 +46,6 @@ pub(super) struct Report {
     /// Responses of plant and loop, from a swept reference.
     #[serde(flatten)]
     pub made: Option<AnalysisOutputs>,
-}
-
-/// The loop by the model.
-#[derive(Debug, Serialize)]
-pub(super) struct Predicted {
-    #[serde(flatten)]
-    pub margins: Margins,
-    #[serde(flatten)]
-    pub step: Option<StepMetrics>,
-    /// Gain and phase at the frequency of a sine.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sine: Option<PredictedSine>,
 }
 
 /// What a recorded run shows, unless its reference is swept.
@@ -145,7 +133,7 @@ fn written(report: &ControlReport<'_>, results: ResultFiles<'_>) -> Option<Contr
 /// Margins, reference and predicted response, printed before the run.
 pub(super) struct PlanText<'a> {
     pub plan: &'a Plan,
-    pub predicted: &'a Predicted,
+    pub predicted: &'a PredictedLoop,
     pub poles: &'a [Pole],
     pub evidence: &'a Evidence,
 }
@@ -155,7 +143,7 @@ impl fmt::Display for PlanText<'_> {
         let config = &self.plan.config;
         let margins = margins_text(config, &self.predicted.margins, self.poles);
         f.write_str(&margins)?;
-        f.write_str(&labelled("reference", &reference_text(config)))?;
+        f.write_str(&labelled("reference", &config.reference_text()))?;
         if let Some(command) = self.plan.command_summary() {
             let text = command_text(command);
             f.write_str(&labelled("command", text.trim_start_matches("; ")))?;
@@ -246,17 +234,6 @@ fn travel_text(extremes: &Extremes) -> String {
         "expected",
         &format!("travel of {travel_um:.1} um by the model"),
     )
-}
-
-/// The reference, and how long the loop is closed.
-pub(super) fn reference_text(config: &Config) -> String {
-    let duration_s = config.control.duration_s;
-    let reference = &config.control.reference;
-    if reference.is_swept() {
-        return config.swept_reference_text();
-    }
-    let reference = reference.design().describe();
-    format!("{reference}; the loop is closed for {duration_s} s")
 }
 
 /// Shaping, prefilter and feedforward, each after a semicolon.

@@ -1,8 +1,9 @@
 //! The plan of a run as text.
 
+use super::control_output::command_text;
 use super::table::labelled;
 use bench_excitation::{AmplitudePoint, Extremes};
-use bench_experiment::{ExcitationPlan, MotorSummary, PlanLimits};
+use bench_experiment::{ControlForecast, ExcitationPlan, MotorSummary, PlanLimits};
 
 /// Extremes with their limits, and the amplitude over frequency.
 pub(super) fn text(plan: &ExcitationPlan) -> String {
@@ -19,25 +20,22 @@ pub(super) fn text(plan: &ExcitationPlan) -> String {
 }
 
 /// The plan of a closed loop. Without extremes the loop of the model is unstable.
-pub(super) fn control_text(
-    reference: &str,
-    expected: Option<&Extremes>,
-    limits: &PlanLimits,
-    motor: Option<&MotorSummary>,
-) -> String {
-    let extremes = match expected {
-        Some(expected) => extremes_text(expected, limits),
+pub(super) fn control_text(plan: &ControlForecast) -> String {
+    let command = plan.command.as_ref().map_or(String::new(), command_text);
+    let extremes = match &plan.expected {
+        Some(expected) => extremes_text(expected, &plan.limits),
         None => labelled(
             "expected",
             "no prediction: the loop of the model is unstable",
         ),
     };
-    let motor = motor.map_or(String::new(), motor_text);
-    format!("{reference}; no motion\n{extremes}{motor}")
+    let motor = plan.motor.as_ref().map_or(String::new(), motor_text);
+    let (reference, probe) = (&plan.reference, probe_text(plan.probe.as_deref()));
+    format!("{reference}{command}; no motion\n{extremes}{motor}{probe}")
 }
 
 /// The scale of the probe.
-pub(super) fn probe_text(scale: Option<&str>) -> String {
+fn probe_text(scale: Option<&str>) -> String {
     scale.map_or(String::new(), |scale| labelled("probe", scale))
 }
 

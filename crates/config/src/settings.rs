@@ -92,6 +92,19 @@ impl Config {
         )
     }
 
+    /// Text that describes the reference of a closed loop, and how long the loop is closed.
+    pub fn reference_text(&self) -> String {
+        let control = &self.control;
+        if control.reference.is_swept() {
+            return self.swept_reference_text();
+        }
+        let reference = control.reference.design().describe();
+        format!(
+            "{reference}; the loop is closed for {} s",
+            control.duration_s
+        )
+    }
+
     /// The travel at which the interlocks trip, in metres of the stage: they judge the position in the metres of the probe as well.
     pub fn permitted_travel_m(&self) -> f64 {
         let gain = self.probe.device.mounting_gain().abs();

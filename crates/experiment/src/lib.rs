@@ -61,9 +61,10 @@ pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,
 };
 pub use forecast::{
-    AmplitudePlanError, ExcitationPlan, MotorForecast, MotorSummary, PlanLimits, PredictedSine,
-    PredictedStep, ResponseSource, default_amplitude, extremes, predicted_extremes, predicted_step,
-    rig_model, shape_amplitude,
+    AmplitudePlanError, CalibrationForecast, ControlForecast, ExcitationPlan, ExpectedExtremes,
+    MotorForecast, MotorSummary, PlanLimits, PredictedLoop, PredictedSine, PredictedStep,
+    ResponseSource, default_amplitude, extremes, predicted_extremes, predicted_step, rig_model,
+    shape_amplitude,
 };
 pub use live::{
     DeviceNames, Feed, FeedSender, FeedSource, LiveRig, OpenBench, Opening, RecordingDefect,
