@@ -125,12 +125,20 @@ fn unpacked(bytes: Vec<u8>) -> Vec<u8> {
 
 /// The text of UTF-16 with a byte order mark.
 fn utf16(bytes: &[u8]) -> Option<String> {
-    let (rest, read): (&[u8], fn([u8; 2]) -> u16) = match bytes {
-        [0xff, 0xfe, rest @ ..] => (rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => (rest, u16::from_be_bytes),
+    let (rest, is_big_endian) = match bytes {
+        [0xff, 0xfe, rest @ ..] => (rest, false),
+        [0xfe, 0xff, rest @ ..] => (rest, true),
         _ => return None,
     };
-    let units = rest.chunks_exact(2).map(|pair| read([pair[0], pair[1]]));
+    let unit = |pair: &[u8]| {
+        let pair = [pair[0], pair[1]];
+        if is_big_endian {
+            u16::from_be_bytes(pair)
+        } else {
+            u16::from_le_bytes(pair)
+        }
+    };
+    let units = rest.chunks_exact(2).map(unit);
     let characters = char::decode_utf16(units);
     Some(characters.map(|c| c.unwrap_or('\u{fffd}')).collect())
 }

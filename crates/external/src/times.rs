@@ -187,10 +187,7 @@ impl Stamp {
     fn floating(text: &str) -> Option<Stamp> {
         let number: f64 = text.parse().ok()?;
         // Beyond 2^63 no clock counts.
-        if !(number.abs() < 9.2e18) {
-            return None;
-        }
-        Some(Stamp {
+        (number.abs() < 9.2e18).then(|| Stamp {
             whole: number.trunc() as i128,
             fraction: number.fract(),
             decimals: None,
@@ -329,9 +326,11 @@ fn check_gaps(time_s: &[f64]) -> Result<(), TimeDefect> {
 /// A time before the one of the line above is an error; equal ones may be rounded, but not all of them.
 fn check_rising(time_s: &[f64]) -> Result<(), TimeDefect> {
     let constant = time_s.iter().all(|t| *t == time_s[0]);
-    let falls = time_s
-        .windows(2)
-        .position(|pair| constant || !(pair[1] >= pair[0]));
+    let is_wrong = |pair: &[f64]| {
+        let rises = pair[1] >= pair[0];
+        constant || !rises
+    };
+    let falls = time_s.windows(2).position(is_wrong);
     match falls {
         Some(k) => Err(TimeDefect::NotRising {
             at: k + 1,

@@ -240,7 +240,8 @@ fn has_certain_side(zero: &UncertainZero, certainty: Certainty) -> bool {
 
 /// Whether a zero is closer to the imaginary axis than a fit is accurate; also with a real part that is not finite.
 fn is_on_axis(zero: &UncertainZero) -> bool {
-    !(zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm())
+    let is_off = zero.s.re.abs() >= FIT_ACCURACY * zero.s.norm();
+    !is_off
 }
 
 /// The verdict from zeros that all have a certain side: the other two criteria must agree.
