@@ -183,7 +183,12 @@ fn recovery_after_one_altered_bit_loses_the_ticks_of_one_chunk_at_most_and_says_
         bytes[at] ^= flip;
         std::fs::write(&path, &bytes).expect("temporary file");
         bytes[at] ^= flip;
-        let recovered = recover(&path, &to).unwrap_or_else(|e| panic!("byte {at}: {e}"));
+        let recovery = recover(&path, &to).unwrap_or_else(|e| panic!("byte {at}: {e}"));
+        assert!(
+            recovery.others.is_empty() && recovery.unused.is_empty(),
+            "byte {at}: one recording, and every byte belongs to it"
+        );
+        let recovered = recovery.first;
         let new = Recording::open(&to).unwrap_or_else(|e| panic!("byte {at}: {e}"));
         let found: Vec<u64> = ticks_in(&new).iter().map(|tick| tick.tick).collect();
         let may_be_lost = ticks_at(at);

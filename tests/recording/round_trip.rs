@@ -420,7 +420,8 @@ fn recovered_file_is_complete_and_reports_the_truncation() {
     let cut = dir.path().join("cut.mcap");
     std::fs::write(&cut, &bytes[..bytes.len() * 6 / 10]).expect("temporary");
 
-    let recovered = recover(&cut, &dir.path().join("whole.mcap")).expect("recoverable");
+    let recovery = recover(&cut, &dir.path().join("whole.mcap")).expect("recoverable");
+    let recovered = recovery.first;
     let whole = Recording::open(&recovered.totals.path).expect("complete");
     let old = Recording::open(&cut).expect("readable");
     assert!(old.truncated() && !whole.truncated());

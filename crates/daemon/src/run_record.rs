@@ -4,8 +4,9 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use bench_base::atomic_file::numbered_names;
 use bench_base::lock_file::{Holder, LockError, LockFile};
-use bench_recording::{Recording, RecordingError, recover};
+use bench_recording::{Recording, RecordingError, Recovery, recover};
 
 /// The file of the record, in the folder of the recordings.
 const FILE: &str = ".bench-daemon.lock";
@@ -66,7 +67,7 @@ pub fn recover_cut_recordings(folder: &Path) -> Vec<String> {
     };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
     let cut = paths.filter(|path| is_cut(path));
-    cut.filter_map(|path| recovered(&path)).collect()
+    cut.flat_map(|path| recovered(&path)).collect()
 }
 
 /// Whether a recording has no end and no recovered copy.
@@ -97,37 +98,55 @@ fn copy_of(path: &Path) -> PathBuf {
     path.with_file_name(format!("{stem}{RECOVERED}"))
 }
 
-/// The name of the copy; `None` if there is none.
-fn recovered(path: &Path) -> Option<String> {
-    let copy = copy_of(path);
+/// The names of the copies, one for each recording in the file.
+fn recovered(path: &Path) -> Vec<String> {
     let shown = path.display();
-    match recover_to(path, &copy) {
-        Ok(()) => {
-            let ticks = Recording::open(&copy).map_or(0, |recording| recording.tick_count());
-            let copy = copy.file_name()?.to_string_lossy().into_owned();
-            tracing::warn!("{shown} was cut off; its {ticks} ticks are in {copy}");
-            Some(copy)
-        }
+    match recover_to(path, &copy_of(path)) {
+        Ok(copies) => copies
+            .iter()
+            .filter_map(|copy| reported(path, copy))
+            .collect(),
         Err(RecordingError::InUse { .. }) => {
             tracing::info!("{shown} is written by another process and was left alone");
-            None
+            Vec::new()
         }
         Err(error) => {
             tracing::warn!("{shown} was cut off and cannot be recovered: {error}");
-            None
+            Vec::new()
         }
     }
 }
 
+fn reported(path: &Path, copy: &Path) -> Option<String> {
+    let ticks = Recording::open(copy).map_or(0, |recording| recording.tick_count());
+    let name = copy.file_name()?.to_string_lossy().into_owned();
+    tracing::warn!(
+        "{} was cut off; {ticks} ticks of it are in {name}",
+        path.display()
+    );
+    Some(name)
+}
+
 /// Recovers under another name, so that a copy that is cut off itself does not pass for a complete one.
-fn recover_to(path: &Path, copy: &Path) -> Result<(), RecordingError> {
+fn recover_to(path: &Path, copy: &Path) -> Result<Vec<PathBuf>, RecordingError> {
     let partial = PathBuf::from(format!("{}{PARTIAL}", copy.display()));
     let _ = std::fs::remove_file(&partial); // left by a recovery that was cut off
-    let recovered = recover(path, &partial).and_then(|_| rename(&partial, copy));
+    let recovered = recover(path, &partial).and_then(|recovery| rename_all(&recovery, copy));
     if recovered.is_err() {
         let _ = std::fs::remove_file(&partial); // the error of the recovery is the one to report
     }
     recovered
+}
+
+/// Gives the recovered files their names: `copy`, then free names beside it.
+fn rename_all(recovery: &Recovery, copy: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+    let is_free = |name: &PathBuf| name == copy || !name.exists();
+    let names = numbered_names(copy).filter(is_free);
+    let renamed = recovery.recordings().zip(names).map(|(recovered, name)| {
+        rename(&recovered.totals.path, &name)?;
+        Ok(name)
+    });
+    renamed.collect()
 }
 
 fn rename(from: &Path, to: &Path) -> Result<(), RecordingError> {
@@ -212,5 +231,22 @@ mod tests {
         std::fs::write(&partial, &bytes[..50]).expect("a recovery that was cut off");
         assert_eq!(recover_cut_recordings(folder.path()), ["a-recovered.mcap"]);
         assert!(!partial.exists());
+    }
+
+    #[test]
+    fn each_recording_of_a_joined_file_has_a_copy() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.mcap");
+        let whole = cut_off(recorder(&path), &path);
+        let cut = std::fs::read(&path).expect("a file");
+        std::fs::write(&path, [whole, cut].concat()).expect("space");
+        let copies = recover_cut_recordings(folder.path());
+        assert_eq!(copies, ["a-recovered.mcap", "a-recovered-2.mcap"]);
+        for copy in copies {
+            let copy = Recording::open(&folder.path().join(copy)).expect("complete");
+            assert_eq!(copy.tick_count(), 300);
+        }
+        let files = std::fs::read_dir(folder.path()).expect("a folder");
+        assert_eq!(files.count(), 3, "no partial file is left");
     }
 }

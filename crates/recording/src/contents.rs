@@ -244,6 +244,16 @@ impl Contents {
         }
     }
 
+    /// Whether this is the metadata record of this program, of which the file already has one.
+    pub(super) fn repeats_own_metadata(&self, metadata: &[u8]) -> bool {
+        self.has_own_metadata && is_intact(op::METADATA, metadata)
+    }
+
+    /// Whether a message of this program was read.
+    pub(super) fn has_messages(&self) -> bool {
+        self.channel_numbers.iter().any(|numbers| numbers.next > 0)
+    }
+
     /// Whether the file has the channel with the ticks.
     pub(super) fn has_loop(&self) -> bool {
         self.topics.values().any(|t| *t == Topic::Loop)
@@ -335,19 +345,41 @@ fn attachment_text(data: &[u8], error: &McapError) -> String {
     )
 }
 
-/// An attachment consists of two times (u64), name and media type (each with its length u32), the length of the content (u64),
-/// the content, and a CRC (u32). `mcap` panics if the record ends between the length and the CRC.
+/// `mcap` panics if an attachment ends between the length and the CRC.
 fn attachment_is_framed(record: &[u8]) -> bool {
-    let after_string = |rest: &[u8]| {
-        let (length, text) = rest.split_first_chunk::<4>()?;
-        text.get(u32::from_le_bytes(*length) as usize..)
-            .map(<[u8]>::len)
+    attachment_rest(record).is_some_and(|rest| rest.len() >= 8 + 4)
+}
+
+/// An attachment consists of two times (u64), name and media type (each with its length u32), the length of the content (u64),
+/// the content, and a CRC (u32). Returns the part that begins with the length of the content.
+fn attachment_rest(record: &[u8]) -> Option<&[u8]> {
+    record.get(16..).and_then(after_text).and_then(after_text)
+}
+
+/// A chunk consists of two times and the size of its uncompressed records (u64 each), their CRC (u32), the name of the compression
+/// (length u32 and text), and the length (u64) and the bytes of the records. Returns the part that begins with the length.
+fn chunk_rest(record: &[u8]) -> Option<&[u8]> {
+    record.get(28..).and_then(after_text)
+}
+
+/// What follows a text, which begins with its length (u32).
+pub(super) fn after_text(bytes: &[u8]) -> Option<&[u8]> {
+    let (length, text) = bytes.split_first_chunk::<4>()?;
+    text.get(u32::from_le_bytes(*length) as usize..)
+}
+
+/// Whether the length that a record of this content has is confirmed by the lengths inside, so that it is true although
+/// something else may be altered.
+pub(super) fn is_length_confirmed(opcode: u8, data: &[u8]) -> bool {
+    let (rest, crc_bytes) = match opcode {
+        op::CHUNK => (chunk_rest(data), 0),
+        op::ATTACHMENT => (attachment_rest(data), 4),
+        _ => (None, 0),
     };
-    let tail = |remaining: usize| &record[record.len() - remaining..];
-    let after_name = record.get(16..).and_then(after_string);
-    after_name
-        .and_then(|n| after_string(tail(n)))
-        .is_some_and(|n| n >= 8 + 4)
+    rest.and_then(<[u8]>::split_first_chunk::<8>)
+        .is_some_and(|(length, content)| {
+            u64::from_le_bytes(*length).checked_add(crc_bytes) == Some(content.len() as u64)
+        })
 }
 
 /// The name in an attachment that is framed.

@@ -118,6 +118,15 @@ pub enum RecordingError {
         /// Why it has none.
         emptiness: Emptiness,
     },
+    /// Another recording follows in the file.
+    #[error("{}: this file holds more than one recording, another one begins at byte {next_at_byte}; \
+        write each to a file of its own with `bench recover`", path.display())]
+    Several {
+        /// The file.
+        path: PathBuf,
+        /// Where the next recording begins.
+        next_at_byte: u64,
+    },
     /// The content of the file was changed, or parts of it are missing.
     #[error("{}: damaged at byte {at_byte}, after {ticks} good ticks: {what}; \
         copy the intact data to a new recording with `bench recover`", path.display())]
@@ -145,7 +154,7 @@ pub enum Emptiness {
 }
 
 impl Emptiness {
-    fn why(self) -> &'static str {
+    pub(super) fn why(self) -> &'static str {
         match self {
             Emptiness::Complete => "it is complete",
             Emptiness::CutOff => "it was cut off before its first half second was written",

@@ -15,8 +15,9 @@
 //! | `disk` | [`DiskWatch`]: ends a run before its recording fills the disk |
 //! | `walk`, `contents` | read a file record by record and return only checked data |
 //! | `reader`, `stream` | [`Recording`]: opens complete and cut-off files, counts gaps, streams [`Ticks`] |
-//! | `summary`, `scanner`, `losses` | read a damaged file: pass over each damage to the next intact record |
-//! | `recover` | [`recover()`]: copies the intact parts of a cut-off or damaged file to a complete one |
+//! | `summary`, `scanner`, `losses` | read a damaged recording: pass over each damage to the next intact record |
+//! | `boundary`, `file_range` | find the recordings in a file that holds several |
+//! | `recover` | [`recover()`]: copies the intact parts of each recording in a cut-off or damaged file to a complete file |
 //!
 //! # Guarantees for a reader
 //!
@@ -34,6 +35,7 @@
 #![deny(unsafe_code)]
 
 mod attachments;
+mod boundary;
 mod contents;
 mod continuity;
 mod descriptor;
@@ -41,12 +43,15 @@ mod digest;
 mod disk;
 mod error;
 mod event_message;
+mod file_range;
 mod live_encoder;
 mod log_time;
 mod losses;
 pub mod messages;
 mod reader;
+mod recording_contents;
 mod recover;
+mod refusal;
 mod scanner;
 pub mod schema;
 mod stream;
@@ -67,8 +72,9 @@ pub use error::{Emptiness, RecordingError};
 pub use event_message::event_text;
 pub use live_encoder::{EncodedMessage, LiveEncoder};
 pub use losses::{Cut, DamagedRange, MissingTicks};
-pub use reader::{Recording, TickReceiver};
-pub use recover::{Recovered, recover};
+pub use reader::Recording;
+pub use recording_contents::TickReceiver;
+pub use recover::{Recovered, Recovery, recover};
 pub use schema::descriptor_set;
 pub use stream::Ticks;
 pub use sync::Syncable;

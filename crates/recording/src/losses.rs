@@ -7,9 +7,9 @@ use serde::Serialize;
 /// The end of the readable part of a recording that is not complete.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Cut {
-    /// The file is readable up to this byte.
+    /// The recording is readable up to this byte of the file.
     pub at_byte: u64,
-    /// Size of the file.
+    /// Where it ends: the size of the file, or the start of the next recording in it.
     pub of_bytes: u64,
     /// What is wrong there.
     pub why: String,
@@ -20,7 +20,7 @@ pub struct Cut {
 pub struct DamagedRange {
     /// Its first byte.
     pub from_byte: u64,
-    /// The first byte after it.
+    /// The first byte after it; equal to `from_byte` where bytes are missing.
     pub to_byte: u64,
     /// What is wrong.
     pub why: String,
@@ -29,6 +29,9 @@ pub struct DamagedRange {
 impl fmt::Display for DamagedRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (from, to, why) = (self.from_byte, self.to_byte, &self.why);
+        if from == to {
+            return write!(f, "at byte {from}: {why}");
+        }
         write!(f, "bytes {from} to {to} are damaged: {why}")
     }
 }

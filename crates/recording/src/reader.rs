@@ -5,24 +5,23 @@ use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::attachments::{Preceding, StoredAttachment, attachment, config_toml};
-use super::contents::{Contents, Part};
-use super::continuity::{Continuity, Gap};
-use super::digest::Digest;
+use super::attachments::{StoredAttachment, attachment, config_toml};
+use super::boundary::end_of_recording;
+use super::continuity::Gap;
 use super::error::Emptiness;
+use super::file_range::{FileRange, RecordingEnd};
 use super::losses::{Cut, DamagedRange, MissingTicks};
 use super::messages::Timing;
+use super::recording_contents::{RecordingContents, TickReceiver};
+use super::refusal::{judge, most_specific, refuse_other_program, require_ticks};
 use super::scanner::Scanner;
-use super::stream::{Decoded, Decoder, RecordReader, Stream, Ticks};
+use super::stream::{RecordReader, Stream, Ticks};
 use super::summary::Summary;
 use super::walk::{Stop, Walk};
 use super::writer::{PERIOD_S, STARTED_NS};
-use super::{CONFIG_ATTACHMENT, METADATA_RECORD, RECOVERED, RecordingError, Topic};
+use super::{CONFIG_ATTACHMENT, RECOVERED, RecordingError};
 use bench_base::input_file;
-use bench_rt::record::{Event, TickRecord};
-
-/// Receives a tick of a recording, and what precedes it.
-pub type TickReceiver<'a> = dyn FnMut(&Preceding<'_>, &TickRecord) + 'a;
+use bench_rt::record::Event;
 
 /// A recording that was read once from start to end. All checks have passed, everything except the ticks is in
 /// memory, and the ticks can be streamed any number of times.
@@ -39,26 +38,12 @@ pub struct Recording {
 /// What is missing in a file that was opened for salvage.
 #[derive(Debug)]
 struct Salvage {
+    /// The part of the file with the recording.
+    from_byte: u64,
+    end: RecordingEnd,
     damage: Vec<DamagedRange>,
     missing_attachments: Vec<String>,
     has_summary: bool,
-}
-
-/// The contents of the file, without the ticks.
-#[derive(Debug, Default)]
-struct RecordingContents {
-    metadata: BTreeMap<String, String>,
-    attachments: Vec<StoredAttachment>,
-    events: Vec<Event>,
-    timings: Vec<Timing>,
-    gaps: Vec<Gap>,
-    missing_ticks: Vec<MissingTicks>,
-    /// Messages on `/loop` that are missing since the last tick.
-    missing_since_tick: u64,
-    last_tick: Option<TickRecord>,
-    period_by_ticks_ns: Option<u64>,
-    decoder: Decoder,
-    digest: Digest,
 }
 
 impl Recording {
@@ -73,11 +58,12 @@ impl Recording {
         on_tick: &mut TickReceiver<'_>,
     ) -> Result<Recording, RecordingError> {
         let file = open(path)?;
-        refuse_other_program(&file, path)?;
-        let mut walk = Walk::new(file);
+        let whole = FileRange::to_end(file, 0).map_err(|source| read_error(path, source))?;
+        refuse_other_program(&whole, path)?;
+        let mut walk = Walk::new(open(path)?);
         let mut found = RecordingContents::default();
         let stop = read_to_end(&mut walk, &mut found, on_tick).err();
-        let cut = stop.map(|stop| judge(path, stop, walk.offset, &found));
+        let cut = stop.map(|stop| judge(path, &whole, stop, walk.offset, &found));
         let cut = cut.transpose()?;
         let emptiness = match cut {
             Some(_) => Emptiness::CutOff,
@@ -95,48 +81,21 @@ impl Recording {
 
     /// As [`Recording::open`], but passes over each damage to the next intact record. [`Recording::damage`] and
     /// [`Recording::missing_ticks`] tell what is missing; an [`EventKind::Lost`](bench_rt::record::EventKind::Lost) is among
-    /// the events where messages are missing.
+    /// the events where messages are missing. Of a file with several recordings, it is the first one with ticks.
     pub fn salvage(path: &Path) -> Result<Recording, RecordingError> {
-        let failed = |source| RecordingError::Read {
-            path: path.into(),
-            source,
-        };
-        let mut scanner = Scanner::new(open(path)?).map_err(failed)?;
-        let mut found = RecordingContents::default();
-        while scanner
-            .step(&mut |part| found.take(part, &mut |_, _| {}))
-            .map_err(failed)?
-        {}
-        found.end();
-        if found.account().ticks() == 0 && !scanner.has_magic {
-            return Err(RecordingError::NotMcap { path: path.into() });
+        let mut errors = Vec::new();
+        for part in SalvagedParts::of(path)? {
+            match part?.recording {
+                Ok(recording) => return Ok(recording),
+                Err(error) => errors.push(error),
+            }
         }
-        Recording::salvaged(path, scanner, found)
+        Err(most_specific(errors, path))
     }
 
-    /// The recording of a scanned file.
-    fn salvaged(
-        path: &Path,
-        scanner: Scanner,
-        found: RecordingContents,
-    ) -> Result<Recording, RecordingError> {
-        let emptiness = match (&scanner.cut, scanner.damage.as_slice()) {
-            (Some(_), []) => Emptiness::CutOff,
-            (None, []) => Emptiness::Complete,
-            (_, [..]) => Emptiness::Damaged,
-        };
-        require_ticks(path, &scanner.contents, &found, emptiness)?;
-        Ok(Recording {
-            path: path.into(),
-            unchecked_messages: scanner.contents.unchecked_messages,
-            salvage: Some(Salvage {
-                missing_attachments: missing_attachments(&found, scanner.summary.as_ref()),
-                has_summary: scanner.summary.is_some(),
-                damage: scanner.damage,
-            }),
-            cut: scanner.cut,
-            found,
-        })
+    /// Where a salvaged recording begins in its file.
+    pub fn from_byte(&self) -> u64 {
+        self.salvage.as_ref().map_or(0, |s| s.from_byte)
     }
 
     /// The parts of a salvaged file that could not be used, without that after a cut.
@@ -291,102 +250,105 @@ impl Recording {
 
     fn reader(&self) -> Result<RecordReader, RecordingError> {
         let file = open(&self.path)?;
-        if self.salvage.is_none() {
+        let Some(salvage) = &self.salvage else {
             return Ok(RecordReader::Walk(Box::new(Walk::new(file))));
-        }
-        let scanner = Scanner::new(file).map_err(|source| RecordingError::Read {
-            path: self.path.clone(),
-            source,
-        })?;
+        };
+        let part = FileRange::to_end(file, salvage.from_byte);
+        let scanner = part.and_then(|part| Scanner::new(part.up_to(salvage.end)));
+        let scanner = scanner.map_err(|source| read_error(&self.path, source))?;
         Ok(RecordReader::Scanner(Box::new(scanner)))
     }
 }
 
-impl RecordingContents {
-    fn account(&self) -> &Continuity {
-        &self.decoder.account
+/// The parts of a damaged file, one after the other: each is one recording, or has none.
+pub(super) struct SalvagedParts {
+    path: PathBuf,
+    /// Start of the next part.
+    next: u64,
+    file_bytes: u64,
+}
+
+/// A part of a damaged file.
+pub(super) struct SalvagedPart {
+    pub(super) from_byte: u64,
+    pub(super) to_byte: u64,
+    /// The recording, or why the part has none.
+    pub(super) recording: Result<Recording, RecordingError>,
+}
+
+impl SalvagedParts {
+    pub(super) fn of(path: &Path) -> Result<SalvagedParts, RecordingError> {
+        let metadata = open(path)?.metadata();
+        Ok(SalvagedParts {
+            path: path.into(),
+            next: 0,
+            file_bytes: metadata.map_err(|source| read_error(path, source))?.len(),
+        })
     }
 
-    fn take(&mut self, part: Part<'_>, on_tick: &mut TickReceiver<'_>) -> Result<(), String> {
-        match self.decoder.decode(&part)? {
-            Some(Decoded::Tick(tick, gap)) => {
-                self.tick(&tick, gap);
-                on_tick(&self.preceding(), &tick);
-            }
-            Some(Decoded::Event(event)) => self.events.push(event),
-            Some(Decoded::Timing(timing)) => self.timings.push(timing),
-            None => {}
-        }
-        self.take_undecoded(part);
-        Ok(())
+    fn part(&self) -> Result<SalvagedPart, RecordingError> {
+        let failed = |source| read_error(&self.path, source);
+        let rest = FileRange::to_end(open(&self.path)?, self.next).map_err(failed)?;
+        let end = end_of_recording(&rest).map_err(failed)?;
+        let mut scanner = Scanner::new(rest.up_to(end)).map_err(failed)?;
+        let mut found = RecordingContents::default();
+        while scanner
+            .step(&mut |part| found.take(part, &mut |_, _| {}))
+            .map_err(failed)?
+        {}
+        found.end();
+        let to_byte = self.next + end.bytes;
+        Ok(SalvagedPart {
+            from_byte: self.next,
+            to_byte: scanner.ends_before_another.unwrap_or(to_byte),
+            recording: salvaged(&self.path, end, scanner, found),
+        })
     }
+}
 
-    fn preceding(&self) -> Preceding<'_> {
-        Preceding {
-            metadata: &self.metadata,
-            attachments: &self.attachments,
-        }
-    }
+impl Iterator for SalvagedParts {
+    type Item = Result<SalvagedPart, RecordingError>;
 
-    fn take_undecoded(&mut self, part: Part<'_>) {
-        match part {
-            Part::Message {
-                topic: topic @ (Topic::Loop | Topic::Event),
-                data,
-            } => self.digest.add(topic as u8, data),
-            Part::Missing {
-                topic: Topic::Loop,
-                messages,
-            } => self.missing_since_tick += messages,
-            Part::Message { .. } | Part::Missing { .. } => {}
-            Part::Attachment {
-                name,
-                media_type,
-                data,
-            } => self.attachments.push(StoredAttachment {
-                name,
-                media_type,
-                data: data.into(),
-            }),
-            Part::Metadata(m) if m.name == METADATA_RECORD => self.metadata.extend(m.metadata),
-            Part::Metadata(_) => {}
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.next >= self.file_bytes {
+            return None;
         }
+        let part = self.part();
+        let end = part.as_ref().map_or(self.file_bytes, |part| part.to_byte);
+        self.next = end.max(self.next + 1);
+        Some(part)
     }
+}
 
-    fn tick(&mut self, tick: &TickRecord, gap: Option<Gap>) {
-        self.gaps.extend(gap);
-        if self.missing_since_tick > 0 {
-            let first = match gap {
-                Some(gap) => gap.after_tick + 1,
-                None => tick.tick.saturating_sub(self.missing_since_tick),
-            };
-            self.add_missing(first, tick.tick.saturating_sub(1));
-        }
-        if let Some(last) = &self.last_tick
-            && last.tick + 1 == tick.tick
-            && self.period_by_ticks_ns.is_none()
-        {
-            self.period_by_ticks_ns = tick.scheduled_ns.checked_sub(last.scheduled_ns);
-        }
-        self.last_tick = Some(*tick);
+/// The recording in a scanned part of a file.
+fn salvaged(
+    path: &Path,
+    end: RecordingEnd,
+    scanner: Scanner,
+    found: RecordingContents,
+) -> Result<Recording, RecordingError> {
+    if found.account().ticks() == 0 && !scanner.has_magic {
+        return Err(RecordingError::NotMcap { path: path.into() });
     }
-
-    fn add_missing(&mut self, first_tick: u64, last_tick: u64) {
-        self.missing_ticks.push(MissingTicks {
-            first_tick,
-            last_tick,
-            ticks: std::mem::take(&mut self.missing_since_tick),
-        });
-    }
-
-    /// The messages that are missing after the last tick.
-    fn end(&mut self) {
-        if self.missing_since_tick > 0 {
-            let first = self.last_tick.map_or(0, |tick| tick.tick.saturating_add(1));
-            let last = first.saturating_add(self.missing_since_tick - 1);
-            self.add_missing(first, last);
-        }
-    }
+    let emptiness = match (&scanner.cut, scanner.damage.as_slice()) {
+        (Some(_), []) => Emptiness::CutOff,
+        (None, []) => Emptiness::Complete,
+        (_, [..]) => Emptiness::Damaged,
+    };
+    require_ticks(path, &scanner.contents, &found, emptiness)?;
+    Ok(Recording {
+        path: path.into(),
+        unchecked_messages: scanner.contents.unchecked_messages,
+        salvage: Some(Salvage {
+            from_byte: scanner.range.from_byte,
+            end,
+            missing_attachments: missing_attachments(&found, scanner.summary.as_ref()),
+            has_summary: scanner.summary.is_some(),
+            damage: scanner.damage,
+        }),
+        cut: scanner.cut,
+        found,
+    })
 }
 
 /// The attachments that the summary names, and the configuration, as far as they were not found.
@@ -399,30 +361,18 @@ fn missing_attachments(found: &RecordingContents, summary: Option<&Summary>) -> 
     missing
 }
 
-/// Refuses a file whose summary names channels, but not that with the ticks.
-fn refuse_other_program(file: &File, path: &Path) -> Result<(), RecordingError> {
-    let bytes = file.metadata().map_or(0, |m| m.len());
-    match Summary::read(file, bytes) {
-        Some(Summary { definitions, .. })
-            if !definitions.channels.is_empty() && !definitions.has_loop() =>
-        {
-            Err(RecordingError::OtherProgram {
-                path: path.into(),
-                channels: channels(&definitions),
-            })
-        }
-        _ => Ok(()),
-    }
-}
-
 fn open(path: &Path) -> Result<File, RecordingError> {
     input_file::open(path).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => RecordingError::Missing { path: path.into() },
-        _ => RecordingError::Read {
-            path: path.into(),
-            source,
-        },
+        _ => read_error(path, source),
     })
+}
+
+fn read_error(path: &Path, source: io::Error) -> RecordingError {
+    RecordingError::Read {
+        path: path.into(),
+        source,
+    }
 }
 
 /// Walks to the end of the file, or to where it cannot be read.
@@ -433,68 +383,4 @@ fn read_to_end(
 ) -> Result<(), Stop> {
     while walk.step(&mut |part| found.take(part, on_tick))? {}
     Ok(())
-}
-
-/// The cut at which a walk ended early, or why the file cannot be used.
-fn judge(
-    path: &Path,
-    stop: Stop,
-    at_byte: u64,
-    found: &RecordingContents,
-) -> Result<Cut, RecordingError> {
-    let why = match stop {
-        Stop::Cut => "the file ends there".into(),
-        Stop::Damaged(what) => {
-            return Err(RecordingError::Damaged {
-                path: path.into(),
-                at_byte,
-                ticks: found.account().ticks(),
-                what,
-            });
-        }
-        Stop::NotMcap => return Err(RecordingError::NotMcap { path: path.into() }),
-        Stop::Read(source) => {
-            return Err(RecordingError::Read {
-                path: path.into(),
-                source,
-            });
-        }
-    };
-    Ok(Cut {
-        at_byte,
-        of_bytes: path.metadata().map_or(at_byte, |m| m.len()),
-        why,
-    })
-}
-
-/// Refuses a file of another program, and a recording without ticks.
-fn require_ticks(
-    path: &Path,
-    contents: &Contents,
-    found: &RecordingContents,
-    emptiness: Emptiness,
-) -> Result<(), RecordingError> {
-    if found.account().ticks() > 0 {
-        return Ok(());
-    }
-    let path = path.to_path_buf();
-    let may_be_own = contents.channels.is_empty() && emptiness != Emptiness::Complete;
-    if contents.has_loop() || may_be_own {
-        return Err(RecordingError::Empty { path, emptiness });
-    }
-    let channels = channels(contents);
-    Err(RecordingError::OtherProgram { path, channels })
-}
-
-/// The channels as text.
-fn channels(contents: &Contents) -> String {
-    let channels = contents.channels.values();
-    let names: Vec<_> = channels
-        .map(|(topic, schema)| format!("{topic} of {schema}"))
-        .collect();
-    if names.is_empty() {
-        "it has no channels".into()
-    } else {
-        format!("it has {}", names.join(", "))
-    }
 }

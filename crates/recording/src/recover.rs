@@ -1,16 +1,43 @@
-//! Copies the intact parts of a cut-off or damaged recording to a complete one.
+//! Copies the intact parts of each recording in a cut-off or damaged file to a complete one.
 
 use std::fs::{File, TryLockError};
 use std::path::Path;
 
 use super::losses::{Cut, DamagedRange, MissingTicks};
-use super::reader::Recording;
+use super::reader::{Recording, SalvagedParts};
+use super::refusal::most_specific;
 use super::{CONFIG_ATTACHMENT, Header, RECOVERED, Recorder, RecordingError, Totals};
+use bench_base::atomic_file::numbered_names;
 use bench_base::locked::{Locked, NotLocked};
 
-/// The result of a recovery.
+/// The result of the recovery of a file.
+#[derive(Debug)]
+pub struct Recovery {
+    /// The first recording in the file.
+    pub first: Recovered,
+    /// The recordings behind it, in the order of the file.
+    pub others: Vec<Recovered>,
+    /// The parts of the file without a recording that has ticks.
+    pub unused: Vec<DamagedRange>,
+}
+
+impl Recovery {
+    /// All recordings, in the order of the file.
+    pub fn recordings(&self) -> impl Iterator<Item = &Recovered> {
+        std::iter::once(&self.first).chain(&self.others)
+    }
+
+    /// Whether every byte of the file belongs to a recording that is complete.
+    pub fn is_complete(&self) -> bool {
+        self.unused.is_empty() && self.recordings().all(Recovered::is_complete)
+    }
+}
+
+/// A recovered recording.
 #[derive(Debug)]
 pub struct Recovered {
+    /// Where the old recording begins in its file.
+    pub from_byte: u64,
     /// Counts of the new recording.
     pub totals: Totals,
     /// The end of the readable part of the old recording; `None` if its data were read to their end.
@@ -51,12 +78,69 @@ impl Recovered {
 /// metadata (with an additional entry `recovered` that describes what is missing) and the attachments. An event `lost` counts the
 /// missing messages at their place. `from` is not changed.
 ///
+/// A file may hold several recordings, one after the other. The first one is copied to `to`, and each other one to the first free
+/// name of `STEM-2.EXT`, `STEM-3.EXT`, ... beside it.
+///
 /// # Errors
-/// When `from` is still being written or cannot be read, or `to` exists or cannot be written.
-pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
+/// When `from` is still being written or cannot be read, or has no recording with ticks, or `to` exists or cannot be written.
+pub fn recover(from: &Path, to: &Path) -> Result<Recovery, RecordingError> {
     let _reading = not_in_use(from)?;
-    let old = Recording::salvage(from)?;
-    let mut new = Recorder::create(to, &header(&old))?;
+    let mut recovered = Vec::new();
+    let (mut unused, mut errors) = (Vec::new(), Vec::new());
+    for part in SalvagedParts::of(from)? {
+        let part = part?;
+        match part.recording {
+            Ok(old) if recovered.is_empty() => recovered.push(copy(&old, create(to, &old)?)?),
+            Ok(old) => recovered.push(copy(&old, create_beside(to, &old)?)?),
+            Err(error) => {
+                unused.push(DamagedRange {
+                    from_byte: part.from_byte,
+                    to_byte: part.to_byte,
+                    why: why_unused(&error),
+                });
+                errors.push(error);
+            }
+        }
+    }
+    let mut recovered = recovered.into_iter();
+    match recovered.next() {
+        Some(first) => Ok(Recovery {
+            first,
+            others: recovered.collect(),
+            unused,
+        }),
+        None => Err(most_specific(errors, from)),
+    }
+}
+
+fn why_unused(error: &RecordingError) -> String {
+    match error {
+        RecordingError::Empty { emptiness, .. } => {
+            format!("the recording there has no ticks ({})", emptiness.why())
+        }
+        RecordingError::OtherProgram { channels, .. } => {
+            format!("an MCAP file of another program is there ({channels})")
+        }
+        _ => "nothing of a recording was found there".into(),
+    }
+}
+
+fn create(to: &Path, old: &Recording) -> Result<Recorder, RecordingError> {
+    Recorder::create(to, &header(old))
+}
+
+/// A new file beside `to`, with a number.
+fn create_beside(to: &Path, old: &Recording) -> Result<Recorder, RecordingError> {
+    for name in numbered_names(to).skip(1) {
+        match create(&name, old) {
+            Err(RecordingError::Exists { .. }) => {}
+            created => return created,
+        }
+    }
+    Err(RecordingError::Exists { path: to.into() })
+}
+
+fn copy(old: &Recording, mut new: Recorder) -> Result<Recovered, RecordingError> {
     for published in old.published()? {
         new.record(&published?)?;
     }
@@ -68,6 +152,7 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovered, RecordingError> {
         .map(|a| (a.name.as_str(), a.media_type.as_str(), a.data.as_slice()))
         .collect();
     Ok(Recovered {
+        from_byte: old.from_byte(),
         totals: new.finish(&results)?,
         cut: old.cut().cloned(),
         damage: old.damage().to_vec(),

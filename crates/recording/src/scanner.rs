@@ -1,28 +1,23 @@
-//! Reads a damaged file: after each damage it continues with the next intact record.
+//! Reads a damaged recording: after each damage it continues with the next intact record.
 //!
+//! After a damage, an intact record that does not continue the recording is of another one, whose start is damaged.
 //! A chunk whose opcode or length is altered is found by its index in the summary, if there is one.
 //! The record after a damaged one is the one at which the length of the damaged record ends, if a record begins there.
 //! Otherwise it is the next position at which a chunk or an attachment with a matching CRC begins.
 
-use std::fs::File;
 use std::io;
-use std::os::unix::fs::FileExt;
 
 use mcap::MAGIC;
 use mcap::records::{ChunkIndex, op};
 
-use super::contents::{Contents, Take, is_intact};
+use super::contents::{Contents, Take, is_intact, is_length_confirmed};
+use super::file_range::{FileRange, RECORD_HEAD_BYTES, RecordHead, is_message_index};
 use super::losses::{Cut, DamagedRange};
-use super::summary::{RECORD_HEAD_BYTES, Summary};
-use super::walk::RECORD_BYTES;
+use super::summary::Summary;
 
-/// Bytes that are searched at a time.
-const SEARCH_BYTES: usize = 1 << 20;
-
-/// A reader of one damaged file.
+/// A reader of one damaged recording. Offsets are counted from its start; damage and cut have positions in the file.
 pub(super) struct Scanner {
-    file: File,
-    file_bytes: u64,
+    pub(super) range: FileRange,
     /// Start of the current record.
     pub(super) offset: u64,
     /// Start of the record before it.
@@ -37,57 +32,41 @@ pub(super) struct Scanner {
     /// Where reading ended before the end of the data.
     pub(super) cut: Option<Cut>,
     pub(super) has_magic: bool,
-}
-
-/// Opcode, and position of the content.
-#[derive(Clone, Copy, PartialEq, Eq)]
-struct RecordHead {
-    opcode: u8,
-    data_at: u64,
-    data_bytes: u64,
-}
-
-impl RecordHead {
-    /// Start of the next record.
-    fn end(&self) -> u64 {
-        self.data_at + self.data_bytes
-    }
-
-    fn is_of_data_section(&self) -> bool {
-        match self.opcode {
-            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::CHUNK => true,
-            op::MESSAGE_INDEX | op::ATTACHMENT | op::METADATA => true,
-            op::DATA_END => self.data_bytes == 4,
-            _ => false,
-        }
-    }
+    has_passed_over: bool,
+    /// Where the recording ends because an intact record of another one follows.
+    pub(super) ends_before_another: Option<u64>,
 }
 
 impl Scanner {
-    pub(super) fn new(file: File) -> io::Result<Scanner> {
-        let file_bytes = file.metadata()?.len();
-        let mut start = [0; MAGIC.len()];
-        let has_magic = file.read_exact_at(&mut start, 0).is_ok() && start == *MAGIC;
-        let mut summary = Summary::read(&file, file_bytes);
+    pub(super) fn new(range: FileRange) -> io::Result<Scanner> {
+        let has_magic = range.has_magic_at(0);
+        let offset = range.first_record()?;
+        let mut summary = Summary::read(&range);
         let definitions = summary.as_mut().map(|s| std::mem::take(&mut s.definitions));
         let mut scanner = Scanner {
-            file,
-            file_bytes,
-            offset: MAGIC.len() as u64,
+            range,
+            offset,
             before: 0,
-            search_from: 0,
+            search_from: if has_magic { offset } else { 0 },
             crc: has_magic.then(crc32fast::Hasher::new),
             summary,
             contents: Contents::salvaging(definitions),
             damage: Vec::new(),
             cut: None,
             has_magic,
+            has_passed_over: false,
+            ends_before_another: None,
         };
         match &mut scanner.crc {
             Some(crc) => crc.update(MAGIC),
-            None => {
-                scanner.note_damage(0, MAGIC.len() as u64, "the magic of MCAP is altered".into())
+            None if offset == 0 => {
+                scanner.note_damage(
+                    0,
+                    0,
+                    "the start of the recording before it is missing".into(),
+                );
             }
+            None => scanner.note_damage(0, offset, "the magic of MCAP is altered".into()),
         }
         Ok(scanner)
     }
@@ -97,7 +76,7 @@ impl Scanner {
         let Some(head) = self.head_here()? else {
             return self.pass_over(self.why_no_record()?, take);
         };
-        let data = self.data_of(head)?;
+        let data = self.range.data_of(head)?;
         let checked = self.check(head, &data);
         let taken = checked.and_then(|()| self.contents.record(head.opcode, &data, take));
         let taken = taken.or_else(|why| match self.take_repaired(&data, &why, take) {
@@ -107,17 +86,39 @@ impl Scanner {
         });
         match taken {
             Ok(()) => self.advance(head, &data, take),
+            Err(_) if self.is_of_another(head, &data) => {
+                self.end_before_another();
+                Ok(false)
+            }
             Err(why) => self.pass_over(why, take),
         }
     }
 
+    /// Whether an intact record that does not continue this recording is of another one.
+    fn is_of_another(&self, head: RecordHead, data: &[u8]) -> bool {
+        let is_begun = self.contents.has_messages() || head.opcode == op::METADATA;
+        self.has_passed_over && is_begun && is_intact(head.opcode, data)
+    }
+
+    /// The damage directly before the other recording is the end of this one: how much is missing there is not known.
+    fn end_before_another(&mut self) {
+        let at_byte = self.range.from_byte + self.offset;
+        let last = self.damage.pop_if(|damage| damage.to_byte == at_byte);
+        self.cut = Some(Cut {
+            at_byte: last.map_or(at_byte, |damage| damage.from_byte),
+            of_bytes: at_byte,
+            why: "another recording follows, whose start is missing".into(),
+        });
+        self.ends_before_another = Some(at_byte);
+    }
+
     /// The record at `offset`. Where an intact chunk begins by the index of the chunks, its head may be altered.
     fn head_here(&mut self) -> io::Result<Option<RecordHead>> {
-        let found = self.head_at(self.offset)?;
+        let found = self.range.head_at(self.offset)?;
         let Some(indexed) = self.indexed_chunk().filter(|head| found != Some(*head)) else {
             return Ok(found);
         };
-        if !is_intact(indexed.opcode, &self.data_of(indexed)?) {
+        if !is_intact(indexed.opcode, &self.range.data_of(indexed)?) {
             return Ok(found);
         }
         let why =
@@ -135,7 +136,7 @@ impl Scanner {
             data_at: self.offset.checked_add(RECORD_HEAD_BYTES as u64)?,
             data_bytes: length.checked_sub(RECORD_HEAD_BYTES as u64)?,
         };
-        (head.data_at <= self.file_bytes && self.contains(&head)).then_some(head)
+        (head.data_at <= self.range.bytes && self.range.contains(&head)).then_some(head)
     }
 
     /// What the summary states of the chunk that begins at `offset`.
@@ -172,6 +173,11 @@ impl Scanner {
         }
         self.before = self.offset;
         self.offset = head.end();
+        self.search_from = if is_length_confirmed(head.opcode, data) {
+            self.offset
+        } else {
+            self.search_from.max(self.before + 1)
+        };
         if self.contents.data_ended {
             self.end(take)?;
         }
@@ -186,6 +192,9 @@ impl Scanner {
             }
             op::HEADER if head.data_at != (MAGIC.len() + RECORD_HEAD_BYTES) as u64 => {
                 Err("a header in the middle of the file".into())
+            }
+            op::METADATA if self.has_passed_over && self.contents.repeats_own_metadata(data) => {
+                Err("the metadata of another recording".into())
             }
             op::DATA_END => self.check_data_crc(data),
             _ => Ok(()),
@@ -207,10 +216,12 @@ impl Scanner {
 
     fn why_no_record(&self) -> io::Result<String> {
         let left = self
-            .file_bytes
+            .range
+            .bytes
             .saturating_sub(self.offset + RECORD_HEAD_BYTES as u64);
-        Ok(match self.any_head_at(self.offset)? {
+        Ok(match self.range.any_head_at(self.offset)? {
             Some(head) if head.data_bytes <= left => "no record of MCAP begins there".into(),
+            _ if self.range.is_followed => "another recording begins within a record".into(),
             _ => "the file ends within a record".into(),
         })
     }
@@ -220,6 +231,7 @@ impl Scanner {
         self.crc = None;
         self.contents.data_ended = false;
         self.contents.assume_own_channels();
+        self.has_passed_over = true;
         let from = self.offset;
         match self.next_record()? {
             Some(next) => {
@@ -232,8 +244,8 @@ impl Scanner {
             }
             None => {
                 self.cut = Some(Cut {
-                    at_byte: from.min(self.file_bytes),
-                    of_bytes: self.file_bytes,
+                    at_byte: self.range.from_byte + from.min(self.range.bytes),
+                    of_bytes: self.range.from_byte + self.range.bytes,
                     why,
                 });
                 self.end(take)?;
@@ -244,8 +256,8 @@ impl Scanner {
 
     fn note_damage(&mut self, from_byte: u64, to_byte: u64, why: String) {
         self.damage.push(DamagedRange {
-            from_byte,
-            to_byte,
+            from_byte: self.range.from_byte + from_byte,
+            to_byte: self.range.from_byte + to_byte,
             why,
         });
     }
@@ -261,91 +273,24 @@ impl Scanner {
 
     /// Start of the next record after the damage at `offset`.
     fn next_record(&self) -> io::Result<Option<u64>> {
-        if let Some(head) = self.head_at(self.offset)?
-            && self.is_plausible_at(head.end())?
+        if let Some(head) = self.range.head_at(self.offset)?
+            && self.range.is_plausible_at(head.end())?
         {
-            // An altered length may end at a later record: the intact ones before it are not passed over.
-            let before_end = self.search(self.offset + 1, head.end())?;
-            return Ok(Some(before_end.unwrap_or(head.end())));
-        }
-        self.search(self.search_from.max(self.before + 1), self.file_bytes)
-    }
-
-    /// Whether a record at a position is most probably one.
-    fn is_plausible_at(&self, position: u64) -> io::Result<bool> {
-        let Some(head) = self.head_at(position)? else {
-            return Ok(false);
-        };
-        match head.opcode {
-            op::DATA_END => Ok(true),
-            op::MESSAGE_INDEX => Ok(is_message_index(&self.data_of(head)?)),
-            _ => self.is_intact_at(position),
-        }
-    }
-
-    /// The first position in `from..end` at which an intact record begins.
-    fn search(&self, from: u64, end: u64) -> io::Result<Option<u64>> {
-        let mut block = vec![0; SEARCH_BYTES];
-        let mut start = from;
-        while start < end {
-            let length = (end - start).min(SEARCH_BYTES as u64);
-            let block = &mut block[..length as usize];
-            self.file.read_exact_at(block, start)?;
-            for (index, position) in (start..start + length).enumerate() {
-                if self.may_begin(&block[index..]) && self.is_intact_at(position)? {
-                    return Ok(Some(position));
-                }
+            if self.may_hide_records(head)? {
+                let before_end = self.range.next_intact(self.offset + 1, head.end())?;
+                return Ok(Some(before_end.unwrap_or(head.end())));
             }
-            start += length;
+            return Ok(Some(head.end()));
         }
-        Ok(None)
+        self.range.next_intact(self.search_from, self.range.bytes)
     }
 
-    /// Whether these bytes may be the begin of a record whose content can be verified.
-    fn may_begin(&self, bytes: &[u8]) -> bool {
-        let is_verifiable = matches!(bytes[0], op::CHUNK | op::ATTACHMENT | op::METADATA);
-        let length = bytes[1..].first_chunk::<8>();
-        is_verifiable && length.is_none_or(|length| u64::from_le_bytes(*length) < self.file_bytes)
-    }
-
-    fn is_intact_at(&self, position: u64) -> io::Result<bool> {
-        match self.head_at(position)? {
-            Some(head) => Ok(is_intact(head.opcode, &self.data_of(head)?)),
-            None => Ok(false),
-        }
-    }
-
-    /// The record at a position; `None` if no record of a data section that fits in the file begins there.
-    fn head_at(&self, position: u64) -> io::Result<Option<RecordHead>> {
-        let head = self.any_head_at(position)?;
-        Ok(head.filter(|head| head.is_of_data_section() && self.contains(head)))
-    }
-
-    fn contains(&self, head: &RecordHead) -> bool {
-        let left = self.file_bytes - head.data_at;
-        head.data_bytes <= left.min(RECORD_BYTES as u64)
-    }
-
-    /// Opcode and length at a position, whatever they are; `None` at the end of the file.
-    fn any_head_at(&self, position: u64) -> io::Result<Option<RecordHead>> {
-        let data_at = position.saturating_add(RECORD_HEAD_BYTES as u64);
-        if data_at > self.file_bytes {
-            return Ok(None);
-        }
-        let mut head = [0; RECORD_HEAD_BYTES];
-        self.file.read_exact_at(&mut head, position)?;
-        let [opcode, length @ ..] = head;
-        Ok(Some(RecordHead {
-            opcode,
-            data_at,
-            data_bytes: u64::from_le_bytes(length),
-        }))
-    }
-
-    fn data_of(&self, head: RecordHead) -> io::Result<Vec<u8>> {
-        let mut data = vec![0; head.data_bytes as usize];
-        self.file.read_exact_at(&mut data, head.data_at)?;
-        Ok(data)
+    /// An altered length may end at a later record: the intact ones before it are not passed over. The records of a recording
+    /// that is the content of an attachment are not among them.
+    fn may_hide_records(&self, head: RecordHead) -> io::Result<bool> {
+        let is_confirmed = is_length_confirmed(head.opcode, &self.range.data_of(head)?);
+        let start_inside = self.range.next_start(head.start(), head.end())?;
+        Ok(!is_confirmed && start_inside.is_none())
     }
 }
 
@@ -367,15 +312,4 @@ fn with_header_of_index(chunk: &[u8], index: &ChunkIndex) -> Option<Vec<u8>> {
     repaired.extend(index.compressed_size.to_le_bytes());
     repaired.extend(&chunk[header_bytes..]);
     Some(repaired)
-}
-
-/// A channel (u16), the length of the entries (u32), and entries of a time and an offset (u64).
-fn is_message_index(data: &[u8]) -> bool {
-    match data.split_first_chunk::<6>() {
-        Some((&[_, _, n0, n1, n2, n3], entries)) => {
-            entries.len().is_multiple_of(16)
-                && entries.len() == u32::from_le_bytes([n0, n1, n2, n3]) as usize
-        }
-        None => false,
-    }
 }

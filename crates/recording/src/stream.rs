@@ -31,7 +31,7 @@ impl RecordReader {
     fn offset(&self) -> u64 {
         match self {
             RecordReader::Walk(walk) => walk.offset,
-            RecordReader::Scanner(scanner) => scanner.offset,
+            RecordReader::Scanner(scanner) => scanner.range.from_byte + scanner.offset,
         }
     }
 }

@@ -1,16 +1,13 @@
 //! The summary at the end of an MCAP file, which repeats the definitions and states what the file contains.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::os::unix::fs::FileExt;
 
 use mcap::records::{ChunkIndex, Footer, Record, op};
 use mcap::{MAGIC, parse_record};
 
 use super::contents::Contents;
+use super::file_range::{FileRange, RECORD_HEAD_BYTES};
 
-/// Opcode and length of a record.
-pub(super) const RECORD_HEAD_BYTES: usize = 1 + 8;
 /// Content of the footer: two offsets (u64) and the CRC of the summary (u32).
 const FOOTER_BYTES: usize = 8 + 8 + 4;
 /// The footer with its head, and the magic.
@@ -27,15 +24,20 @@ pub(super) struct Summary {
     pub(super) messages: BTreeMap<u16, u64>,
     /// Names of the attachments.
     pub(super) attachments: Vec<String>,
+    /// Bytes that are missing at the start of the recording, from which offsets are counted; negative if there are more.
+    missing_bytes: i128,
     /// The chunks by their start.
     pub(super) chunks: BTreeMap<u64, ChunkIndex>,
 }
 
 impl Summary {
-    /// Reads the summary of a file of this length; `None` if there is none, or if its CRC does not hold.
-    pub(super) fn read(file: &File, file_bytes: u64) -> Option<Summary> {
-        let records = summary_records(file, file_bytes)?;
-        let mut summary = Summary::default();
+    /// Reads the summary at the end of `range`; `None` if there is none, or if its CRC does not hold.
+    pub(super) fn read(range: &FileRange) -> Option<Summary> {
+        let (records, missing_bytes) = summary_records(range)?;
+        let mut summary = Summary {
+            missing_bytes,
+            ..Summary::default()
+        };
         let mut rest = records.as_slice();
         while let Some((head, after)) = rest.split_first_chunk::<RECORD_HEAD_BYTES>() {
             let [opcode, length @ ..] = *head;
@@ -55,7 +57,9 @@ impl Summary {
             Record::Statistics(statistics) => self.messages = statistics.channel_message_counts,
             Record::AttachmentIndex(index) => self.attachments.push(index.name),
             Record::ChunkIndex(index) => {
-                self.chunks.insert(index.chunk_start_offset, index);
+                let start = i128::from(index.chunk_start_offset) - self.missing_bytes;
+                self.chunks
+                    .extend(u64::try_from(start).ok().map(|start| (start, index)));
             }
             _ => {}
         }
@@ -63,24 +67,28 @@ impl Summary {
     }
 }
 
-/// The records of the summary, before the footer.
-fn summary_records(file: &File, file_bytes: u64) -> Option<Vec<u8>> {
-    let end = file_bytes.checked_sub(END_BYTES as u64)?;
+/// The records of the summary, before the footer, and the number of missing bytes before them. They are known only without the start
+/// of the recording and with the end of its data, and are trusted only with a CRC.
+fn summary_records(range: &FileRange) -> Option<(Vec<u8>, i128)> {
+    let end = range.bytes.checked_sub(END_BYTES as u64)?;
     let mut tail = [0; END_BYTES];
-    file.read_exact_at(&mut tail, end).ok()?;
+    range.read_exact_at(&mut tail, end).ok()?;
     let footer = footer(&tail)?;
-    let length = end.checked_sub(footer.summary_start)?;
-    if footer.summary_start == 0 || length > SUMMARY_BYTES {
+    let found_at = range.summary_at.filter(|_| !range.has_magic_at(0));
+    let start = found_at.unwrap_or(footer.summary_start);
+    let missing_bytes = i128::from(footer.summary_start) - i128::from(start);
+    let length = end.checked_sub(start)?;
+    let has_no_proof = footer.summary_crc == 0 && missing_bytes != 0;
+    if footer.summary_start == 0 || length > SUMMARY_BYTES || has_no_proof {
         return None;
     }
     let mut records = vec![0; length as usize];
-    file.read_exact_at(&mut records, footer.summary_start)
-        .ok()?;
+    range.read_exact_at(&mut records, start).ok()?;
     let mut crc = crc32fast::Hasher::new();
     crc.update(&records);
     crc.update(&tail[..RECORD_HEAD_BYTES + FOOTER_BYTES - 4]);
     let holds = footer.summary_crc == 0 || footer.summary_crc == crc.finalize();
-    holds.then_some(records)
+    holds.then_some((records, missing_bytes))
 }
 
 fn footer(tail: &[u8; END_BYTES]) -> Option<Footer> {

@@ -103,6 +103,9 @@ impl Walk {
             McapError::BadMagic => Stop::Damaged(
                 "the footer or the magic at the end of the MCAP file is missing".into(),
             ),
+            McapError::BytesAfterEndMagic => {
+                Stop::Damaged("the file goes on after the end of the recording".into())
+            }
             other => Stop::Damaged(error::why(&other)),
         }
     }
