@@ -166,6 +166,85 @@ fn recovery_without_the_configuration_keeps_all_ticks_and_names_the_loss() {
     }
 }
 
+#[test]
+fn every_recording_of_a_joined_file_is_recovered_into_a_file_of_its_own() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = chirp(folder.path());
+    let original = std::fs::read(&path).expect("a recording");
+    let originals: Vec<_> = ticks(&path).iter().map(bits).collect();
+    // In the middle of a chunk that is about half of the recording away from its end.
+    let cut = &original[..byte_in_a_chunk(&original)];
+    let joined = folder.path().join("joined.mcap");
+    let second = original.len() as u64;
+    std::fs::write(&joined, [&original, cut].concat()).expect("room");
+
+    let output = bench(&["identify"]).arg(&joined).output().expect("it runs");
+    let message = stderr(&output);
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    let words = format!("more than one recording, another one begins at byte {second}");
+    assert!(
+        message.contains(&words) && message.contains("bench recover"),
+        "{message}"
+    );
+
+    let output = bench(&["recover"]).arg(&joined).output().expect("it runs");
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(3), "{text}");
+    let words = format!("2 recordings found in the file, beginning at bytes 0, {second}");
+    assert!(
+        text.contains(&words) && !text.contains("nothing is missing"),
+        "{text}"
+    );
+    let whole = ticks(&folder.path().join("joined_recovered.mcap"));
+    assert!(whole.iter().map(bits).eq(originals.iter().copied()));
+    let part = ticks(&folder.path().join("joined_recovered-2.mcap"));
+    assert!(part.len() > 1000 && part.len() < originals.len());
+    assert!(
+        part.iter()
+            .map(bits)
+            .eq(originals[..part.len()].iter().copied())
+    );
+
+    let (_, report) = recover(&joined, &folder.path().join("to.mcap"));
+    let other = &report["other_recordings"][0];
+    assert_eq!(report["from_byte"], 0);
+    assert_eq!(report["ticks"], originals.len());
+    assert_eq!(report["cut"], Value::Null);
+    assert_eq!(other["from_byte"], second);
+    assert_eq!(other["ticks"], part.len());
+    assert_eq!(other["cut"]["of_bytes"], second + cut.len() as u64);
+    assert!(
+        other["recording"]
+            .as_str()
+            .is_some_and(|name| name.ends_with("to-2.mcap"))
+    );
+    assert_eq!(report["unused"], serde_json::json!([]));
+}
+
+#[test]
+fn joined_complete_recordings_are_recovered_without_a_loss() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = chirp(folder.path());
+    let original = std::fs::read(&path).expect("a recording");
+    let joined = folder.path().join("joined.mcap");
+    std::fs::write(&joined, [&original[..], &original].concat()).expect("room");
+    let to = folder.path().join("to.mcap");
+    let output = bench(&["recover"])
+        .arg(&joined)
+        .arg("--to")
+        .arg(&to)
+        .output();
+    let output = output.expect("it runs");
+    let text = stdout(&output);
+    assert_eq!(output.status.code(), Some(0), "{text}");
+    assert!(
+        text.contains("2 recordings found") && text.contains("nothing is missing"),
+        "{text}"
+    );
+    assert_is_equal(&to, &path);
+    assert_is_equal(&folder.path().join("to-2.mcap"), &path);
+}
+
 /// A byte in the content of a chunk in the middle of the file. A record is (opcode, length u64, content), the first follows the
 /// magic of 8 bytes, and a chunk has the opcode 6.
 fn byte_in_a_chunk(bytes: &[u8]) -> usize {
