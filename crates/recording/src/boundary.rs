@@ -226,6 +226,38 @@ mod tests {
         }
     }
 
+    /// A file with one chunk, not compressed, whose only message is `data`.
+    fn chunk_with(data: &[u8]) -> Vec<u8> {
+        let mut file = std::io::Cursor::new(Vec::new());
+        let options = mcap::WriteOptions::new().compression(None);
+        let mut writer = options.create(&mut file).expect("memory");
+        let channel = writer.add_channel(0, "/raw", "", &Default::default());
+        let header = mcap::records::MessageHeader {
+            channel_id: channel.expect("memory"),
+            sequence: 0,
+            log_time: 0,
+            publish_time: 0,
+        };
+        let written = writer.write_to_known_channel(&header, data);
+        written.and_then(|()| writer.finish()).expect("memory");
+        drop(writer);
+        file.into_inner()
+    }
+
+    #[test]
+    fn recording_inside_a_chunk_is_content() {
+        let recording = recording();
+        let whole = chunk_with(&recording);
+        let at = |part: &[u8]| whole.windows(part.len()).position(|window| window == part);
+        let mut altered = whole.clone();
+        altered[at(&recording).expect("not compressed") + recording.len() / 2] ^= 1;
+        for chunk in [whole, altered] {
+            let range = range(&[&chunk, &recording]);
+            let end = end_of_recording(&range).expect("readable").bytes;
+            assert_eq!(end, chunk.len() as u64);
+        }
+    }
+
     #[test]
     fn start_across_two_search_blocks_is_found() {
         let recording = recording();
