@@ -135,7 +135,7 @@ fn every_refused_command_gives_a_remedy() {
     let bench = Bench::new();
     bench.write("broken.toml", "[plant\n");
     bench.write("data.csv", "x,y\n1,2\n2,1\n");
-    bench.write("words.csv", "x,y\n1,2\ntwo,1\n");
+    bench.write("words.csv", "x,y\n1,2\n2,2\n3,2\ntwo,1\n");
     bench.write("far.csv", "time_s,reference_m\n0,0\n0,1e-6\n");
     bench.write("text.mcap", "not a recording");
     bench.write(

@@ -85,7 +85,7 @@ pub enum DataError {
     },
     /// No line has two numbers.
     #[error(
-        "{path} has no lines with numbers in at least two columns; a record is a table with one sample per line",
+        "{path} has no lines with numbers in at least two columns; check that it is a table with one sample per line",
         path = .path.display()
     )]
     NoColumns {
