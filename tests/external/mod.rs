@@ -2,6 +2,7 @@
 
 mod distortion;
 mod existing_results;
+mod forms;
 mod motor_bench;
 mod periodic;
 mod random_stages;
