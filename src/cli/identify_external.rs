@@ -15,6 +15,7 @@ use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFil
 use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
+use bench_identify::record_check::Resolution;
 use bench_identify::{Distortion, DistortionSource};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
@@ -40,6 +41,11 @@ struct Report {
     /// Hold and lag of the input that were assumed; 0 without them.
     hold_s: f64,
     input_lag_s: f64,
+    /// Steps of the values of input and output; `null` if they are below the noise.
+    input_resolution: Option<f64>,
+    output_resolution: Option<f64>,
+    #[serde(skip)]
+    resolution: Resolution,
     /// Number of averaged periods; `null` if the record is not periodic.
     periods: Option<usize>,
     /// Number of omitted periods before them.
@@ -123,6 +129,9 @@ impl Report {
             band_hz: analysis.band_hz,
             hold_s: analysis.input_path.hold_s,
             input_lag_s: analysis.input_path.lag_s,
+            input_resolution: analysis.resolution.input,
+            output_resolution: analysis.resolution.output,
+            resolution: analysis.resolution,
             periods: periodic.map(|part| part.periods),
             skipped_periods: periodic.map(|part| part.skipped),
             distortion_ratio: distortion.map(|distortion| distortion.ratio),
@@ -153,13 +162,14 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
             self.output,
             self.times_text(),
+            self.resolution_text(),
             self.input_path_text()
         )
     }
@@ -170,6 +180,12 @@ impl Report {
             TimeBase::Resampled { .. } => labelled("times", &self.times.to_string()),
             TimeBase::Given | TimeBase::Regular => String::new(),
         }
+    }
+
+    /// The resolution of the channels, if it exceeds their noise.
+    fn resolution_text(&self) -> String {
+        let text = self.resolution.description();
+        text.map_or_else(String::new, |text| labelled("resolution", &text))
     }
 
     /// The averaged periods and the distortion of a periodic record.

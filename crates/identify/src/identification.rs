@@ -7,6 +7,7 @@ use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{describes, hint, implausible, unless_undetermined};
+use crate::record_check::Resolution;
 use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
@@ -38,6 +39,8 @@ pub struct ExternalAnalysis {
     pub judged_up_to_rad_s: f64,
     /// Periods and distortion of a periodic record.
     pub periodic: Option<PeriodicPart>,
+    /// Steps of the values of input and output that exceed their noise.
+    pub resolution: Resolution,
 }
 
 /// What only a periodic record shows.
@@ -236,7 +239,10 @@ fn analyse(
         Some(_) => Vec::new(),
         None => record_check::stray_lines(signals),
     };
-    let signals: &Signals = &record_check::without(signals, &stray_lines);
+    let (recorded, cleaned) = (signals, record_check::without(signals, &stray_lines));
+    let signals: &Signals = &cleaned;
+    let resolution = Resolution::of(recorded);
+    let defects = record_check::defects(recorded, signals, repetition.is_some());
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
     let (frf, periodic) = response(signals, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
@@ -250,8 +256,7 @@ fn analyse(
         None => modal::fit(&frf.data, &chain),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let why = defective(signals, repetition.is_some())
-        .or_else(|| implausible(signals.rate_hz, &frf, &fit, &chain));
+    let why = listed(&defects).or_else(|| implausible(signals.rate_hz, &frf, &fit, &chain));
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => {
@@ -271,6 +276,7 @@ fn analyse(
         band_hz,
         judged_up_to_rad_s,
         periodic,
+        resolution,
     })
 }
 
@@ -302,11 +308,6 @@ fn response(
     }
     let settings = IdentifySettings::Local(EstimatorSettings::default());
     Ok((crate::response(signals, band_hz, &settings)?, None))
-}
-
-/// The defects of the record, which modes would be fitted to.
-fn defective(signals: &Signals, is_periodic: bool) -> Option<String> {
-    listed(&record_check::defects(signals, is_periodic))
 }
 
 fn listed(items: &[impl ToString]) -> Option<String> {

@@ -6,28 +6,38 @@ mod defect;
 mod ends;
 mod plateaus;
 mod prediction;
+mod resolution;
 mod stray_lines;
 
 use super::Signals;
 pub use defect::Defect;
 pub use ends::input_ratio_at_start;
 use ends::motion_at_ends;
-use plateaus::{clipped, repeated};
+use plateaus::{Quantisation, clipped, repeated};
 use prediction::Prediction;
+pub use resolution::Resolution;
 pub use stray_lines::{StrayLine, stray_lines, without};
 
-/// The first defect of each kind. A periodic record does not begin and end at rest.
-pub fn defects(signals: &Signals, is_periodic: bool) -> Vec<Defect> {
-    let lasting = clipped(signals).or_else(|| repeated(signals));
+/// An output whose step is below this ratio of its noise has as few equal neighbours as one without a step.
+const MIN_STEP_RATIO: f64 = 0.1;
+
+/// The first defect of each kind. `cleaned` is the record without its stray lines; its values are no multiples of a step any more. A
+/// periodic record does not begin and end at rest.
+pub fn defects(recorded: &Signals, cleaned: &Signals, is_periodic: bool) -> Vec<Defect> {
+    let step = resolution::step(&recorded.output).unwrap_or(0.0);
+    let prediction = Prediction::new(cleaned, step);
+    let noise = prediction.as_ref().map_or(0.0, Prediction::noise);
+    let quantisation = (step > MIN_STEP_RATIO * noise).then_some(Quantisation { step, noise });
+    let lasting = clipped(recorded).or_else(|| repeated(recorded, quantisation));
     if lasting.is_some() || is_periodic {
         return lasting.into_iter().collect();
     }
-    let Some(prediction) = Prediction::new(signals) else {
+    let Some(prediction) = prediction else {
         return Vec::new();
     };
     let jumps = prediction.jumps().into_iter();
     jumps
-        .chain(motion_at_ends(signals, prediction.median_sigma()))
+        .chain(motion_at_ends(cleaned, prediction.median_sigma()))
         .collect()
 }
 
@@ -71,16 +81,20 @@ mod tests {
         }
     }
 
+    fn found_in(signals: &Signals, is_periodic: bool) -> Vec<Defect> {
+        defects(signals, signals, is_periodic)
+    }
+
     fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
         let mut signals = signals();
         let output = signals.output.iter().enumerate();
         signals.output = output.map(|(k, y)| change(k, *y)).collect();
-        defects(&signals, false)
+        found_in(&signals, false)
     }
 
     #[test]
     fn sound_record_has_no_defect() {
-        assert_eq!(defects(&signals(), false), []);
+        assert_eq!(found_in(&signals(), false), []);
     }
 
     #[test]
@@ -165,6 +179,68 @@ mod tests {
         );
     }
 
+    /// The output rounded to steps of 1/40 of its largest amplitude, without noise of its own.
+    fn rounded(mut signals: Signals) -> Signals {
+        let largest = signals.output.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
+        let step = largest / 40.0;
+        for y in &mut signals.output {
+            *y = step * (*y / step).round();
+        }
+        signals
+    }
+
+    #[test]
+    fn rounded_output_at_rest_and_at_its_peaks_has_no_defect() {
+        let signals = rounded(signals());
+        assert_eq!(found_in(&signals, false), []);
+        assert_eq!(found_in(&signals, true), []);
+    }
+
+    #[test]
+    fn stuck_probe_with_a_coarse_step_is_found() {
+        let mut signals = rounded(signals());
+        // The sweep passes 30 Hz at 10 s. From one zero crossing to the next, 17 samples later, 17 samples are the same.
+        let is_crossing = |k: &usize| signals.output[*k - 1] < 0.0 && signals.output[*k] >= 0.0;
+        let start = (10_000..10_040).find(is_crossing).expect("a crossing");
+        let value = signals.output[start];
+        signals.output[start..start + 17].fill(value);
+        let found = found_in(&signals, true);
+        let [Defect::Repeated { time_s, samples }] = found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((time_s * RATE_HZ - start as f64).abs() < 2.0, "{found:?}");
+        assert!((17..20).contains(&samples), "{found:?}");
+    }
+
+    #[test]
+    fn probe_with_a_coarse_step_that_fails_for_good_is_found() {
+        let mut signals = rounded(signals());
+        let value = signals.output[10_000];
+        signals.output[10_000..].fill(value);
+        let found = found_in(&signals, true);
+        let [Defect::Repeated { time_s, .. }] = found[..] else {
+            panic!("{found:?}")
+        };
+        assert!((time_s - 10.0).abs() < 0.005, "{found:?}");
+    }
+
+    #[test]
+    fn spike_below_one_step_is_no_defect_and_one_of_many_steps_is() {
+        let sound = rounded(signals());
+        let levels = Resolution::of(&sound).output.expect("a resolution");
+        let with_spike = |steps: f64| {
+            let mut signals = sound.clone();
+            signals.output[23_000] += steps * levels;
+            found_in(&signals, false)
+        };
+        assert_eq!(with_spike(1.0), []);
+        let found = with_spike(40.0);
+        assert!(
+            matches!(found[..], [Defect::Spike { time_s: 23.0, .. }]),
+            "{found:?}"
+        );
+    }
+
     #[test]
     fn clipped_output_is_found_with_its_limit() {
         let found = spoiled(|_, y| y.clamp(-3.0, 3.0));
@@ -179,7 +255,7 @@ mod tests {
         let whole = signals();
         let cases = [(10_000..25_000, true), (0..10_000, false)];
         for (range, at_start) in cases {
-            let found = defects(&whole.slice(range), false);
+            let found = found_in(&whole.slice(range), false);
             let expected = |defect: &Defect| match defect {
                 Defect::MovingAtStart { .. } => at_start,
                 Defect::MovingAtEnd { .. } => !at_start,
@@ -203,7 +279,7 @@ mod tests {
             }
         };
         signals.output = (0..25_000).map(response).collect();
-        assert_eq!(defects(&signals, false), []);
+        assert_eq!(found_in(&signals, false), []);
     }
 
     /// A sine of 30 Hz at 1 kHz with steps of a fortieth of its amplitude stays at its largest value for 3 or 4 samples a period.
@@ -214,7 +290,7 @@ mod tests {
         signals.output = (0..25_000)
             .map(|k| (40.0 * sine(k)).round() / 40.0)
             .collect();
-        let found = defects(&signals, true);
+        let found = found_in(&signals, true);
         assert!(
             !found.iter().any(|d| matches!(d, Defect::Clipped { .. })),
             "{found:?}"

@@ -1,15 +1,26 @@
 //! Samples that do not change: repeated readings, and an output at its limit.
 //!
 //! A run of L equal samples in a record of n is a defect if n p^L is below 1e-6, with p the ratio of equal neighbours, and the input
-//! changes meanwhile.
+//! changes meanwhile. An output with a step is equal to itself wherever it moves by less: there the output must also move by several
+//! steps right before and right after the run.
 
 use super::defect::Defect;
 use crate::Signals;
 
 /// A repeated sample occurs at least this many times in succession ...
 const MIN_REPEATED: usize = 5;
+/// ... of a quantised output at least this many times, so that it can be compared with the motion around ...
+const MIN_QUANTISED: usize = 8;
 /// ... and by chance with less than this probability.
 const CHANCE: f64 = 1e-6;
+/// Before and after repeated samples of a quantised output, it moves by at least this number of steps.
+const MOVED_STEPS: f64 = 6.0;
+/// Fast motion exceeds these steps in this number of samples.
+const FAST_SAMPLES: usize = 16;
+/// Upper limit of the probability that neighbouring samples of an output that moves by 24 steps or more within a run are equal.
+const MOVING_EQUAL: f64 = 0.03;
+/// Meanwhile the input moves by at least this ratio of its range.
+const ACTIVE_SPAN: f64 = 0.05;
 /// A clipped output stays at its limit for at least this many samples ...
 const MIN_CLIPPED: usize = 3;
 /// ... at least this many times.
@@ -17,28 +28,102 @@ const MIN_CLIPPED_PEAKS: usize = 4;
 /// A limit occurs at least this many times as often as the value next to it.
 const MIN_PILE_RATIO: usize = 5;
 
-/// The longest run of equal samples, if it is no chance.
-pub(super) fn repeated(signals: &Signals) -> Option<Defect> {
+/// The resolution of an output, and its noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quantisation {
+    /// The step of its values.
+    pub(super) step: f64,
+    /// Standard deviation of its noise.
+    pub(super) noise: f64,
+}
+
+impl Quantisation {
+    /// The probability that two neighbouring samples are equal. With noise above a step it is that of rest, where their difference of
+    /// standard deviation sqrt(2) sigma is 0: q/(2 sqrt(pi) sigma). With less, [`Run::hides_motion`] excludes rest.
+    fn chance_of_equal(&self) -> f64 {
+        if self.noise < self.step {
+            return MOVING_EQUAL;
+        }
+        self.step / (2.0 * std::f64::consts::PI.sqrt() * self.noise)
+    }
+}
+
+/// Samples of the same value.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    start: usize,
+    samples: usize,
+}
+
+/// The longest run of equal samples, if it is no chance, and the output moves before and after it by several of its steps.
+pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) -> Option<Defect> {
     let output = &signals.output;
-    let runs = output.chunk_by(|a, b| a == b);
-    let starts = runs.scan(0, |end, run| {
+    let runs = output.chunk_by(|a, b| a == b).scan(0, |end, run| {
         *end += run.len();
-        Some((*end - run.len(), run.len()))
+        let start = *end - run.len();
+        Some(Run {
+            start,
+            samples: run.len(),
+        })
     });
-    let moving = starts.filter(|(start, samples)| {
-        let input = &signals.input[*start..start + samples];
-        let changes = input.windows(2).filter(|pair| pair[0] != pair[1]);
-        2 * changes.count() >= *samples
-    });
-    let (start, samples) = moving.max_by_key(|(_, samples)| *samples)?;
-    let equal = output.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    let others = equal.saturating_sub(samples) as f64;
-    let ratio = (others / output.len() as f64).max(CHANCE);
-    let chance = output.len() as f64 * ratio.powf(samples as f64);
-    (samples >= MIN_REPEATED && chance < CHANCE).then(|| Defect::Repeated {
-        time_s: start as f64 / signals.rate_hz,
-        samples,
+    let longest = runs
+        .filter(|run| match quantisation {
+            Some(q) => run.samples >= MIN_QUANTISED && run.hides_motion(signals, q.step),
+            None => run.samples >= MIN_REPEATED && run.input_changes(&signals.input),
+        })
+        .max_by_key(|run| run.samples)?;
+    let chance = longest.chance(output, quantisation);
+    (chance < CHANCE).then(|| Defect::Repeated {
+        time_s: longest.start as f64 / signals.rate_hz,
+        samples: longest.samples,
     })
+}
+
+impl Run {
+    fn input_changes(&self, input: &[f64]) -> bool {
+        let pairs = input[self.start..self.start + self.samples].windows(2);
+        2 * pairs.filter(|pair| pair[0] != pair[1]).count() >= self.samples
+    }
+
+    /// The probability of such a run in the record.
+    fn chance(&self, output: &[f64], quantisation: Option<Quantisation>) -> f64 {
+        let equal = output.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        let others = equal.saturating_sub(self.samples) as f64;
+        // Of a quantised output, the ratio of the whole record is that of the parts in which it moves by less than one step.
+        let ratio = quantisation.map_or(others / output.len() as f64, |q| q.chance_of_equal());
+        output.len() as f64 * ratio.max(CHANCE).powf(self.samples as f64)
+    }
+
+    /// Whether the output moves by [`MOVED_STEPS`] right before and right after, each in a quarter of the time of the run, and the
+    /// input is active meanwhile. To a run until the end of the record the output must come from fast motion.
+    ///
+    /// Where a smooth output stays within one step from -T to T, it is at least as flat as c t^2 at a peak, and hardly flatter than
+    /// c t^4 with several frequencies: from T to 1.5 T it changes by 1.5^4 - 1 = 4 steps at most, and rounding adds one.
+    fn hides_motion(&self, signals: &Signals, step: f64) -> bool {
+        let (output, input) = (&signals.output, &signals.input);
+        let end = self.start + self.samples;
+        let is_last = end == output.len();
+        let around = self.samples.div_ceil(4);
+        let before = if is_last {
+            around.min(FAST_SAMPLES)
+        } else {
+            around
+        };
+        if self.start < before || (!is_last && end + around > output.len()) {
+            return false;
+        }
+        let moved = |samples: &[f64]| span(samples) >= MOVED_STEPS * step;
+        moved(&output[self.start - before..self.start])
+            && (is_last || moved(&output[end..end + around]))
+            && span(&input[self.start..end]) > ACTIVE_SPAN * span(input)
+    }
+}
+
+/// The difference between the largest and the smallest sample.
+fn span(samples: &[f64]) -> f64 {
+    let low = samples.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    high - low
 }
 
 /// The output at its largest or smallest value, if it stays there in several places.

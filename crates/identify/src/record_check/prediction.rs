@@ -36,6 +36,8 @@ const NORMAL_MEDIAN: f64 = 0.6745;
 const JUMP_RATIO: f64 = 30.0;
 /// The square of a spike is at least this ratio of the energy of the noise.
 const MIN_ENERGY_RATIO: f64 = 0.02;
+/// A spike or a jump is larger than this number of steps of the output: rounding may add one half at each side of it.
+const MIN_STEPS: f64 = 2.0;
 /// A spike is at most this many samples long.
 const MAX_SPIKE: usize = 4;
 
@@ -47,10 +49,13 @@ pub(super) struct Prediction<'a> {
     error: Vec<f64>,
     /// Standard deviation of the errors of each block, at least that of rounding.
     sigma: Vec<f64>,
+    /// The step of the output.
+    step: f64,
 }
 
 impl<'a> Prediction<'a> {
-    pub(super) fn new(signals: &'a Signals) -> Option<Self> {
+    /// The prediction of an output whose values are multiples of `step`; 0 if they are not.
+    pub(super) fn new(signals: &'a Signals, step: f64) -> Option<Self> {
         let scale = Scale::new(signals);
         let coefficients = coefficients(signals, &scale)?;
         let row_error = |k: usize| {
@@ -64,7 +69,10 @@ impl<'a> Prediction<'a> {
         };
         let mut error = vec![0.0; ORDER];
         error.extend((ORDER..signals.len()).map(row_error));
+        // Output whose motion is below one step has no errors for a while, and then some of the size of the step.
+        let quantisation = step * gain(&coefficients) / 12.0_f64.sqrt();
         let rounding = f64::EPSILON * scale.output.max(scale.offset.abs());
+        let rounding = rounding.max(quantisation);
         let blocks = error.chunks(BLOCK);
         let sigma = blocks
             .map(|block| sigma_by_median(block).max(rounding))
@@ -74,7 +82,13 @@ impl<'a> Prediction<'a> {
             coefficients,
             error,
             sigma,
+            step,
         })
+    }
+
+    /// The standard deviation of white noise of the output that gives these errors.
+    pub(super) fn noise(&self) -> f64 {
+        self.median_sigma() / gain(&self.coefficients)
     }
 
     /// The median over the blocks.
@@ -108,11 +122,16 @@ impl<'a> Prediction<'a> {
         self.error[k].abs() > DEFECT_SIGMAS * self.sigma[k / BLOCK]
     }
 
-    /// Whether a defect matters beside the noise: a short spike must have some of the noise's energy, a step always matters.
+    /// Whether a defect matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy.
     fn has_effect(&self, defect: Defect, k: usize) -> bool {
-        let Defect::Spike { height, .. } = defect else {
-            return true;
+        let height = match defect {
+            Defect::Spike { height, .. } => height,
+            Defect::Step { height, .. } => return height.abs() > MIN_STEPS * self.step,
+            _ => return true,
         };
+        if height.abs() <= MIN_STEPS * self.step {
+            return false;
+        }
         let sigma = self.sigma[k / BLOCK];
         height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
     }
@@ -202,6 +221,11 @@ fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
     }
     // Cholesky reads the lower triangle alone.
     Some(Cholesky::<f64, Dyn>::new(matrix)?.solve(&right))
+}
+
+/// The standard deviation of the errors for white noise of 1 in the output: sqrt(1 + sum a_i^2).
+fn gain(coefficients: &DVector<f64>) -> f64 {
+    (1.0 + coefficients.rows(0, ORDER).norm_squared()).sqrt()
 }
 
 fn sigma_by_median(errors: &[f64]) -> f64 {

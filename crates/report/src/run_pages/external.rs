@@ -77,6 +77,7 @@ impl<'a> ExternalRecord<'a> {
             ("Samples", Some(self.samples.to_string())),
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
             ("Times", Some(self.times.to_string())),
+            ("Resolution", self.analysis.resolution.description()),
             (
                 "Hold of the input",
                 milliseconds(self.analysis.input_path.hold_s),
