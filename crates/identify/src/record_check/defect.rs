@@ -27,6 +27,13 @@ pub enum Defect {
         /// Number of samples.
         samples: usize,
     },
+    /// The probe is slower than the log: each of its values is repeated.
+    Held {
+        /// Samples for each value.
+        samples: f64,
+        /// Values per second.
+        probe_hz: f64,
+    },
     /// The output stays at its largest or smallest value.
     Clipped {
         /// Time of the first sample at that value.
@@ -61,6 +68,12 @@ impl fmt::Display for Defect {
                 f,
                 "{samples} samples of the output from {time_s:.4} s on have the same value; check the probe and its connection, and repeat the record"
             ),
+            Defect::Held { samples, probe_hz } => write!(
+                f,
+                "{}: the probe has {probe_hz:.1} values per second; keep only the lines in which the output has changed, with their times, or log both columns at the rate of the probe; the excitation must end below {:.1} Hz, half of it",
+                HeldFor(*samples),
+                probe_hz / 2.0
+            ),
             Defect::Clipped { time_s, value } => write!(
                 f,
                 "the output is clipped at {value:.6e}, for the first time at {time_s:.4} s; lower the amplitude, or extend the range of the probe"
@@ -76,5 +89,34 @@ impl fmt::Display for Defect {
                 100.0 * ratio
             ),
         }
+    }
+}
+
+/// A whole number of samples differs from a measured one by less than this.
+const WHOLE: f64 = 0.02;
+
+/// For how many samples the output stays the same.
+struct HeldFor(f64);
+
+impl fmt::Display for HeldFor {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = self.0.round();
+        if (self.0 - whole).abs() > WHOLE {
+            return write!(
+                f,
+                "the output changes only after {:.2} samples on average",
+                self.0
+            );
+        }
+        let ending = match whole as u64 % 10 {
+            2 if whole != 12.0 => "nd",
+            3 if whole != 13.0 => "rd",
+            1 if whole != 11.0 => "st",
+            _ => "th",
+        };
+        write!(
+            f,
+            "the output changes only at every {whole:.0}{ending} sample"
+        )
     }
 }

@@ -4,15 +4,19 @@
 
 mod defect;
 mod ends;
+mod held;
 mod plateaus;
 mod prediction;
 mod resolution;
 mod stray_lines;
+#[cfg(test)]
+mod tests;
 
 use super::Signals;
 pub use defect::Defect;
 pub use ends::input_ratio_at_start;
 use ends::motion_at_ends;
+use held::held;
 use plateaus::{Quantisation, clipped, repeated};
 use prediction::Prediction;
 pub use resolution::Resolution;
@@ -28,7 +32,9 @@ pub fn defects(recorded: &Signals, cleaned: &Signals, is_periodic: bool) -> Vec<
     let prediction = Prediction::new(cleaned, step);
     let noise = prediction.as_ref().map_or(0.0, Prediction::noise);
     let quantisation = (step > MIN_STEP_RATIO * noise).then_some(Quantisation { step, noise });
-    let lasting = clipped(recorded).or_else(|| repeated(recorded, quantisation));
+    let lasting = held(recorded, step)
+        .or_else(|| clipped(recorded))
+        .or_else(|| repeated(recorded, quantisation));
     if lasting.is_some() || is_periodic {
         return lasting.into_iter().collect();
     }
@@ -39,261 +45,4 @@ pub fn defects(recorded: &Signals, cleaned: &Signals, is_periodic: bool) -> Vec<
     jumps
         .chain(motion_at_ends(cleaned, prediction.median_sigma()))
         .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const RATE_HZ: f64 = 1000.0;
-
-    /// 20 s of a mode of 30 Hz driven by a sweep, with 1 s of rest before and 4 s after, and noise of 1e-3.
-    fn signals() -> Signals {
-        let (w, zeta, step) = (std::f64::consts::TAU * 30.0, 0.02, 1.0 / RATE_HZ);
-        let mut state = 7_u64;
-        let mut noise = move || {
-            let mut uniform = || {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                (state >> 11) as f64 / (1_u64 << 53) as f64
-            };
-            (0..12).map(|_| uniform()).sum::<f64>() - 6.0
-        };
-        let force = |n: usize| {
-            let t = n as f64 / RATE_HZ - 1.0;
-            let fade = (t / 1.0).min(20.0 - t).clamp(0.0, 1.0);
-            fade * (std::f64::consts::TAU * (3.0 * t + 1.5 * t * t)).sin()
-        };
-        let input: Vec<f64> = (0..25_000).map(force).collect();
-        let (mut x, mut v) = (0.0, 0.0);
-        let output = input.iter().map(|u| {
-            let position = x;
-            // Semi-implicit Euler: any stable recursion of second order serves.
-            v += step * (w * w * (u - x) - 2.0 * zeta * w * v);
-            x += step * v;
-            position + 1e-3 * noise()
-        });
-        Signals {
-            rate_hz: RATE_HZ,
-            output: output.collect(),
-            input,
-        }
-    }
-
-    fn found_in(signals: &Signals, is_periodic: bool) -> Vec<Defect> {
-        defects(signals, signals, is_periodic)
-    }
-
-    fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
-        let mut signals = signals();
-        let output = signals.output.iter().enumerate();
-        signals.output = output.map(|(k, y)| change(k, *y)).collect();
-        found_in(&signals, false)
-    }
-
-    #[test]
-    fn sound_record_has_no_defect() {
-        assert_eq!(found_in(&signals(), false), []);
-    }
-
-    #[test]
-    fn spike_is_found_with_its_time_and_height() {
-        for length in [1, 3] {
-            let inside = |k: usize| (12_000..12_000 + length).contains(&k);
-            let found = spoiled(|k, y| if inside(k) { y + 2.0 } else { y });
-            let [Defect::Spike { time_s, height }] = found[..] else {
-                panic!("{found:?}")
-            };
-            assert!(time_s == 12.0 && (height - 2.0).abs() < 0.1, "{found:?}");
-        }
-    }
-
-    #[test]
-    fn step_is_found_with_its_time_and_height() {
-        let found = spoiled(|k, y| if k >= 15_000 { y - 0.5 } else { y });
-        let [Defect::Step { time_s, height }] = found[..] else {
-            panic!("{found:?}")
-        };
-        assert!(time_s == 15.0 && (height + 0.5).abs() < 0.05, "{found:?}");
-    }
-
-    #[test]
-    fn sinusoid_of_the_whole_record_is_found_and_subtracted() {
-        let sound = signals();
-        assert_eq!(stray_lines(&sound), []);
-        let (hz, height, phase) = (50.0123, 0.2, 0.7);
-        let mut disturbed = sound.clone();
-        for (n, y) in disturbed.output.iter_mut().enumerate() {
-            *y += height * (std::f64::consts::TAU * hz * n as f64 / RATE_HZ + phase).cos();
-        }
-        let found = stray_lines(&disturbed);
-        let [line] = found[..] else {
-            panic!("{found:?}")
-        };
-        assert!((line.frequency_hz - hz).abs() < 1e-4, "{line:?}");
-        assert!(
-            (line.amplitude.norm() / height - 1.0).abs() < 1e-2,
-            "{line:?}"
-        );
-        let cleaned = without(&disturbed, &found);
-        let left = cleaned.output.iter().zip(&sound.output);
-        let left = left.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / sound.len() as f64;
-        // 2 % of the line's 0.14.
-        assert!(left.sqrt() < 2.8e-3, "{}", left.sqrt());
-    }
-
-    #[test]
-    fn line_of_the_input_is_no_stray_line() {
-        let line = |n: usize| 0.2 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
-        let mut signals = signals();
-        for (n, y) in signals.output.iter_mut().enumerate() {
-            *y += line(n);
-        }
-        assert_eq!(stray_lines(&signals).len(), 1, "in the output alone");
-        for (n, u) in signals.input.iter_mut().enumerate() {
-            *u += line(n);
-        }
-        assert_eq!(stray_lines(&signals), []);
-    }
-
-    #[test]
-    fn input_that_began_before_the_record_is_active_at_its_start() {
-        let whole = signals();
-        assert!(input_ratio_at_start(&whole) < 0.01);
-        let begun = input_ratio_at_start(&whole.slice(10_000..25_000));
-        assert!((0.5..2.0).contains(&begun), "{begun}");
-    }
-
-    #[test]
-    fn repeated_samples_are_found_with_their_number() {
-        let sound = signals();
-        let inside = |k: usize| (9_000..9_100).contains(&k);
-        let found = spoiled(|k, y| if inside(k) { sound.output[9_000] } else { y });
-        assert_eq!(
-            found,
-            [Defect::Repeated {
-                time_s: 9.0,
-                samples: 100
-            }]
-        );
-    }
-
-    /// The output rounded to steps of 1/40 of its largest amplitude, without noise of its own.
-    fn rounded(mut signals: Signals) -> Signals {
-        let largest = signals.output.iter().fold(0.0_f64, |m, y| m.max(y.abs()));
-        let step = largest / 40.0;
-        for y in &mut signals.output {
-            *y = step * (*y / step).round();
-        }
-        signals
-    }
-
-    #[test]
-    fn rounded_output_at_rest_and_at_its_peaks_has_no_defect() {
-        let signals = rounded(signals());
-        assert_eq!(found_in(&signals, false), []);
-        assert_eq!(found_in(&signals, true), []);
-    }
-
-    #[test]
-    fn stuck_probe_with_a_coarse_step_is_found() {
-        let mut signals = rounded(signals());
-        // The sweep passes 30 Hz at 10 s. From one zero crossing to the next, 17 samples later, 17 samples are the same.
-        let is_crossing = |k: &usize| signals.output[*k - 1] < 0.0 && signals.output[*k] >= 0.0;
-        let start = (10_000..10_040).find(is_crossing).expect("a crossing");
-        let value = signals.output[start];
-        signals.output[start..start + 17].fill(value);
-        let found = found_in(&signals, true);
-        let [Defect::Repeated { time_s, samples }] = found[..] else {
-            panic!("{found:?}")
-        };
-        assert!((time_s * RATE_HZ - start as f64).abs() < 2.0, "{found:?}");
-        assert!((17..20).contains(&samples), "{found:?}");
-    }
-
-    #[test]
-    fn probe_with_a_coarse_step_that_fails_for_good_is_found() {
-        let mut signals = rounded(signals());
-        let value = signals.output[10_000];
-        signals.output[10_000..].fill(value);
-        let found = found_in(&signals, true);
-        let [Defect::Repeated { time_s, .. }] = found[..] else {
-            panic!("{found:?}")
-        };
-        assert!((time_s - 10.0).abs() < 0.005, "{found:?}");
-    }
-
-    #[test]
-    fn spike_below_one_step_is_no_defect_and_one_of_many_steps_is() {
-        let sound = rounded(signals());
-        let levels = Resolution::of(&sound).output.expect("a resolution");
-        let with_spike = |steps: f64| {
-            let mut signals = sound.clone();
-            signals.output[23_000] += steps * levels;
-            found_in(&signals, false)
-        };
-        assert_eq!(with_spike(1.0), []);
-        let found = with_spike(40.0);
-        assert!(
-            matches!(found[..], [Defect::Spike { time_s: 23.0, .. }]),
-            "{found:?}"
-        );
-    }
-
-    #[test]
-    fn clipped_output_is_found_with_its_limit() {
-        let found = spoiled(|_, y| y.clamp(-3.0, 3.0));
-        assert!(
-            matches!(found[..], [Defect::Clipped { value, .. }] if value == 3.0),
-            "{found:?}"
-        );
-    }
-
-    #[test]
-    fn record_that_begins_or_ends_in_motion_is_found() {
-        let whole = signals();
-        let cases = [(10_000..25_000, true), (0..10_000, false)];
-        for (range, at_start) in cases {
-            let found = found_in(&whole.slice(range), false);
-            let expected = |defect: &Defect| match defect {
-                Defect::MovingAtStart { .. } => at_start,
-                Defect::MovingAtEnd { .. } => !at_start,
-                _ => false,
-            };
-            assert!(found.len() == 1 && found.iter().all(expected), "{found:?}");
-        }
-    }
-
-    #[test]
-    fn impulse_of_the_input_is_no_defect() {
-        let mut signals = signals();
-        signals.input.fill(0.0);
-        signals.input[1000] = 1.0;
-        let response = |k: usize| {
-            let t = (k as f64 - 1000.0) / RATE_HZ;
-            if t > 0.0 {
-                (-4.0 * t).exp() * (188.0 * t).sin()
-            } else {
-                0.0
-            }
-        };
-        signals.output = (0..25_000).map(response).collect();
-        assert_eq!(found_in(&signals, false), []);
-    }
-
-    /// A sine of 30 Hz at 1 kHz with steps of a fortieth of its amplitude stays at its largest value for 3 or 4 samples a period.
-    #[test]
-    fn flat_peaks_of_a_coarse_quantisation_are_no_clipping() {
-        let mut signals = signals();
-        let sine = |k: usize| (std::f64::consts::TAU * 30.003 * k as f64 / RATE_HZ).sin();
-        signals.output = (0..25_000)
-            .map(|k| (40.0 * sine(k)).round() / 40.0)
-            .collect();
-        let found = found_in(&signals, true);
-        assert!(
-            !found.iter().any(|d| matches!(d, Defect::Clipped { .. })),
-            "{found:?}"
-        );
-    }
 }
