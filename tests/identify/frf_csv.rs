@@ -108,7 +108,7 @@ fn rejects_other_columns_and_invalid_rows_with_their_line() {
         "1,2,3,4,5,6,seven",
         "1,2,3,4,5,6,7,8",
     ] {
-        let text = format!("{}\n0.5,1e-4,0,1,0,0,0.1\n{row}\n", frf_csv::HEADER);
+        let text = format!("{}\n0.5,1e-4,0,1,1e-7,0.1,0.1\n{row}\n", frf_csv::HEADER);
         let error = frf_csv::from_str(&text).unwrap_err().to_string();
         assert!(error.contains("line 3") && error.contains(row), "{error}");
     }

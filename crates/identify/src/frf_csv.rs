@@ -10,6 +10,7 @@ use nalgebra::Complex;
 use thiserror::Error;
 
 use super::Frf;
+use super::frf_value::{ValueDefect, coherence_defect, sigma_defect};
 use bench_base::input_file::{self, MAX_TABLE_BYTES};
 
 /// Name of the magnitude column of a response from current to displacement.
@@ -58,6 +59,32 @@ pub enum FrfCsvError {
         line: u64,
         /// The row.
         text: String,
+    },
+    /// A cell is not a finite number.
+    #[error(
+        "line {line}, column `{column}`: {text:?} is not a finite number (in {row:?}); {REPAIR}"
+    )]
+    Cell {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Name of the column.
+        column: &'static str,
+        /// The cell.
+        text: String,
+        /// The row.
+        row: String,
+    },
+    /// A standard deviation or coherence that no measurement has.
+    #[error("line {line}, column `{column}`: {value} {defect}")]
+    Value {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Name of the column.
+        column: &'static str,
+        /// The value.
+        value: f64,
+        /// What is wrong, with the remedy.
+        defect: ValueDefect,
     },
     /// The text is not a table.
     #[error("{reason}; {REPAIR}")]
@@ -130,7 +157,8 @@ pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
 /// Reads an FRF in metres per ampere from text.
 ///
 /// # Errors
-/// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies.
+/// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies, standard deviations above 0
+/// and a coherence of 0 to 1.
 pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let found = text.lines().next().unwrap_or_default().trim();
     if found != HEADER {
@@ -143,9 +171,9 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let mut frf = Frf::default();
     for record in reader.records() {
         let record = record.map_err(|error| not_a_table(&error))?;
-        finite_numbers(&record)
-            .and_then(|numbers| push_row(numbers, &mut frf))
-            .ok_or_else(|| invalid_row(&record))?;
+        let numbers = finite_numbers(&record)?;
+        push_row(numbers, &mut frf).ok_or_else(|| invalid_row(&record))?;
+        check_values(&record, numbers)?;
     }
     Ok(frf)
 }
@@ -169,17 +197,65 @@ fn not_a_table(error: &csv::Error) -> FrfCsvError {
 }
 
 fn invalid_row(record: &csv::StringRecord) -> FrfCsvError {
-    let line = record.position().map_or(0, csv::Position::line);
-    let text = record.iter().collect::<Vec<_>>().join(",");
-    FrfCsvError::Row { line, text }
+    FrfCsvError::Row {
+        line: line(record),
+        text: text(record),
+    }
+}
+
+fn line(record: &csv::StringRecord) -> u64 {
+    record.position().map_or(0, csv::Position::line)
+}
+
+fn text(record: &csv::StringRecord) -> String {
+    record.iter().collect::<Vec<_>>().join(",")
 }
 
 /// The numbers of a row, if there is one for each column and all are finite.
-fn finite_numbers(record: &csv::StringRecord) -> Option<[f64; COLUMNS]> {
-    let fields = record.iter().map(|field| field.parse().ok());
-    let numbers: Vec<f64> = fields.collect::<Option<_>>()?;
-    let finite = numbers.iter().all(|number| number.is_finite());
-    numbers.try_into().ok().filter(|_| finite)
+fn finite_numbers(record: &csv::StringRecord) -> Result<[f64; COLUMNS], FrfCsvError> {
+    let cells = record.iter().zip(HEADER.split(','));
+    let numbers = cells.map(|(cell, column)| {
+        let number = cell.parse().ok().filter(|number: &f64| number.is_finite());
+        number.ok_or_else(|| FrfCsvError::Cell {
+            line: line(record),
+            column,
+            text: cell.into(),
+            row: text(record),
+        })
+    });
+    let numbers: Vec<f64> = numbers.collect::<Result<_, _>>()?;
+    let count_is_right = record.len() == COLUMNS;
+    let numbers = numbers.try_into().ok().filter(|_| count_is_right);
+    numbers.ok_or_else(|| invalid_row(record))
+}
+
+/// Refuses a standard deviation or a coherence that no measurement has.
+fn check_values(record: &csv::StringRecord, numbers: [f64; COLUMNS]) -> Result<(), FrfCsvError> {
+    let [_, _, _, coherence, magnitude_sigma, phase_sigma_deg, _] = numbers;
+    let found = [
+        ("coherence", coherence, coherence_defect(coherence)),
+        (
+            "magnitude_sigma",
+            magnitude_sigma,
+            sigma_defect(magnitude_sigma),
+        ),
+        (
+            "phase_sigma_deg",
+            phase_sigma_deg,
+            sigma_defect(phase_sigma_deg),
+        ),
+    ];
+    let mut defects = found
+        .into_iter()
+        .filter_map(|(column, value, defect)| Some((column, value, defect?)));
+    defects.next().map_or(Ok(()), |(column, value, defect)| {
+        Err(FrfCsvError::Value {
+            line: line(record),
+            column,
+            value,
+            defect,
+        })
+    })
 }
 
 /// Appends a row; `None` if its frequency is not above the one before.
@@ -196,7 +272,7 @@ fn push_row(numbers: [f64; COLUMNS], frf: &mut Frf) -> Option<()> {
     let response = Complex::from_polar(magnitude, phase_deg.to_radians());
     frf.frequency_hz.push(frequency);
     frf.response.push(response);
-    frf.coherence.push(coherence);
+    frf.coherence.push(coherence.clamp(0.0, 1.0));
     frf.magnitude_sigma.push(magnitude_sigma);
     frf.phase_sigma_rad.push(phase_sigma_deg.to_radians());
     frf.resolution_hz.push(resolution);
@@ -219,11 +295,51 @@ mod tests {
 
     #[test]
     fn error_of_a_row_holds_its_line_and_text() {
-        let text = format!("{HEADER}\n0.5,1e-4,0,1,0,0,0.1\n1,2,3\n");
+        let text = format!("{HEADER}\n0.5,1e-4,0,1,1e-7,0.1,0.1\n1,2,3\n");
         let error = from_str(&text).expect_err("a row of three numbers");
         assert!(
             matches!(&error, FrfCsvError::Row { line: 3, text } if text == "1,2,3"),
             "{error:?}"
         );
+    }
+
+    #[test]
+    fn rejects_sigma_and_coherence_that_no_measurement_has_with_line_column_and_value() {
+        use ValueDefect::{Coherence, NegativeSigma, ZeroSigma};
+        for (row, at, of, is) in [
+            ("1,2,3,1,0,1,0.1", "magnitude_sigma", 0.0, ZeroSigma),
+            ("1,2,3,1,-0.5,1,0.1", "magnitude_sigma", -0.5, NegativeSigma),
+            ("1,2,3,1,1,0,0.1", "phase_sigma_deg", 0.0, ZeroSigma),
+            ("1,2,3,1,1,-2,0.1", "phase_sigma_deg", -2.0, NegativeSigma),
+            ("1,2,3,1.7,1,1,0.1", "coherence", 1.7, Coherence),
+            ("1,2,3,-0.1,1,1,0.1", "coherence", -0.1, Coherence),
+        ] {
+            let error = from_str(&format!("{HEADER}\n{row}\n")).expect_err(row);
+            let FrfCsvError::Value {
+                line: 2,
+                column,
+                value,
+                defect,
+            } = error
+            else {
+                panic!("{row}: {error:?}");
+            };
+            assert_eq!((column, value, defect), (at, of, is), "{row}");
+        }
+    }
+
+    #[test]
+    fn error_of_a_sigma_that_is_not_finite_holds_line_column_and_text() {
+        let error = from_str(&format!("{HEADER}\n1,2,3,1,inf,1,0.1\n")).expect_err("infinite");
+        assert!(
+            matches!(&error, FrfCsvError::Cell { line: 2, column: "magnitude_sigma", text, .. } if text == "inf"),
+            "{error:?}"
+        );
+    }
+
+    #[test]
+    fn coherence_above_one_by_rounding_is_one() {
+        let frf = from_str(&format!("{HEADER}\n1,2,3,1.0000005,1,1,0.1\n")).expect("rounded");
+        assert_eq!(frf.coherence, [1.0]);
     }
 }

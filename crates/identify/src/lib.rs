@@ -36,6 +36,7 @@ mod excited_band;
 mod fft;
 mod frf;
 pub mod frf_csv;
+pub mod frf_value;
 mod growing;
 mod identification;
 mod local_model;
