@@ -20,6 +20,7 @@
 //! | distortion, odd and even, separated from noise | [`harmonics`], [`linearity`], [`with_distortion`] |
 //! | readings and set-points of irregular times | [`resampling`], [`setpoint_timing`] |
 //! | the excess delay of a response over its model | [`delay`] |
+//! | standard deviations of a response that has none | [`scatter`] |
 //! | modes with confidence intervals | [`modal`] |
 //! | whether there are CNMP zeros | [`verdict`] |
 //! | FRFs as CSV | [`frf_csv`] |
@@ -47,6 +48,7 @@ mod noise_parts;
 mod plausibility;
 pub mod record_check;
 pub mod repeated;
+pub mod scatter;
 mod settings;
 mod signals;
 mod timing;

@@ -10,18 +10,18 @@ use nalgebra::Complex;
 const DEPENDENT_RATIO: f64 = 1e-10;
 
 /// The solution of min |right - sum of solution_i column_i|^2.
-pub(super) struct LeastSquares {
-    pub(super) solution: Vec<Complex<f64>>,
+pub(crate) struct LeastSquares {
+    pub(crate) solution: Vec<Complex<f64>>,
     /// right - sum of solution_i column_i
-    pub(super) residual: Vec<Complex<f64>>,
+    pub(crate) residual: Vec<Complex<f64>>,
     /// g in solution_0 = sum over rows of g_j right_j.
-    pub(super) gradient: Vec<Complex<f64>>,
+    pub(crate) gradient: Vec<Complex<f64>>,
     /// Influence of each row on its own fit: the diagonal of the projection.
-    pub(super) leverage: Vec<f64>,
+    pub(crate) leverage: Vec<f64>,
 }
 
 /// Solves for `columns`, of the same length as `right`; `None` where they are linearly dependent or not finite.
-pub(super) fn solve(
+pub(crate) fn solve(
     mut columns: Vec<Vec<Complex<f64>>>,
     mut right: Vec<Complex<f64>>,
 ) -> Option<LeastSquares> {

@@ -9,7 +9,7 @@
 
 pub(super) mod frf_data;
 pub mod joint;
-mod least_squares;
+pub(super) mod least_squares;
 pub mod local;
 mod model;
 mod noise_floor;
