@@ -210,10 +210,10 @@ impl Heading {
 
 /// Whether the cells are units: most of them known ones, or in brackets.
 fn are_units(cells: &[String]) -> bool {
-    const KNOWN: [&str; 36] = [
+    const KNOWN: [&str; 41] = [
         "s", "sec", "ms", "us", "µs", "ns", "min", "n", "mn", "kn", "a", "ma", "v", "mv", "m",
         "mm", "um", "µm", "nm", "m/s", "mm/s", "m/s2", "m/s^2", "m/s²", "g", "deg", "rad", "°",
-        "hz", "%", "-", "1", "none", "pa", "bar", "counts",
+        "hz", "rad/s", "db", "m/a", "um/a", "mm/a", "%", "-", "1", "none", "pa", "bar", "counts",
     ];
     let is_unit = |cell: &String| {
         let bare = cell.trim_matches(['[', ']', '(', ')', '<', '>', ' ']);

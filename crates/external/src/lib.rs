@@ -1,4 +1,4 @@
-//! Records of other programs: tables of text, one sample per line, with the times of their samples.
+//! Records and frequency responses ([`frf`]) of other programs: tables of text, one sample or frequency per line.
 //!
 //! ```text
 //! file -> content (gzip, UTF-8, UTF-16, Latin-1; other formats are named) -> layout (preamble, names, units, separator)
@@ -12,6 +12,7 @@
 mod cells;
 mod content;
 mod error;
+pub mod frf;
 mod layout;
 mod table;
 mod times;

@@ -17,10 +17,10 @@ pub(crate) struct Table<'a> {
 }
 
 /// A cell with its place.
-struct Cell<'a> {
-    text: &'a str,
-    line: u64,
-    column: &'a str,
+pub(crate) struct Cell<'a> {
+    pub text: &'a str,
+    pub line: u64,
+    pub column: &'a str,
 }
 
 impl<'a> Table<'a> {
@@ -42,6 +42,20 @@ impl<'a> Table<'a> {
 
     pub fn names(&self) -> &[String] {
         &self.layout.names
+    }
+
+    /// Whether the file names its columns.
+    pub fn has_names(&self) -> bool {
+        self.layout.has_names
+    }
+
+    /// The unit of a column by the line of units; empty without one.
+    pub fn unit(&self, index: usize) -> &str {
+        self.layout.units.get(index).map_or("", String::as_str)
+    }
+
+    pub fn path(&self) -> &'a Path {
+        self.path
     }
 
     /// The numbers of some columns.
@@ -93,7 +107,7 @@ impl<'a> Table<'a> {
     }
 
     /// Calls a function with the cells of some columns of each line of samples.
-    fn each_row(
+    pub fn each_row(
         &self,
         names: &[&String],
         mut take: impl FnMut(&[Cell<'_>]) -> Result<(), DataError>,
@@ -161,7 +175,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn number(&self, cell: &Cell<'_>) -> Result<f64, DataError> {
+    pub fn number(&self, cell: &Cell<'_>) -> Result<f64, DataError> {
         let number = self.layout.format.number(cell.text);
         let number = number.filter(|number| number.is_finite());
         number.ok_or_else(|| self.cell_error(cell))

@@ -23,6 +23,9 @@ pub const RATIO: &str = "magnitude";
 /// The columns of a response from current to displacement, in this order.
 pub const HEADER: &str = "frequency_hz,magnitude_m_per_a,phase_deg,coherence,magnitude_sigma,phase_sigma_deg,resolution_hz";
 
+/// Name of the column of the standard deviations of the magnitude.
+pub const MAGNITUDE_SIGMA: &str = "magnitude_sigma";
+
 /// Number of columns of [`HEADER`].
 pub const COLUMNS: usize = 7;
 
@@ -178,6 +181,12 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     Ok(frf)
 }
 
+/// Whether the first line has the columns of [`HEADER`], the magnitude in any unit.
+pub fn has_own_columns(text: &str) -> bool {
+    let found = text.lines().next().unwrap_or_default().trim();
+    !matches!(wrong_header(found), FrfCsvError::Header { .. })
+}
+
 /// The columns are those of another file, or of a response in another unit.
 fn wrong_header(found: &str) -> FrfCsvError {
     let name = found.split(',').nth(1).unwrap_or_default();
@@ -235,7 +244,7 @@ fn check_values(record: &csv::StringRecord, numbers: [f64; COLUMNS]) -> Result<(
     let found = [
         ("coherence", coherence, coherence_defect(coherence)),
         (
-            "magnitude_sigma",
+            MAGNITUDE_SIGMA,
             magnitude_sigma,
             sigma_defect(magnitude_sigma),
         ),

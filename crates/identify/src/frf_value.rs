@@ -25,6 +25,11 @@ pub enum ValueDefect {
         "is not a finite standard deviation; correct it, or leave out the column if it is unknown"
     )]
     InfiniteSigma,
+    /// A magnitude below zero.
+    #[error(
+        "is negative, but a magnitude is not; correct it, or name the column by what it is, such as `real` or `magnitude_db`"
+    )]
+    NegativeMagnitude,
     /// A coherence outside 0 to 1.
     #[error(
         "is not a coherence, which is from 0 to 1; correct it, or leave out the column if it is another quantity"

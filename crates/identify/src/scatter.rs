@@ -23,8 +23,21 @@
 //! window with random excitation, whose lines have the correlation (2/3)^2, by 11 %.
 
 use nalgebra::Complex;
+use serde::Serialize;
 
 use super::local_model::least_squares;
+
+/// Where the standard deviations of a response come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum SigmaSource {
+    /// The file or the recording.
+    #[default]
+    Given,
+    /// The scatter of the response, by [`variances`].
+    Estimated,
+}
 
 /// The fewest points of a response whose noise can be estimated: those of the small neighbourhood.
 pub const MIN_POINTS: usize = NEAR;

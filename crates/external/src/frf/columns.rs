@@ -1,0 +1,280 @@
+//! What the columns of a table are, by their names.
+
+use serde::Serialize;
+
+use super::error::FrfTableError;
+use crate::table::Table;
+
+/// Unit of phases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[serde(rename_all = "lowercase")]
+pub enum PhaseUnit {
+    /// Degrees.
+    Deg,
+    /// Radians.
+    Rad,
+}
+
+/// What a column contains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    Frequency,
+    Magnitude,
+    Phase,
+    Real,
+    Imaginary,
+    Coherence,
+    MagnitudeSigma,
+    Resolution,
+}
+
+/// Unit of a magnitude.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Scale {
+    /// Metres per ampere.
+    Linear,
+    /// 20 log10 of it.
+    Decibels,
+}
+
+/// Names of two columns that are the response.
+#[derive(Clone, Debug)]
+pub(super) enum Pair {
+    Polar {
+        magnitude: String,
+        scale: Scale,
+        phase: String,
+        phase_unit: Option<PhaseUnit>,
+    },
+    Cartesian {
+        real: String,
+        imaginary: String,
+    },
+    /// Not named.
+    Unknown([String; 2]),
+}
+
+/// The columns of a response.
+#[derive(Clone, Debug)]
+pub(super) struct Columns {
+    pub frequency: String,
+    /// Hertz per unit of the column; `None` if it is not stated.
+    pub hz_per_unit: Option<f64>,
+    pub pair: Pair,
+    pub coherence: Option<String>,
+    pub magnitude_sigma: Option<String>,
+    pub resolution: Option<String>,
+}
+
+/// The words of a name and its unit, in lower case.
+struct Words(Vec<String>);
+
+impl Words {
+    fn of(name: &str, unit: &str) -> Words {
+        let text = format!("{name} {unit}")
+            .to_lowercase()
+            .replace('°', " deg ");
+        let words = text.split(|c: char| !c.is_alphanumeric());
+        let words = words.filter(|word| !word.is_empty());
+        Words(words.map(String::from).collect())
+    }
+
+    fn has(&self, any: &[&str]) -> bool {
+        self.0.iter().any(|word| any.contains(&word.as_str()))
+    }
+
+    fn is_only(&self, any: &[&str]) -> bool {
+        !self.0.is_empty() && self.0.iter().all(|word| any.contains(&word.as_str()))
+    }
+
+    fn role(&self) -> Option<Role> {
+        let is_phase = self.has(&["phase", "phi", "φ", "angle", "arg"]);
+        if self.has(&["sigma", "std", "stddev", "uncertainty", "σ"]) {
+            return (!is_phase && !self.has(&["deg", "rad"])).then_some(Role::MagnitudeSigma);
+        }
+        const ROLES: [(Role, &[&str]); 5] = [
+            (Role::Coherence, &["coherence", "coh", "gamma2", "γ2"]),
+            (Role::Resolution, &["resolution"]),
+            (Role::Real, &["real", "re"]),
+            (Role::Imaginary, &["imag", "imaginary", "im"]),
+            (
+                Role::Frequency,
+                &["frequency", "frequencies", "freq", "f", "omega", "w", "ω"],
+            ),
+        ];
+        const MAGNITUDES: [&str; 10] = [
+            "magnitude",
+            "mag",
+            "amplitude",
+            "ampl",
+            "amp",
+            "gain",
+            "abs",
+            "g",
+            "h",
+            "compliance",
+        ];
+        let named = ROLES.iter().find(|(_, words)| self.has(words));
+        if let Some((role, _)) = named {
+            Some(*role)
+        } else if is_phase || self.is_only(&["deg"]) {
+            Some(Role::Phase)
+        } else if self.has(&MAGNITUDES) || self.has(&["db"]) {
+            Some(Role::Magnitude)
+        } else {
+            self.is_only(&["hz", "khz"]).then_some(Role::Frequency)
+        }
+    }
+
+    fn hz_per_unit(&self) -> Option<f64> {
+        if self.has(&["khz"]) {
+            Some(1e3)
+        } else if self.has(&["hz"]) {
+            Some(1.0)
+        } else {
+            self.has(&["rad", "rads", "omega", "w", "ω"])
+                .then_some(0.5 / std::f64::consts::PI)
+        }
+    }
+
+    fn phase_unit(&self) -> Option<PhaseUnit> {
+        if self.has(&["deg", "degree", "degrees"]) {
+            Some(PhaseUnit::Deg)
+        } else {
+            self.has(&["rad", "radian", "radians"])
+                .then_some(PhaseUnit::Rad)
+        }
+    }
+
+    fn scale(&self) -> Scale {
+        if self.has(&["db"]) {
+            Scale::Decibels
+        } else {
+            Scale::Linear
+        }
+    }
+
+    /// Whether the unit is another one than metres per ampere.
+    fn has_other_unit(&self) -> bool {
+        const OTHERS: [&str; 13] = [
+            "um", "µm", "μm", "mm", "nm", "n", "mn", "v", "mv", "ma", "s2", "counts", "percent",
+        ];
+        self.0.len() > 1
+            && self.0[1..]
+                .iter()
+                .any(|word| OTHERS.contains(&word.as_str()))
+            || self.0.join(" ").ends_with("a per m")
+    }
+}
+
+impl Columns {
+    /// The columns of a table by their names; three columns without names are a frequency and two of the response.
+    pub fn of(table: &Table<'_>) -> Result<Columns, FrfTableError> {
+        if let ([frequency, first, second], false) = (table.names(), table.has_names()) {
+            return Ok(Columns {
+                frequency: frequency.clone(),
+                hz_per_unit: None,
+                pair: Pair::Unknown([first.clone(), second.clone()]),
+                coherence: None,
+                magnitude_sigma: None,
+                resolution: None,
+            });
+        }
+        Named::of(table)?.columns()
+    }
+}
+
+/// A column with its words and its role.
+struct NamedColumn<'a> {
+    name: &'a String,
+    words: Words,
+    role: Option<Role>,
+}
+
+struct Named<'a> {
+    table: &'a Table<'a>,
+    columns: Vec<NamedColumn<'a>>,
+}
+
+impl<'a> Named<'a> {
+    fn of(table: &'a Table<'_>) -> Result<Named<'a>, FrfTableError> {
+        let columns = table.names().iter().enumerate().map(|(index, name)| {
+            let words = Words::of(name, table.unit(index));
+            let role = words.role();
+            NamedColumn { name, words, role }
+        });
+        let columns: Vec<NamedColumn<'_>> = columns.collect();
+        for (index, column) in columns.iter().enumerate() {
+            let same =
+                |other: &&NamedColumn<'_>| column.role.is_some() && other.role == column.role;
+            if let Some(first) = columns[..index].iter().find(same) {
+                return Err(FrfTableError::Twice {
+                    path: table.path().to_owned(),
+                    first: first.name.clone(),
+                    second: column.name.clone(),
+                });
+            }
+        }
+        Ok(Named { table, columns })
+    }
+
+    fn get(&self, role: Role) -> Option<&NamedColumn<'a>> {
+        self.columns.iter().find(|column| column.role == Some(role))
+    }
+
+    fn name(&self, role: Role) -> Option<String> {
+        self.get(role).map(|column| column.name.clone())
+    }
+
+    fn require(&self, role: Role, what: &'static str) -> Result<&NamedColumn<'a>, FrfTableError> {
+        self.get(role).ok_or_else(|| FrfTableError::Missing {
+            path: self.table.path().to_owned(),
+            what,
+            available: self.table.names().to_vec(),
+        })
+    }
+
+    fn columns(&self) -> Result<Columns, FrfTableError> {
+        let frequency = self.require(Role::Frequency, "frequency")?;
+        Ok(Columns {
+            frequency: frequency.name.clone(),
+            hz_per_unit: frequency.words.hz_per_unit(),
+            pair: self.pair()?,
+            coherence: self.name(Role::Coherence),
+            magnitude_sigma: self.name(Role::MagnitudeSigma),
+            resolution: self.name(Role::Resolution),
+        })
+    }
+
+    fn pair(&self) -> Result<Pair, FrfTableError> {
+        if let (Some(real), Some(imaginary)) = (self.get(Role::Real), self.get(Role::Imaginary)) {
+            for column in [real, imaginary] {
+                self.check_unit(column)?;
+            }
+            return Ok(Pair::Cartesian {
+                real: real.name.clone(),
+                imaginary: imaginary.name.clone(),
+            });
+        }
+        let magnitude = self.require(Role::Magnitude, "magnitude")?;
+        self.check_unit(magnitude)?;
+        let phase = self.require(Role::Phase, "phase")?;
+        Ok(Pair::Polar {
+            magnitude: magnitude.name.clone(),
+            scale: magnitude.words.scale(),
+            phase: phase.name.clone(),
+            phase_unit: phase.words.phase_unit(),
+        })
+    }
+
+    fn check_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
+        if column.words.has_other_unit() {
+            return Err(FrfTableError::Unit {
+                path: self.table.path().to_owned(),
+                column: column.name.clone(),
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,150 @@
+//! The numbers of a response, checked line by line.
+
+use std::path::{Path, PathBuf};
+
+use bench_identify::frf_value::{ValueDefect, coherence_defect, sigma_defect};
+
+use super::columns::{Columns, Pair, Scale};
+use super::error::FrfTableError;
+use crate::error::DataError;
+use crate::table::{Cell, Table};
+
+/// The numbers of the lines of a table, the line at 0 Hz left out.
+pub(super) struct Numbers {
+    pub path: PathBuf,
+    pub rows: Vec<Row>,
+    /// Whether a line at 0 Hz was left out.
+    pub without_zero: bool,
+}
+
+/// The numbers of a line.
+pub(super) struct Row {
+    /// In the unit of the file.
+    pub frequency: f64,
+    pub pair: [f64; 2],
+    pub coherence: Option<f64>,
+    /// `None` where the file has no value.
+    pub magnitude_sigma: Option<f64>,
+    pub resolution: Option<f64>,
+}
+
+/// A cell with the column that it belongs to.
+type Cells<'a, 'b> = &'a [Cell<'b>];
+
+impl Numbers {
+    pub fn read(table: &Table<'_>, columns: &Columns) -> Result<Numbers, FrfTableError> {
+        let pair = match &columns.pair {
+            Pair::Polar {
+                magnitude, phase, ..
+            } => [magnitude, phase],
+            Pair::Cartesian { real, imaginary } => [real, imaginary],
+            Pair::Unknown([first, second]) => [first, second],
+        };
+        let others = [
+            &columns.coherence,
+            &columns.magnitude_sigma,
+            &columns.resolution,
+        ];
+        let mut names = vec![&columns.frequency, pair[0], pair[1]];
+        names.extend(others.into_iter().flatten());
+        let mut numbers = Numbers {
+            path: table.path().to_owned(),
+            rows: Vec::new(),
+            without_zero: false,
+        };
+        let mut defect = None;
+        table.each_row(&names, |cells| {
+            let row = row(table, columns, cells)?;
+            let found = numbers.push(row, cells, columns);
+            defect = defect.take().or(found.err());
+            Ok(())
+        })?;
+        defect.map_or(Ok(numbers), Err)
+    }
+
+    fn push(
+        &mut self,
+        row: Row,
+        cells: Cells<'_, '_>,
+        columns: &Columns,
+    ) -> Result<(), FrfTableError> {
+        let previous = self.rows.last().map_or(0.0, |last| last.frequency);
+        if row.frequency == 0.0 && self.rows.is_empty() && !self.without_zero {
+            self.without_zero = true;
+            return Ok(());
+        }
+        if row.frequency <= previous {
+            return Err(FrfTableError::NotRising {
+                path: self.path.clone(),
+                line: cells[0].line,
+                column: columns.frequency.clone(),
+                value: row.frequency,
+                previous,
+            });
+        }
+        check(&self.path, cells[0].line, &row, columns)?;
+        self.rows.push(row);
+        Ok(())
+    }
+}
+
+fn row(table: &Table<'_>, columns: &Columns, cells: Cells<'_, '_>) -> Result<Row, DataError> {
+    let at = |name: &Option<String>| {
+        let name = name.as_deref()?;
+        cells.iter().find(|cell| cell.column == name)
+    };
+    let stated = |name: &Option<String>| at(name).map(|cell| table.number(cell)).transpose();
+    // No value: not known.
+    let sigma = at(&columns.magnitude_sigma).filter(|cell| !cell.text.is_empty());
+    Ok(Row {
+        frequency: table.number(&cells[0])?,
+        pair: [table.number(&cells[1])?, table.number(&cells[2])?],
+        coherence: stated(&columns.coherence)?,
+        magnitude_sigma: sigma.map(|cell| table.number(cell)).transpose()?,
+        resolution: stated(&columns.resolution)?,
+    })
+}
+
+/// Refuses numbers that no measurement has.
+fn check(path: &Path, line: u64, row: &Row, columns: &Columns) -> Result<(), FrfTableError> {
+    let linear = match &columns.pair {
+        Pair::Polar {
+            magnitude,
+            scale: Scale::Linear,
+            ..
+        } => Some(magnitude),
+        _ => None,
+    };
+    let magnitude = linear.filter(|_| row.pair[0] < 0.0);
+    let sigma = row.magnitude_sigma.and_then(sigma_defect);
+    let coherence = row.coherence.and_then(coherence_defect);
+    let found: [(Option<&String>, f64, Option<ValueDefect>); 3] = [
+        (
+            magnitude,
+            row.pair[0],
+            magnitude.map(|_| ValueDefect::NegativeMagnitude),
+        ),
+        (
+            columns.magnitude_sigma.as_ref(),
+            row.magnitude_sigma.unwrap_or_default(),
+            sigma,
+        ),
+        (
+            columns.coherence.as_ref(),
+            row.coherence.unwrap_or_default(),
+            coherence,
+        ),
+    ];
+    for (column, value, defect) in found {
+        if let (Some(column), Some(defect)) = (column, defect) {
+            return Err(FrfTableError::Value {
+                path: path.to_owned(),
+                line,
+                column: column.clone(),
+                value,
+                defect,
+            });
+        }
+    }
+    Ok(())
+}

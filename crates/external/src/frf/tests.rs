@@ -1,0 +1,237 @@
+//! Tables of other programs give the response that was written, or say what is missing.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex;
+
+use super::columns::Columns;
+use super::numbers::Numbers;
+use super::*;
+
+/// A mode at 30 Hz with a delay of 0.5 ms, and a scatter of one part in 10 000.
+fn stage(hz: f64) -> Complex<f64> {
+    let x = hz / 30.0;
+    let mode = Complex::from(1e-4) / Complex::new(1.0 - x * x, 0.04 * x);
+    let scatter = 1.0 + 1e-4 * libm::sin(1e3 * hz * hz);
+    mode * Complex::from_polar(scatter, -TAU * hz * 5e-4)
+}
+
+fn grid() -> impl Iterator<Item = f64> {
+    (1..=200).map(|k| 0.5 * f64::from(k))
+}
+
+fn of(text: String, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
+    let table = Table::of(Path::new("frf.csv"), text)?;
+    let columns = Columns::of(&table)?;
+    points::response(&Numbers::read(&table, &columns)?, columns, phase)
+}
+
+/// A table with these lines before it and three numbers in each line.
+fn table(heading: &str, separator: &str, row: fn(f64, Complex<f64>) -> [f64; 3]) -> String {
+    let rows = grid().map(|hz| {
+        let cells = row(hz, stage(hz)).map(|number| format!("{number:e}"));
+        format!("{}\n", cells.join(separator))
+    });
+    format!("{heading}{}", rows.collect::<String>())
+}
+
+#[track_caller]
+fn is_stage(found: Result<ImportedFrf, FrfTableError>) -> ImportedFrf {
+    let found = found.expect("a response");
+    for (k, hz) in grid().enumerate() {
+        let frequency_hz = found.frf.frequency_hz[k];
+        assert!((frequency_hz / hz - 1.0).abs() < 1e-12, "{frequency_hz}");
+        // Three conversions of rounded numbers, at phases of up to 3.4 rad.
+        let ratio = found.frf.response[k] / stage(hz);
+        assert!((ratio - 1.0).norm() < 1e-13, "{hz} Hz: {ratio}");
+    }
+    assert_eq!(found.sigma, SigmaSource::Estimated);
+    found
+}
+
+fn db(h: Complex<f64>) -> f64 {
+    20.0 * libm::log10(h.norm())
+}
+
+#[test]
+fn units_are_those_of_the_names() {
+    let cases: [(&str, fn(f64, Complex<f64>) -> [f64; 3]); 9] = [
+        ("frequency_hz,magnitude_m_per_a,phase_deg", |hz, h| {
+            [hz, h.norm(), h.arg().to_degrees()]
+        }),
+        ("f (kHz),|G| (dB),phase (rad)", |hz, h| {
+            [1e-3 * hz, db(h), h.arg()]
+        }),
+        ("omega,mag_db,phase_deg", |hz, h| {
+            [TAU * hz, db(h), h.arg().to_degrees()]
+        }),
+        ("Freq [rad/s],magnitude (dB),Phase [°]", |hz, h| {
+            [TAU * hz, db(h), h.arg().to_degrees()]
+        }),
+        ("Hz,dB,deg", |hz, h| [hz, db(h), h.arg().to_degrees()]),
+        ("f_hz,real,imag", |hz, h| [hz, h.re, h.im]),
+        ("imag,freq_hz,real", |hz, h| [h.im, hz, h.re]),
+        ("freq_hz,Re(G) [m/A],Im(G) [m/A]", |hz, h| [hz, h.re, h.im]),
+        ("f,gain,phase\nHz,m/A,rad", |hz, h| [hz, h.norm(), h.arg()]),
+    ];
+    for (names, row) in cases {
+        let found = is_stage(of(table(&format!("{names}\n"), ",", row), None));
+        assert!(
+            found.assumptions.is_empty(),
+            "{names}: {:?}",
+            found.assumptions
+        );
+    }
+}
+
+#[test]
+fn comments_separators_and_decimal_commas_are_read() {
+    let polar = |hz: f64, h: Complex<f64>| [hz, h.norm(), h.arg().to_degrees()];
+    for separator in [",", ";", "\t", "  "] {
+        for heading in ["% Analyser 3\n% run 7\n", "# Analyser 3\n"] {
+            let names = "f_hz,mag,phase_deg\n".replace(',', separator);
+            is_stage(of(
+                table(&format!("{heading}{names}"), separator, polar),
+                None,
+            ));
+        }
+    }
+    let text = table("f_hz;mag;phase_deg\n", ";", polar).replace('.', ",");
+    is_stage(of(text, None));
+}
+
+#[test]
+fn numbers_decide_where_names_do_not_and_the_assumption_is_stated() {
+    let cases: [(&str, fn(f64, Complex<f64>) -> [f64; 3], &[&str]); 5] = [
+        (
+            "f_hz,mag,phase\n",
+            |hz, h| [hz, h.norm(), h.arg().to_degrees()],
+            &["degrees"],
+        ),
+        (
+            "f,mag,phase\n",
+            |hz, h| [hz, h.norm(), h.arg()],
+            &["Hz", "radians"],
+        ),
+        (
+            "",
+            |hz, h| [hz, h.norm(), h.arg()],
+            &["Hz", "magnitude (m/A)", "radians"],
+        ),
+        (
+            "",
+            |hz, h| [hz, db(h), h.arg().to_degrees()],
+            &["Hz", "dB", "degrees"],
+        ),
+        ("", |hz, h| [hz, h.re, h.im], &["Hz", "real"]),
+    ];
+    for (heading, row, words) in cases {
+        let found = is_stage(of(table(heading, ",", row), None));
+        assert_eq!(
+            found.assumptions.len(),
+            words.len(),
+            "{:?}",
+            found.assumptions
+        );
+        for (assumption, word) in found.assumptions.iter().zip(words) {
+            assert!(assumption.contains(word), "{assumption}");
+        }
+    }
+}
+
+#[test]
+fn phases_of_unknown_unit_are_refused_with_the_option_that_decides() {
+    // Ten radians, unwrapped, or ten degrees.
+    let unwrapped = |hz: f64, h: Complex<f64>| [hz, h.norm(), -0.1 * hz];
+    let text = table("f_hz,mag,phase\n", ",", unwrapped);
+    let error = of(text.clone(), None).expect_err("unknown").to_string();
+    assert!(
+        error.contains("--frf-phase") && error.contains("10.0000"),
+        "{error}"
+    );
+    for (unit, rad) in [(PhaseUnit::Rad, 1.0), (PhaseUnit::Deg, PI / 180.0)] {
+        let found = of(text.clone(), Some(unit)).expect("given");
+        let phase = found.frf.phase_rad(9);
+        assert!((phase + 0.5 * rad).abs() < 1e-12, "{phase}");
+    }
+}
+
+#[test]
+fn sigma_of_the_file_is_used_and_one_that_no_measurement_has_is_refused() {
+    let with = |sigma: fn(usize) -> &'static str| {
+        let rows = grid().enumerate().map(|(k, hz)| {
+            let h = stage(hz);
+            format!("{hz},{},{},{}\n", h.re, h.im, sigma(k))
+        });
+        format!(
+            "f_hz,real,imag,magnitude_sigma\n{}",
+            rows.collect::<String>()
+        )
+    };
+    let given = of(with(|_| "2e-8"), None).expect("given");
+    assert_eq!(given.sigma, SigmaSource::Given);
+    assert!((given.frf.magnitude_sigma[7] / 2e-8 - 1.0).abs() < 1e-12);
+    let partly = of(with(|k| if k == 7 { "" } else { "2e-8" }), None).expect("one without");
+    assert_eq!(partly.sigma, SigmaSource::Estimated);
+    assert!((partly.frf.magnitude_sigma[6] / 2e-8 - 1.0).abs() < 1e-12);
+    let other = partly.frf.magnitude_sigma[7];
+    assert!(other > 0.0 && (other / 2e-8 - 1.0).abs() > 1e-3, "{other}");
+    for (text, words) in [
+        (
+            with(|k| if k == 7 { "0" } else { "2e-8" }),
+            "0 is the standard deviation of an exact value",
+        ),
+        (
+            with(|k| if k == 7 { "-1e-8" } else { "2e-8" }),
+            "is negative",
+        ),
+        (
+            with(|k| if k == 7 { "inf" } else { "2e-8" }),
+            "not a finite number",
+        ),
+    ] {
+        let error = of(text, None).expect_err(words).to_string();
+        for word in ["line 9", "magnitude_sigma", words] {
+            assert!(error.contains(word), "`{word}` is not in {error}");
+        }
+    }
+}
+
+#[test]
+fn defects_are_refused_with_their_place() {
+    let cases = [
+        ("a,b,c\n1,2,3\n2,3,4\n", "no column of the frequency"),
+        ("f,b,c\n1,2,3\n2,3,4\n", "no column of the magnitude"),
+        ("f_hz,mag_um_per_a,phase_deg\n1,2,3\n2,3,4\n", "not in m/A"),
+        (
+            "f_hz,magnitude_a_per_m,phase_deg\n1,2,3\n2,3,4\n",
+            "not in m/A",
+        ),
+        (
+            "f_hz,mag,abs,phase_deg\n1,2,3,4\n2,3,4,5\n",
+            "`mag` and `abs`",
+        ),
+        ("f_hz,mag,phase_deg\n1,2,3\n1,3,4\n", "line 3: 1"),
+        (
+            "f_hz,mag,phase_deg\n1,2,3\n2,-3,4\n",
+            "line 3, column `mag`: -3 is negative",
+        ),
+        (
+            "f_hz,mag,phase_deg,coherence\n1,2,3,1\n2,3,4,1.7\n",
+            "1.7 is not a coherence",
+        ),
+        ("f_hz,mag,phase_deg\n1,2,3\n2,3,4\n", "2 frequencies"),
+        ("1,2,-300\n2,-3,4\n", "no line with the names"),
+    ];
+    for (text, words) in cases {
+        let error = of(text.into(), None).expect_err(words).to_string();
+        assert!(error.contains(words) && error.contains("; "), "{error}");
+    }
+}
+
+#[test]
+fn line_at_zero_hertz_is_left_out() {
+    let text = table("f_hz,real,imag\n0,1,0\n", ",", |hz, h| [hz, h.re, h.im]);
+    let found = is_stage(of(text, None));
+    assert_eq!(found.assumptions, ["the line at 0 Hz is left out"]);
+}
