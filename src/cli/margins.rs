@@ -15,6 +15,7 @@ use bench_base::decimal::Decimal;
 use bench_config::{Config, ProbeSettings, Purpose};
 use bench_control::{ClosedLoop, Margins, Pole, listed_poles};
 use bench_experiment::{LoopModel, Stage, check_calibration, closed_loop};
+use bench_external::frf::PhaseUnit;
 use bench_order::{BenchOptions, ControllerChoice, GLOSSARY};
 use bench_report::figures::{self, Figure};
 use bench_report::{LoopPlot, Picture, ReportError, joined, loop_svg, plant_conditions};
@@ -31,10 +32,14 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "frf")]
     continuous: bool,
     /// Also compute the margins with a measured plant instead of the model, with 95 % confidence intervals: the FRF of
-    /// `bench chirp` (..._frf.csv) or its recording (MCAP); exit code 1 if this loop is not stable. Outside of the
-    /// measured band the model is used
+    /// `bench chirp` (..._frf.csv) or its recording (MCAP), or a table of another program with frequency, magnitude and
+    /// phase, or real and imaginary part, in m/A; exit code 1 if this loop is not stable. Outside of the measured band the
+    /// model is used
     #[arg(long, value_name = "FILE|RECORDING")]
     frf: Option<PathBuf>,
+    /// With --frf: unit of the phases of a table [default: that in the name of the column, otherwise by the numbers]
+    #[arg(long, value_name = "UNIT", requires = "frf", value_enum)]
+    frf_phase: Option<PhaseUnit>,
     /// With --frf: folder for L, S, T, C S and P S as CSV and for Bode plot, Nyquist plot and sensitivities as SVG
     #[arg(long, value_name = "FOLDER", requires = "frf")]
     out: Option<PathBuf>,
@@ -74,7 +79,15 @@ pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
         .write(|| drawn(args, &config, &closed_loop, &margins))?;
     let frf = args.frf.as_deref();
     let measured = frf
-        .map(|frf| measured_margins::measured(frf, args.out.as_deref(), &closed_loop, &config))
+        .map(|frf| {
+            measured_margins::measured(
+                frf,
+                args.frf_phase,
+                args.out.as_deref(),
+                &closed_loop,
+                &config,
+            )
+        })
         .transpose()?;
     let is_stable = measured
         .as_ref()

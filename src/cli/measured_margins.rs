@@ -14,6 +14,8 @@ use bench_control::ClosedLoop;
 use bench_control::measured::{NyquistCount, OutsideBand, RangeBound, Stability};
 use bench_experiment::outputs::{ExistingFile, ResultFiles};
 use bench_experiment::{LoopCurves, MeasuredFrf, MeasuredLoopMargins};
+use bench_external::frf::PhaseUnit;
+use bench_identify::scatter::SigmaSource;
 use bench_report::figures::{Figure, loop_peaks, measured_margins};
 use bench_report::run_pages::{MeasuredLoopFiles, MeasuredLoopReport};
 
@@ -24,6 +26,8 @@ pub(super) struct Measured {
     frf: String,
     /// Number of measured frequencies.
     frequencies: usize,
+    /// Where the standard deviations of the plant come from.
+    sigma: SigmaSource,
     #[serde(flatten)]
     result: MeasuredLoopMargins,
     /// Margins and peaks as shown.
@@ -43,11 +47,12 @@ impl Measured {
 /// The margins of a control law around the plant of a file; files of the loop in a folder.
 pub(super) fn measured(
     path: &Path,
+    phase: Option<PhaseUnit>,
     out: Option<&Path>,
     closed_loop: &ClosedLoop,
     config: &Config,
 ) -> Result<Measured, CliError> {
-    let measured = MeasuredFrf::read(path)?;
+    let measured = MeasuredFrf::read(path, phase)?;
     warn(&measured.cautions);
     warn(&measured.differences(config));
     let result = bench_experiment::measured_margins(&measured, closed_loop, config)?;
@@ -55,6 +60,7 @@ pub(super) fn measured(
     Ok(Measured {
         frf: path.display().to_string(),
         frequencies: measured.frf.len(),
+        sigma: measured.sigma,
         figures: figures(&result),
         result,
         files: files.transpose()?,
@@ -76,10 +82,14 @@ fn write(
     config: &Config,
 ) -> Result<MeasuredLoopFiles, CliError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let estimated = match measured.sigma {
+        SigmaSource::Estimated => ", standard deviations estimated from its scatter",
+        _ => "",
+    };
     let report = MeasuredLoopReport {
         title: config.title.clone(),
         subtitle: format!(
-            "{} controller with the plant of {name}",
+            "{} controller with the plant of {name}{estimated}",
             config.control.controller
         ),
         curves: &LoopCurves::of(&measured.frf, closed_loop, config),
@@ -105,12 +115,23 @@ pub(super) fn text(measured: &Measured) -> String {
     );
     [
         wrap(&title, 0),
+        sigma_text(measured.sigma).map_or(String::new(), |text| wrap(text, 2)),
         wrap(&stability_text(&result.count), 2),
         figure_lines(&measured.figures),
         outside_text(&result.outside_band),
         measured.files.as_ref().map_or(String::new(), files_text),
     ]
     .concat()
+}
+
+/// What a reader of the intervals must know about the standard deviations.
+pub(super) fn sigma_text(sigma: SigmaSource) -> Option<&'static str> {
+    match sigma {
+        SigmaSource::Estimated => Some(
+            "the file has no standard deviations: they are estimated from the scatter of the response over neighbouring frequencies",
+        ),
+        _ => None,
+    }
 }
 
 fn stability_text(count: &NyquistCount) -> String {

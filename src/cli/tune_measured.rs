@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::error::CliError;
+use super::measured_margins::sigma_text;
 use super::output::warn;
 use super::table::{result_table, wrap};
 use bench_base::progress::Progress;
@@ -12,6 +13,7 @@ use bench_control::measured::Stability;
 use bench_control::tuning::{Goal, MeasuredPlant};
 use bench_experiment::campaign::recorded_points;
 use bench_experiment::tuning::{FrfEvidence, FrfSource, IdentifiedFrf};
+use bench_external::frf::PhaseUnit;
 use bench_identify::verdict::Cnmp;
 use bench_order::BenchOptions;
 use bench_report::figures::frf_table;
@@ -19,11 +21,14 @@ use bench_report::figures::frf_table;
 /// Where the plants come from.
 #[derive(Clone, Debug, clap::Args)]
 pub(super) struct SourceOptions {
-    /// Design from a measured response instead of the model: the FRF of `bench chirp` (..._frf.csv) or its recording (MCAP);
-    /// repeatable, one for each operating point. Of the configuration only rate, delays, amplifier, probe and interlocks are
-    /// used
+    /// Design from a measured response instead of the model: the FRF of `bench chirp` (..._frf.csv) or its recording (MCAP), or
+    /// a table of another program with frequency, magnitude and phase, or real and imaginary part, in m/A; repeatable, one for
+    /// each operating point. Of the configuration only rate, delays, amplifier, probe and interlocks are used
     #[arg(long, value_name = "FILE|RECORDING", conflicts_with_all = ["campaign", "operating_points"])]
     frf: Vec<PathBuf>,
+    /// With --frf: unit of the phases of the tables [default: that in the name of the column, otherwise by the numbers]
+    #[arg(long, value_name = "UNIT", requires = "frf", value_enum)]
+    frf_phase: Option<PhaseUnit>,
     /// Design from the recordings of all points of a campaign (`bench campaign --keep-recordings`); with --asymmetry only from
     /// those of this mass asymmetry
     #[arg(long, value_name = "DIR", conflicts_with = "operating_points")]
@@ -50,7 +55,9 @@ impl SourceOptions {
         self.refuse_model_options(bench, goal)?;
         let files = self.files(bench)?;
         progress.begin("measured responses", 0);
-        let sources = files.iter().map(|file| FrfSource::read(file));
+        let sources = files
+            .iter()
+            .map(|file| FrfSource::read(file, self.frf_phase));
         let sources: Vec<FrfSource> = sources.collect::<Result<_, _>>()?;
         for source in &sources {
             warn(&source.measured.cautions);
@@ -102,9 +109,12 @@ pub(super) fn remarks(frfs: &[IdentifiedFrf]) -> Vec<String> {
 fn remarks_of(frf: &IdentifiedFrf) -> Vec<String> {
     let name = &frf.plant.name;
     let uncertain = frf.uncertain_signs_hz().into_iter();
-    let mut remarks: Vec<String> = uncertain
-        .map(|hz| format!("{name}: the sign of the mode at {hz:.2} Hz is uncertain, so it counts with any phase: the design must hold for both signs; a larger amplitude there or a longer chirp makes it certain"))
-        .collect();
+    let sigma = sigma_text(frf.source.measured.sigma);
+    let sigma = sigma.map(|text| format!("{name}: {text}"));
+    let mut remarks: Vec<String> = sigma.into_iter().collect();
+    let uncertain = uncertain
+        .map(|hz| format!("{name}: the sign of the mode at {hz:.2} Hz is uncertain, so it counts with any phase: the design must hold for both signs; a larger amplitude there or a longer chirp makes it certain"));
+    remarks.extend(uncertain);
     if frf.verdict.cnmp == Cnmp::Undecided {
         let why = &frf.verdict.why;
         remarks.push(format!("{name}: it is undecided whether there are CNMP zeros ({why}), so the design must hold for every response in the 95 % region of the measured one"));

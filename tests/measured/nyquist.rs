@@ -2,6 +2,7 @@
 
 use bench_control::measured::Stability;
 use bench_experiment::{MeasuredFrf, closed_loop, measured_margins};
+use bench_identify::scatter::SigmaSource;
 
 use crate::measured::program::Draw;
 use crate::measured::sampled::{config, frf};
@@ -25,6 +26,7 @@ fn count_equals_the_number_of_unstable_eigenvalues() {
         let measured = MeasuredFrf {
             frf: frf(&model, (0.1, 500.0)),
             recorded: None,
+            sigma: SigmaSource::Given,
             cautions: Vec::new(),
         };
         let found = measured_margins(&measured, &model, &config).expect("margins");
@@ -52,6 +54,7 @@ fn margins_of_the_sampled_model_are_those_of_the_model() {
         let measured = MeasuredFrf {
             frf: frf(&model, (0.1, 500.0)),
             recorded: None,
+            sigma: SigmaSource::Given,
             cautions: Vec::new(),
         };
         let found = measured_margins(&measured, &model, &config).expect("margins");

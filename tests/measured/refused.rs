@@ -5,6 +5,7 @@ use bench_control::ClosedLoop;
 use bench_experiment::{FrfError, MeasuredFrf, closed_loop, measured_margins};
 use bench_identify::Frf;
 use bench_identify::frf_csv::{self, METRES_PER_AMPERE};
+use bench_identify::scatter::SigmaSource;
 
 use crate::measured::program::Bench;
 use crate::measured::sampled::{config, frf};
@@ -16,6 +17,7 @@ fn refusal(frf: Frf, config: &Config) -> FrfError {
     let measured = MeasuredFrf {
         frf,
         recorded: None,
+        sigma: SigmaSource::Given,
         cautions: Vec::new(),
     };
     measured_margins(&measured, &model, config).expect_err("a refusal")
@@ -89,6 +91,7 @@ fn refuses_a_gap_that_may_hide_a_resonance_and_accepts_a_narrower_one() {
     let measured = MeasuredFrf {
         frf: without(&whole, (120.0, 120.05)),
         recorded: None,
+        sigma: SigmaSource::Given,
         cautions: Vec::new(),
     };
     // The model's own points are 0.6 % apart: 0.7 Hz.
@@ -173,7 +176,10 @@ fn command_refuses_other_files_and_options() {
         "--frf newton.csv",
         &["magnitude_x_per_f", "magnitude_m_per_a"],
     );
-    refused("--frf other.csv", &["other.csv", "first line"]);
+    refused(
+        "--frf other.csv",
+        &["other.csv", "no column of the frequency", "a, b"],
+    );
     refused("--frf missing.csv", &["missing.csv"]);
     refused("--frf good.csv --continuous", &["--continuous", "--frf"]);
     refused("--out there", &["--frf"]);

@@ -3,6 +3,7 @@
 use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerText};
 use bench_experiment::{MeasuredFrf, MeasuredLoopMargins, closed_loop, measured_margins};
+use bench_identify::scatter::SigmaSource;
 use bench_identify::{Estimate, response};
 use bench_plant::LoopPlant;
 use bench_rig::simulated;
@@ -98,6 +99,7 @@ fn of_seed(seed: u64, controller: &str) -> Vec<Compared> {
     let measured = MeasuredFrf {
         frf,
         recorded: None,
+        sigma: SigmaSource::Given,
         cautions: Vec::new(),
     };
     let model = closed_loop(&config).expect("a loop");

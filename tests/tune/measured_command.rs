@@ -99,7 +99,10 @@ fn refuses_options_of_the_model_and_files_that_are_no_responses() {
             &["--asymmetry", "leave it out"],
         ),
         ("--frf other.csv --campaign there", &["--campaign", "--frf"]),
-        ("--frf other.csv", &["other.csv", "first line"]),
+        (
+            "--frf other.csv",
+            &["other.csv", "no column of the frequency"],
+        ),
         (
             "--frf micrometres.csv",
             &["magnitude_um_per_a", "magnitude_m_per_a"],

@@ -4,6 +4,7 @@ use bench_config::{Config, Source, load};
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
 use bench_experiment::MeasuredFrf;
 use bench_experiment::tuning::FrfSource;
+use bench_identify::scatter::SigmaSource;
 use bench_identify::{Frf, FrfDatum, FrfPoint, response};
 use bench_plant::{LoopPlant, Mode};
 use bench_rig::simulated;
@@ -38,6 +39,7 @@ pub fn measured(name: &str, config: &Config) -> FrfSource {
         measured: MeasuredFrf {
             frf,
             recorded: None,
+            sigma: SigmaSource::Given,
             cautions: Vec::new(),
         },
     }
@@ -84,6 +86,7 @@ pub fn sampled(
         measured: MeasuredFrf {
             frf,
             recorded: None,
+            sigma: SigmaSource::Given,
             cautions: Vec::new(),
         },
     }

@@ -1,4 +1,4 @@
-//! A measured plant from a file: the FRF that `bench chirp` writes, or the recording of an excitation.
+//! A measured plant from a file: the FRF that `bench chirp` writes, that of another program, or the recording of an excitation.
 //!
 //! The FRF of `bench chirp` (`..._frf.csv`) is that from the command of a tick to the reading of a tick: with hold, computing delay,
 //! amplifier and the age of the reading, as the loop has it. The file `..._frf_without_delay.csv` has the same columns, but the delay
@@ -11,26 +11,14 @@ use super::analysis_error::AnalysisError;
 use super::read_run::{ReadSignals, open_with_signals};
 use super::recorded_excitation::{cautions, measured_response};
 use crate::plan::{Plan, PlanError, RunKind};
-use bench_base::units::{hz, rad_s};
+use bench_base::input_file::{self, MAX_TABLE_BYTES};
 use bench_config::Config;
-use bench_control::ClosedLoop;
 use bench_control::measured::MeasuredLoopError;
-use bench_identify::delay::excess_delay;
+use bench_external::frf::{self as external_frf, FrfTableError, PhaseUnit};
+use bench_identify::Frf;
 use bench_identify::frf_csv::{self, FrfCsvError};
-use bench_identify::{Estimate, Frf};
-use bench_plant::LoopPlant;
+use bench_identify::scatter::SigmaSource;
 use bench_recording::{Recording, RecordingError};
-
-/// The phases are compared with the model up to this multiple of its highest mode.
-const LAST_MODE: f64 = 1.2;
-/// An excess delay of more periods is not an error of the configured delays.
-const MAX_EXCESS_PERIODS: f64 = 0.5;
-/// Delays that differ by less than this ratio of a period are equal.
-const SAME_DELAY_PERIODS: f64 = 0.1;
-/// A deviation of more standard deviations is not noise.
-const CERTAIN_SIGMAS: f64 = 4.0;
-/// Largest ratio of the measured static response and that of the model, and of its inverse.
-const MAX_GAIN_RATIO: f64 = 10.0;
 
 /// A measured plant, from command (A) to reading (m).
 #[derive(Clone, Debug)]
@@ -39,7 +27,9 @@ pub struct MeasuredFrf {
     pub frf: Frf,
     /// The configuration of the run, if the file is a recording.
     pub recorded: Option<Box<Config>>,
-    /// Defects of the run.
+    /// Where its standard deviations come from.
+    pub sigma: SigmaSource,
+    /// Defects of the run, and what was assumed about a file of another program.
     pub cautions: Vec<String>,
 }
 
@@ -55,6 +45,9 @@ pub enum FrfError {
         /// What is wrong.
         why: FrfCsvError,
     },
+    /// The file of another program is no response.
+    #[error(transparent)]
+    Table(#[from] FrfTableError),
     /// The recording cannot be read.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -139,27 +132,57 @@ impl FrfError {
 }
 
 impl MeasuredFrf {
-    /// The FRF of a CSV file, or of a recording, which ends in `.mcap`, with its data for a fit.
+    /// The FRF of a table, or of a recording, which ends in `.mcap`, with its data for a fit. `phase` is the unit of the phases of a
+    /// table, whatever it states.
     ///
     /// # Errors
     /// When the file cannot be read, or has no response from current to displacement.
-    pub fn read(path: &Path) -> Result<MeasuredFrf, FrfError> {
+    pub fn read(path: &Path, phase: Option<PhaseUnit>) -> Result<MeasuredFrf, FrfError> {
         if path.extension() == Some(OsStr::new("mcap")) {
             MeasuredFrf::of_recording(path)
         } else {
-            MeasuredFrf::of_csv(path)
+            MeasuredFrf::of_table(path, phase)
         }
     }
 
-    fn of_csv(path: &Path) -> Result<MeasuredFrf, FrfError> {
-        let frf = frf_csv::read(path).map_err(|why| FrfError::Csv {
-            path: path.display().to_string(),
-            why,
-        })?;
+    fn of_table(path: &Path, phase: Option<PhaseUnit>) -> Result<MeasuredFrf, FrfError> {
+        let bytes = input_file::read(path, MAX_TABLE_BYTES);
+        let bytes =
+            bytes.map_err(|why| csv_error(path, FrfCsvError::File(path.to_owned(), why)))?;
+        let text = std::str::from_utf8(&bytes).ok();
+        match text.filter(|text| frf_csv::has_own_columns(text) && phase.is_none()) {
+            Some(text) => MeasuredFrf::of_own_csv(path, text),
+            None => MeasuredFrf::of_external(path, phase),
+        }
+    }
+
+    /// The FRF of a file that this program wrote. Without a value in the columns of standard deviations they are estimated.
+    fn of_own_csv(path: &Path, text: &str) -> Result<MeasuredFrf, FrfError> {
+        match frf_csv::from_str(text) {
+            Ok(frf) => Ok(MeasuredFrf {
+                frf,
+                recorded: None,
+                sigma: SigmaSource::Given,
+                cautions: Vec::new(),
+            }),
+            Err(FrfCsvError::Cell { column, text, .. })
+                if column == frf_csv::MAGNITUDE_SIGMA && text.is_empty() =>
+            {
+                MeasuredFrf::of_external(path, None)
+            }
+            Err(why) => Err(csv_error(path, why)),
+        }
+    }
+
+    fn of_external(path: &Path, phase: Option<PhaseUnit>) -> Result<MeasuredFrf, FrfError> {
+        let imported = external_frf::read(path, phase)?;
+        let file = path.display();
+        let assumptions = imported.assumptions.into_iter();
         Ok(MeasuredFrf {
-            frf,
+            frf: imported.frf,
             recorded: None,
-            cautions: Vec::new(),
+            sigma: imported.sigma,
+            cautions: assumptions.map(|text| format!("{file}: {text}")).collect(),
         })
     }
 
@@ -169,6 +192,7 @@ impl MeasuredFrf {
         Ok(MeasuredFrf {
             frf: recorded_frf(&recording, signals, &plan)?,
             recorded: Some(Box::new(plan.config)),
+            sigma: SigmaSource::Given,
             cautions: cautions(&recording),
         })
     }
@@ -190,6 +214,13 @@ impl MeasuredFrf {
     }
 }
 
+fn csv_error(path: &Path, why: FrfCsvError) -> FrfError {
+    FrfError::Csv {
+        path: path.display().to_string(),
+        why,
+    }
+}
+
 /// The response of a recorded run with this plan, from command (A) to reading (m): that of [`analyse`](crate::analyse), without the
 /// fit of the modes.
 ///
@@ -208,108 +239,4 @@ pub fn recorded_frf(
             Err(FrfError::Kind(recording.path().display().to_string()))
         }
     }
-}
-
-/// Refuses an FRF that was not measured through the signal path of `config`.
-pub(crate) fn check_frf(
-    measured: &MeasuredFrf,
-    model: &ClosedLoop,
-    config: &Config,
-) -> Result<(), FrfError> {
-    check_rate(measured, config)?;
-    let mean_age = LoopPlant::with_mean_age(config, model.modes());
-    check_gain(&measured.frf, &mean_age)?;
-    match &measured.recorded {
-        Some(_) => Ok(()),
-        None => check_delay(&measured.frf, model, &mean_age),
-    }
-}
-
-/// Refuses an FRF beyond half the loop rate, and a recording with another signal path than that of `config`.
-pub(crate) fn check_rate(measured: &MeasuredFrf, config: &Config) -> Result<(), FrfError> {
-    let (_, last_hz) = measured.band_hz();
-    let rate_hz = config.servo.rate_hz;
-    let recorded = measured.recorded.as_deref();
-    if last_hz >= 0.5 * rate_hz {
-        return Err(FrfError::AboveNyquist { last_hz, rate_hz });
-    }
-    recorded.map_or(Ok(()), |recorded| check_path(recorded, config))
-}
-
-/// A setting and its value in a configuration.
-type Setting = (&'static str, fn(&Config) -> f64);
-
-/// The settings of the signal path between command and reading.
-const SIGNAL_PATH: [Setting; 6] = [
-    ("loop.rate_hz", |c| c.servo.rate_hz),
-    ("loop.computing_delay_periods", |c| {
-        f64::from(c.servo.computing_delay_periods)
-    }),
-    ("amplifier.bandwidth_hz", |c| c.amplifier.bandwidth_hz),
-    ("amplifier.latency_s", |c| c.amplifier.latency_s),
-    ("probe.latency_s", |c| c.probe.latency_s),
-    ("probe.transport_s", |c| c.probe.transport_s),
-];
-
-/// Compares the signal path of a recording with that of the loop.
-fn check_path(recorded: &Config, config: &Config) -> Result<(), FrfError> {
-    let differs = |(_, of): &&Setting| of(recorded) != of(config);
-    match SIGNAL_PATH.iter().find(differs) {
-        None => Ok(()),
-        Some((name, of)) => Err(FrfError::Path {
-            name,
-            recorded: of(recorded),
-            configured: of(config),
-        }),
-    }
-}
-
-/// Compares the static response with that of the model: a factor of a thousand is another unit.
-fn check_gain(frf: &Frf, plant: &LoopPlant) -> Result<(), FrfError> {
-    let (Some(&frequency_hz), Some(response)) = (frf.frequency_hz.first(), frf.response.first())
-    else {
-        return Ok(());
-    };
-    let ratio = response.norm() / plant.response(rad_s(frequency_hz)).norm();
-    if (1.0 / MAX_GAIN_RATIO..=MAX_GAIN_RATIO).contains(&ratio) {
-        Ok(())
-    } else {
-        Err(FrfError::Gain {
-            ratio,
-            frequency_hz,
-        })
-    }
-}
-
-/// Compares the phases with those of the model.
-fn check_delay(frf: &Frf, model: &ClosedLoop, plant: &LoopPlant) -> Result<(), FrfError> {
-    let frequencies = frf.frequency_hz.iter();
-    let response: Vec<_> = frequencies.map(|f| plant.response(rad_s(*f))).collect();
-    let highest = model.modes().iter().map(|mode| mode.omega_rad_s);
-    let max_hz = LAST_MODE * hz(highest.fold(0.0, f64::max));
-    let Some(excess) = excess_delay(frf, &response, max_hz) else {
-        return Ok(());
-    };
-    judge_excess(excess, plant)
-}
-
-/// An excess delay that is minus the delay of the model shows that the delay was removed from the phases.
-pub(crate) fn judge_excess(excess: Estimate, plant: &LoopPlant) -> Result<(), FrfError> {
-    let (delay_s, period_s) = (plant.delay_s(), plant.period_s());
-    let within = |limit_s: f64, difference_s: f64| {
-        difference_s.abs() <= limit_s + CERTAIN_SIGMAS * excess.sigma
-    };
-    if within(MAX_EXCESS_PERIODS * period_s, excess.value) {
-        return Ok(());
-    }
-    if within(SAME_DELAY_PERIODS * period_s, excess.value + delay_s) {
-        return Err(FrfError::DelayRemoved {
-            lead_ms: -1e3 * excess.value,
-            delay_ms: 1e3 * delay_s,
-        });
-    }
-    Err(FrfError::OtherDelay {
-        excess_ms: 1e3 * excess.value,
-        period_ms: 1e3 * period_s,
-    })
 }

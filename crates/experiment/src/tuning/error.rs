@@ -122,7 +122,9 @@ impl TuneSourceError {
 /// The name of the file, unless the message contains it.
 fn prefix(file: &str, why: &FrfError) -> String {
     match why {
-        FrfError::Csv { .. } | FrfError::Recording(_) | FrfError::Kind(_) => String::new(),
+        FrfError::Csv { .. } | FrfError::Table(_) | FrfError::Recording(_) | FrfError::Kind(_) => {
+            String::new()
+        }
         _ => format!("{file}: "),
     }
 }

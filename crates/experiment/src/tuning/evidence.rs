@@ -13,6 +13,7 @@ use bench_control::tuning::DISC_SIGMAS_95;
 use bench_control::{ClosedLoop, ControllerFile, ControllerText, SectionSettings};
 use bench_identify::Estimate;
 use bench_identify::modal::FittedMode;
+use bench_identify::scatter::SigmaSource;
 use bench_identify::verdict::Cnmp;
 use bench_plant::SignalPath;
 
@@ -42,6 +43,8 @@ pub struct FrfEvidence {
     pub band_hz: [f64; 2],
     /// Number of measured frequencies.
     pub frequencies: usize,
+    /// Where the standard deviations of the response come from.
+    pub sigma: SigmaSource,
     /// Whether there are CNMP zeros.
     pub cnmp: Cnmp,
     /// The reasons.
@@ -109,6 +112,7 @@ fn of_one(
         band_hz: found.band_hz,
         outside_band: found.outside_band,
         frequencies: frf.source.measured.frf.len(),
+        sigma: frf.source.measured.sigma,
         plant: frf.plant.name.clone(),
         file: frf.source.file.clone(),
         sha256: frf.source.sha256.clone(),

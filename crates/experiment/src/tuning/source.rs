@@ -8,6 +8,7 @@ use super::error::TuneSourceError;
 use crate::analysis::{MeasuredFrf, variance};
 use bench_base::numeric::to_four_decimals;
 use bench_config::{Config, PlantSettings};
+use bench_external::frf::PhaseUnit;
 use bench_identify::{Frf, FrfDatum};
 
 /// A measured frequency response, from command (A) to reading (m).
@@ -22,13 +23,13 @@ pub struct FrfSource {
 }
 
 impl FrfSource {
-    /// The response of a CSV file of `bench chirp`, or of a recording, which ends in `.mcap`.
+    /// The response of a table, or of a recording, which ends in `.mcap`; `phase` as in [`MeasuredFrf::read`].
     ///
     /// # Errors
     /// When the file cannot be read, or has no response from current to displacement.
-    pub fn read(path: &Path) -> Result<FrfSource, TuneSourceError> {
+    pub fn read(path: &Path, phase: Option<PhaseUnit>) -> Result<FrfSource, TuneSourceError> {
         let file = path.display().to_string();
-        let read = MeasuredFrf::read(path);
+        let read = MeasuredFrf::read(path, phase);
         let mut measured = read.map_err(|why| TuneSourceError::File {
             file: file.clone(),
             why: Box::new(why),
