@@ -1,5 +1,6 @@
 //! Whether a measured response belongs to the bench of a configuration: rate, unit, conventions and delay.
 
+use super::conventions::check_conventions;
 use super::measured_frf::{FrfError, MeasuredFrf};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
@@ -31,6 +32,7 @@ pub(crate) fn check_frf(
     match &measured.recorded {
         Some(_) => Ok(()),
         None => {
+            check_conventions(&measured.frf, |hz| mean_age.response(rad_s(hz)))?;
             check_delay(&measured.frf, model, &mean_age)
         }
     }

@@ -92,6 +92,31 @@ pub enum FrfError {
         /// Rate of the loop.
         rate_hz: f64,
     },
+    /// Radians where degrees are stated.
+    #[error(
+        "no phase of the FRF exceeds {largest_deg:.3} deg, although its magnitude has a resonance at {resonance_hz:.4} Hz, across which the phase falls by 180 deg: the phases are probably in radians; give --frf-phase rad, or name the column phase_rad"
+    )]
+    Radians {
+        /// Largest magnitude of a phase.
+        largest_deg: f64,
+        /// Where the magnitude is the largest.
+        resonance_hz: f64,
+    },
+    /// The complex conjugate of a response.
+    #[error(
+        "the phase of the FRF rises across its resonances, where that of every stage falls: the response is conjugated (another sign convention of the phase); change the sign of the phases or of the imaginary part, a lag must be negative"
+    )]
+    Conjugated,
+    /// The response has the other sign.
+    #[error(
+        "the FRF has the other sign than expected: its phase is {phase_deg:.1} deg at the lowest frequency of {frequency_hz:.4} Hz, so that a positive current seems to give a negative displacement; change the sign of the response (add 180 deg to the phases), or that of the probe or the motor if the bench is wired like this"
+    )]
+    Sign {
+        /// Lowest measured frequency.
+        frequency_hz: f64,
+        /// Phase there.
+        phase_deg: f64,
+    },
     /// The delay was removed.
     #[error(
         "the phases of the FRF lead those of the model by {lead_ms:.3} ms, and the delay of the signal path is {delay_ms:.3} ms, so it seems to be removed; give the file ..._frf.csv, not ..._frf_without_delay.csv, or the recording"

@@ -2,12 +2,13 @@
 //!
 //! A recording is read into signals (`read_run`, `signal_builder`), cut into parts (`segments`), and its responses are estimated
 //! (`response_estimate`, `closed_responses`); `recorded_excitation` does all of this and fits the modes. `measured_frf` reads a
-//! response from a file, for a loop around a measured plant (`response_points`); `frf_checks` refuses one that does not
+//! response from a file, for a loop around a measured plant (`response_points`); `frf_checks` and `conventions` refuse one that does not
 //! belong to the bench.
 
 mod analysed_run;
 mod analysis_error;
 mod closed_responses;
+mod conventions;
 mod ending;
 mod frf_checks;
 mod measured_frf;
@@ -21,6 +22,7 @@ mod signal_builder;
 
 pub use analysed_run::AnalysedRun;
 pub use analysis_error::{AnalysisError, ClosedLoopError};
+pub(crate) use conventions::check_static_conventions;
 pub use ending::{EndKind, Ending};
 pub(crate) use frf_checks::{check_frf, check_rate, judge_excess};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};

@@ -7,7 +7,7 @@ use super::distinct::{check_distinct, check_modes};
 use super::error::TuneSourceError;
 use super::mode_fit::{best_fit, groups};
 use super::source::FrfSource;
-use crate::analysis::{FrfError, check_rate, judge_excess, points};
+use crate::analysis::{FrfError, check_rate, check_static_conventions, judge_excess, points};
 use bench_base::units::{hz, rad_s};
 use bench_config::Config;
 use bench_control::measured::{MeasuredLoop, check_gaps};
@@ -142,6 +142,7 @@ fn refused(source: &FrfSource, why: FrfError) -> TuneSourceError {
 fn fitted(source: &FrfSource, config: &Config) -> Result<ModalFit, TuneSourceError> {
     check_rate(&source.measured, config).map_err(|why| refused(source, why))?;
     check_unit(source, config)?;
+    check_phases(source, config).map_err(|why| refused(source, why))?;
     let file = source.file.clone();
     let fit = best_fit(source, &MeasurementChain::bench(config));
     let fit = fit.map_err(|why| TuneSourceError::Fit {
@@ -151,6 +152,15 @@ fn fitted(source: &FrfSource, config: &Config) -> Result<ModalFit, TuneSourceErr
     check_fit(source, &fit, config).map_err(|why| refused(source, why))?;
     check_static_response(source, &fit, config)?;
     Ok(fit)
+}
+
+/// Refuses a table in other conventions than the bench has. Of a recording they are known.
+fn check_phases(source: &FrfSource, config: &Config) -> Result<(), FrfError> {
+    if source.measured.recorded.is_some() {
+        return Ok(());
+    }
+    let static_sign = config.motor.force_constant_n_per_a.signum();
+    check_static_conventions(&source.measured.frf, static_sign)
 }
 
 /// Refuses a stage without a spring to ground, and a response that begins above the first mode: the static response by the fit then
