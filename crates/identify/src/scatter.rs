@@ -19,8 +19,9 @@
 //! The noise is of equal power over a neighbourhood, or in the ratio of the response as on a resonance that amplifies it: what makes the
 //! residuals more probable.
 //!
-//! The errors of different points must be independent. A window that couples neighbouring lines makes the estimate smaller: a Hann
-//! window with random excitation, whose lines have the correlation (2/3)^2, by 11 %.
+//! Errors of neighbouring points are correlated if a window couples the lines (Hann, with random excitation: (2/3)^2), or if the
+//! response was smoothed. A model follows such errors, and its residuals are too small and correlated themselves. Where they are,
+//! every second point is used, or every fourth, and so on, until they are not; so many points are also the resolution of the response.
 
 use nalgebra::Complex;
 use serde::Serialize;
@@ -35,7 +36,7 @@ pub enum SigmaSource {
     /// The file or the recording.
     #[default]
     Given,
-    /// The scatter of the response, by [`variances`].
+    /// The scatter of the response, by [`Scatter`].
     Estimated,
 }
 
@@ -90,29 +91,103 @@ struct Model {
     limit: f64,
 }
 
-/// E|error|^2 of each point of a response at rising frequencies. `None` with fewer points than [`MIN_POINTS`], or where the response is
-/// zero at all of them.
-pub fn variances(frequency_hz: &[f64], response: &[Complex<f64>]) -> Option<Vec<f64>> {
-    let count = frequency_hz.len().min(response.len());
-    if count < MIN_POINTS {
-        return None;
-    }
-    let found = (0..count).map(|k| {
-        let least = ROUNDING * response[k].norm();
-        variance(frequency_hz, response, k).max(least * least)
-    });
-    let found: Vec<f64> = found.collect();
-    found
-        .iter()
-        .all(|variance| *variance > 0.0)
-        .then_some(found)
+/// Distances of the points that are used, in points.
+const STRIDES: [usize; 6] = [1, 2, 4, 8, 16, LAST_STRIDE];
+const LAST_STRIDE: usize = 32;
+/// Correlation of neighbouring residuals above which those of a neighbourhood are not independent. That of independent errors is
+/// -0.1, because the model has removed their slow part.
+const CORRELATED: f64 = 0.1;
+/// The correlation is the median over so many points to either side: 1/(2 14)^(1/2) = 0.19 for one neighbourhood, of which eight are
+/// independent, is 0.08 for the median.
+const MEDIAN_REACH: usize = 64;
+
+/// The noise of a response.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scatter {
+    /// E|error|^2 of each point.
+    pub variance: Vec<f64>,
+    /// Points further apart than this number have independent errors, at each point.
+    pub correlated_points: Vec<usize>,
 }
 
-/// E|error|^2 of a point by the first model that describes its neighbourhood.
-fn variance(frequency_hz: &[f64], response: &[Complex<f64>], k: usize) -> f64 {
-    let mut best: Option<(Neighbourhood<'_>, Curve, Fit)> = None;
+impl Scatter {
+    /// The noise of a response at rising frequencies. `None` with fewer points than [`MIN_POINTS`], or where the response is zero.
+    pub fn of(frequency_hz: &[f64], response: &[Complex<f64>]) -> Option<Scatter> {
+        let count = frequency_hz.len().min(response.len());
+        if count < MIN_POINTS {
+            return None;
+        }
+        let mut scatter = Scatter {
+            variance: vec![0.0; count],
+            correlated_points: vec![0; count],
+        };
+        for stride in STRIDES {
+            let is_last = stride == LAST_STRIDE || count < 2 * stride * WIDE;
+            scatter.fill_in(frequency_hz, response, stride, is_last);
+            if is_last || scatter.correlated_points.iter().all(|points| *points > 0) {
+                break;
+            }
+        }
+        scatter.with_rounding(response)
+    }
+
+    /// Fills in the points that have no value yet and independent residuals at a distance.
+    fn fill_in(
+        &mut self,
+        frequency_hz: &[f64],
+        response: &[Complex<f64>],
+        stride: usize,
+        is_last: bool,
+    ) {
+        let at = |k| estimate(frequency_hz, response, k, stride);
+        let estimates: Vec<PointEstimate> = (0..self.variance.len()).map(at).collect();
+        for k in 0..estimates.len() {
+            if self.correlated_points[k] > 0 {
+                continue;
+            }
+            self.variance[k] = estimates[k].variance;
+            if is_last || median_correlation(&estimates, k) <= CORRELATED {
+                self.correlated_points[k] = stride;
+            }
+        }
+    }
+
+    fn with_rounding(mut self, response: &[Complex<f64>]) -> Option<Scatter> {
+        for (variance, value) in self.variance.iter_mut().zip(response) {
+            let least = ROUNDING * value.norm();
+            *variance = variance.max(least * least);
+        }
+        let is_noisy = self.variance.iter().all(|variance| *variance > 0.0);
+        is_noisy.then_some(self)
+    }
+}
+
+/// The noise at a point by one neighbourhood.
+struct PointEstimate {
+    variance: f64,
+    /// Of neighbouring residuals.
+    correlation: f64,
+}
+
+/// The median of the correlation around a point.
+fn median_correlation(estimates: &[PointEstimate], k: usize) -> f64 {
+    let last = (k + MEDIAN_REACH + 1).min(estimates.len());
+    let near = &estimates[k.saturating_sub(MEDIAN_REACH)..last];
+    let mut sorted: Vec<f64> = near.iter().map(|estimate| estimate.correlation).collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// The noise at a point by the first model that describes its neighbourhood.
+fn estimate(
+    frequency_hz: &[f64],
+    response: &[Complex<f64>],
+    k: usize,
+    stride: usize,
+) -> PointEstimate {
+    let mut best: Option<(Neighbourhood, Curve, Fit)> = None;
     for model in MODELS {
-        let near = Neighbourhood::of(frequency_hz, response, k, model.points);
+        let near = Neighbourhood::of(frequency_hz, response, k, model.points, stride);
         let equal = vec![1.0; near.x.len()];
         let Some(fit) = near.fit(model.curve, equal) else {
             continue;
@@ -124,8 +199,13 @@ fn variance(frequency_hz: &[f64], response: &[Complex<f64>], k: usize) -> f64 {
             best = Some((near, model.curve, fit));
         }
     }
-    best.map_or(f64::INFINITY, |(near, curve, fit)| {
-        near.variance_at_centre(curve, &fit)
+    let none = PointEstimate {
+        variance: f64::INFINITY,
+        correlation: 0.0,
+    };
+    best.map_or(none, |(near, curve, fit)| PointEstimate {
+        variance: near.variance_at_centre(curve, &fit),
+        correlation: fit.correlation(),
     })
 }
 
@@ -151,6 +231,17 @@ impl Fit {
         })
     }
 
+    /// Of neighbouring residuals.
+    fn correlation(&self) -> f64 {
+        let products = self.residual.windows(2).map(|r| (r[1] * r[0].conj()).re);
+        let power: f64 = self.residual.iter().map(|r| r.norm_sqr()).sum();
+        if power > 0.0 {
+            products.sum::<f64>() / power
+        } else {
+            0.0
+        }
+    }
+
     /// -ln of the likelihood of the residuals for each point, with variances in the ratio 1/weight^2.
     fn improbability(&self) -> f64 {
         let logs: f64 = self.weight.iter().map(|weight| weight.ln()).sum();
@@ -159,30 +250,35 @@ impl Fit {
 }
 
 /// Points around a frequency.
-struct Neighbourhood<'a> {
+struct Neighbourhood {
     /// Frequencies from that of the centre, over the extent.
     x: Vec<f64>,
-    response: &'a [Complex<f64>],
+    response: Vec<Complex<f64>>,
     /// Index of the centre.
     centre: usize,
 }
 
-impl<'a> Neighbourhood<'a> {
+impl Neighbourhood {
+    /// At most `points` points around the point k, which is one of them, at a distance of `stride` points.
     fn of(
         frequency_hz: &[f64],
-        response: &'a [Complex<f64>],
+        response: &[Complex<f64>],
         k: usize,
         points: usize,
-    ) -> Neighbourhood<'a> {
-        let points = points.min(response.len());
-        let first = k.saturating_sub(points / 2).min(response.len() - points);
-        let near = first..first + points;
-        let extent = frequency_hz[near.end - 1] - frequency_hz[first];
-        let x = frequency_hz[near.clone()].iter();
+        stride: usize,
+    ) -> Neighbourhood {
+        let (below, above) = (k / stride, (response.len() - 1 - k) / stride);
+        let points = points.min(below + above + 1);
+        let centre = (points / 2)
+            .min(below)
+            .max(points.saturating_sub(above + 1));
+        let at = |i: usize| k + stride * i - stride * centre;
+        let extent = frequency_hz[at(points - 1)] - frequency_hz[at(0)];
+        let x = (0..points).map(|i| (frequency_hz[at(i)] - frequency_hz[k]) / extent);
         Neighbourhood {
-            x: x.map(|hz| (hz - frequency_hz[k]) / extent).collect(),
-            response: &response[near],
-            centre: k - first,
+            x: x.collect(),
+            response: (0..points).map(|i| response[at(i)]).collect(),
+            centre,
         }
     }
 
@@ -208,7 +304,7 @@ impl<'a> Neighbourhood<'a> {
 
     fn parabola(&self, weight: Vec<f64>) -> Option<Fit> {
         let columns = self.powers().map(|column| weighted(column, &weight));
-        let right = weighted(self.response.to_vec(), &weight);
+        let right = weighted(self.response.clone(), &weight);
         let fit = least_squares::solve(columns.to_vec(), right)?;
         Fit::new(weight, fit.residual, columns.len())
     }
@@ -224,7 +320,7 @@ impl<'a> Neighbourhood<'a> {
             let slope = self.response.iter().zip(&self.x).map(|(h, x)| -h * *x);
             let columns = self.powers().into_iter().chain([slope.collect()]);
             let columns = columns.map(|column| weighted(column, &weight));
-            let right = weighted(self.response.to_vec(), &weight);
+            let right = weighted(self.response.clone(), &weight);
             let fit = least_squares::solve(columns.collect(), right)?;
             pole = fit.solution[3];
             residual = fit.residual;
@@ -243,142 +339,4 @@ fn weighted(column: Vec<Complex<f64>>, weight: &[f64]) -> Vec<Complex<f64>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::f64::consts::TAU;
-
-    use rand_core::{Rng, SeedableRng};
-    use rand_pcg::Pcg64Mcg;
-
-    use super::*;
-
-    const SEEDS: u64 = 6;
-    /// Frequencies and damping ratios of the modes of the stage.
-    const MODES: [(f64, f64, f64); 2] = [(29.3, 0.009, 0.47), (118.0, 0.004, -0.05)];
-    const DELAY_S: f64 = 6e-4;
-
-    /// A stage of two modes with residues of both signs, in m/N, with a delay.
-    fn stage(hz: f64) -> Complex<f64> {
-        let s = Complex::new(0.0, TAU * hz);
-        let mode = |(at_hz, zeta, residue): (f64, f64, f64)| {
-            let w = TAU * at_hz;
-            Complex::from(residue) / (s * s + s * (2.0 * zeta * w) + w * w)
-        };
-        MODES.into_iter().map(mode).sum::<Complex<f64>>()
-            * Complex::from_polar(1.0, -TAU * hz * DELAY_S)
-    }
-
-    /// A complex Gaussian number with E|z|^2 = 1.
-    fn normal(random: &mut Pcg64Mcg) -> Complex<f64> {
-        let mut uniform = || (random.next_u64() as f64 + 0.5) / u64::MAX as f64;
-        let (radius, angle) = ((-uniform().ln()).sqrt(), TAU * uniform());
-        Complex::from_polar(radius, angle)
-    }
-
-    /// Estimated over true standard deviations, over all seeds, with the frequencies.
-    fn ratios(grid_hz: &[f64], sigma: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
-        let mut ratios = Vec::new();
-        for seed in 0..SEEDS {
-            let mut random = Pcg64Mcg::seed_from_u64(seed);
-            let measured = |hz: &f64| stage(*hz) + normal(&mut random) * sigma(*hz);
-            let response: Vec<_> = grid_hz.iter().map(measured).collect();
-            let variances = variances(grid_hz, &response).expect("enough points");
-            let found = grid_hz.iter().zip(variances);
-            ratios.extend(found.map(|(hz, variance)| (*hz, variance.sqrt() / sigma(*hz))));
-        }
-        ratios
-    }
-
-    /// 800 lines from 0.25 Hz to 200 Hz: mode 1 is two lines wide, mode 2 four.
-    fn analyser() -> Vec<f64> {
-        (1..=800).map(|k| 0.25 * f64::from(k)).collect()
-    }
-
-    fn quantile(ratios: &[(f64, f64)], part: f64) -> f64 {
-        let mut sorted: Vec<f64> = ratios.iter().map(|(_, ratio)| *ratio).collect();
-        sorted.sort_by(f64::total_cmp);
-        sorted[(part * sorted.len() as f64) as usize]
-    }
-
-    /// Within so many lines of a mode.
-    fn near(ratios: &[(f64, f64)], lines: f64) -> Vec<(f64, f64)> {
-        let is_near = |hz: f64| MODES.iter().any(|mode| (hz - mode.0).abs() <= 0.25 * lines);
-        ratios
-            .iter()
-            .copied()
-            .filter(|(hz, _)| is_near(*hz))
-            .collect()
-    }
-
-    /// 400 points from 1 Hz to 200 Hz at a constant ratio of 1.3 %.
-    fn stepped() -> Vec<f64> {
-        (0..400)
-            .map(|k| 200_f64.powf(f64::from(k) / 400.0))
-            .collect()
-    }
-
-    #[test]
-    fn estimate_is_the_standard_deviation_of_the_noise() {
-        let at_rest = stage(0.0).norm();
-        // From poor to good: one part in 100 to one in 10 000 of the static response.
-        for part in [1e-2, 1e-3, 1e-4] {
-            for (name, found) in [
-                ("equal", ratios(&analyser(), |_| part * at_rest)),
-                (
-                    "relative",
-                    ratios(&analyser(), |hz| part * stage(hz).norm()),
-                ),
-                ("stepped", ratios(&stepped(), |_| part * at_rest)),
-            ] {
-                // The median of (chi-square/28)^(1/2) of 28 degrees of freedom is 0.988; where a further model is used it has 26.
-                let median = quantile(&found, 0.5);
-                assert!((0.95..1.05).contains(&median), "{part} {name}: {median}");
-                // Its first percentile is 0.70, that of 10 degrees of freedom 0.51; a tenth is for the choice of the models.
-                let small = quantile(&found, 0.01);
-                assert!((0.40..0.75).contains(&small), "{part} {name}: {small}");
-            }
-        }
-    }
-
-    #[test]
-    fn estimate_near_lightly_damped_modes_may_be_larger_and_is_never_much_smaller() {
-        let at_rest = stage(0.0).norm();
-        for part in [1e-2, 1e-3, 1e-4] {
-            for (name, found) in [
-                ("equal", ratios(&analyser(), |_| part * at_rest)),
-                (
-                    "relative",
-                    ratios(&analyser(), |hz| part * stage(hz).norm()),
-                ),
-            ] {
-                let near = near(&found, 3.0);
-                let median = quantile(&near, 0.5);
-                assert!((0.8..2.0).contains(&median), "{part} {name}: {median}");
-                let small = quantile(&near, 0.1);
-                assert!((0.45..1.0).contains(&small), "{part} {name}: {small}");
-            }
-        }
-    }
-
-    #[test]
-    fn too_few_points_and_zeros_have_no_estimate() {
-        let grid = &analyser()[..MIN_POINTS];
-        let response: Vec<_> = grid.iter().map(|hz| stage(*hz)).collect();
-        assert!(variances(grid, &response).is_some());
-        assert!(variances(&grid[1..], &response[1..]).is_none());
-        assert!(variances(grid, &[Complex::default(); MIN_POINTS]).is_none());
-    }
-
-    #[test]
-    fn points_made_equal_by_rounding_are_not_exact() {
-        let grid = analyser();
-        let mut random = Pcg64Mcg::seed_from_u64(1);
-        let noisy = |(k, _): (usize, &f64)| match k {
-            ..100 => Complex::from(1.0),
-            _ => Complex::from(1.0) + normal(&mut random) * 0.01,
-        };
-        let response: Vec<_> = grid.iter().enumerate().map(noisy).collect();
-        let found = variances(&grid, &response).expect("noise");
-        // Single precision: 6e-8.
-        assert!(found.iter().all(|variance| *variance > 3e-15), "{found:?}");
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use bench_identify::scatter::{self, MIN_POINTS, SigmaSource};
+use bench_identify::scatter::{MIN_POINTS, Scatter, SigmaSource};
 use bench_identify::{Frf, FrfPoint};
 use num_complex::Complex;
 
@@ -157,26 +157,29 @@ fn with_sigma(
 ) -> Result<(Frf, SigmaSource), FrfTableError> {
     let is_given = numbers.rows.iter().all(|row| row.magnitude_sigma.is_some());
     let scatter = if is_given {
-        vec![0.0; values.len()]
+        None
     } else {
-        scatter::variances(frequency_hz, values).ok_or_else(|| FrfTableError::NoScatter {
+        let scatter = Scatter::of(frequency_hz, values);
+        Some(scatter.ok_or_else(|| FrfTableError::NoScatter {
             path: numbers.path.clone(),
             points: values.len(),
             least: MIN_POINTS,
-        })?
+        })?)
     };
     let mut frf = Frf::default();
     for (k, row) in numbers.rows.iter().enumerate() {
         let given = row.magnitude_sigma.map(|sigma| 2.0 * sigma * sigma);
-        let variance = given.unwrap_or(scatter[k]);
+        let (estimated, correlated) = scatter.as_ref().map_or((0.0, 1), |scatter| {
+            (scatter.variance[k], scatter.correlated_points[k])
+        });
+        let variance = given.unwrap_or(estimated);
+        let spacing = correlated as f64 * spacing_hz(frequency_hz, k);
         frf.push(FrfPoint {
             frequency_hz: frequency_hz[k],
             response: values[k],
             coherence: coherence(row, variance, values[k]),
             variance,
-            resolution_hz: row
-                .resolution
-                .unwrap_or_else(|| spacing_hz(frequency_hz, k)),
+            resolution_hz: row.resolution.unwrap_or(spacing),
         });
     }
     let source = if is_given {
