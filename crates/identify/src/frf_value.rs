@@ -6,7 +6,7 @@ use thiserror::Error;
 /// of sums in single precision (2^-24 each).
 const COHERENCE_ROUNDING: f64 = 1e-6;
 
-/// What is wrong with a value, as the end of a message that begins with it.
+/// What is wrong with a value, as the end of a message that begins with the value.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ValueDefect {
