@@ -53,9 +53,12 @@ fn db(h: Complex<f64>) -> f64 {
     20.0 * libm::log10(h.norm())
 }
 
+/// The three columns of a response at a frequency in hertz.
+type RowOf = fn(f64, Complex<f64>) -> [f64; 3];
+
 #[test]
 fn units_are_those_of_the_names() {
-    let cases: [(&str, fn(f64, Complex<f64>) -> [f64; 3]); 9] = [
+    let cases: [(&str, RowOf); 9] = [
         ("frequency_hz,magnitude_m_per_a,phase_deg", |hz, h| {
             [hz, h.norm(), h.arg().to_degrees()]
         }),
@@ -102,7 +105,7 @@ fn comments_separators_and_decimal_commas_are_read() {
 
 #[test]
 fn numbers_decide_where_names_do_not_and_the_assumption_is_stated() {
-    let cases: [(&str, fn(f64, Complex<f64>) -> [f64; 3], &[&str]); 5] = [
+    let cases: [(&str, RowOf, &[&str]); 5] = [
         (
             "f_hz,mag,phase\n",
             |hz, h| [hz, h.norm(), h.arg().to_degrees()],
