@@ -23,6 +23,8 @@
 //! response was smoothed. A model follows such errors, and its residuals are too small and correlated themselves. Where they are,
 //! every second point is used, or every fourth, and so on, until they are not; so many points are also the resolution of the response.
 
+use std::cmp::Ordering;
+
 use nalgebra::Complex;
 use serde::Serialize;
 
@@ -92,14 +94,16 @@ struct Model {
 }
 
 /// Distances of the points that are used, in points.
-const STRIDES: [usize; 6] = [1, 2, 4, 8, 16, LAST_STRIDE];
-const LAST_STRIDE: usize = 32;
-/// Correlation of neighbouring residuals above which those of a neighbourhood are not independent. That of independent errors is
-/// -0.1, because the model has removed their slow part.
-const CORRELATED: f64 = 0.1;
-/// The correlation is the median over so many points to either side: 1/(2 14)^(1/2) = 0.19 for one neighbourhood, of which eight are
-/// independent, is 0.08 for the median.
-const MEDIAN_REACH: usize = 64;
+const STRIDES: [usize; 6] = [1, 2, 4, 8, 16, 32];
+/// Correlation of neighbouring residuals of the wide parabola above which errors are not independent. That of independent errors is
+/// -0.1, because the model has removed their slow part; that of lines under a Hann window is 0.25.
+const CORRELATED: f64 = 0.0;
+/// The correlation is the lower quartile over so many points to either side: near a mode, which the parabola does not describe, the
+/// residuals are correlated as well. The quartile of independent errors is -0.1 - 0.67/(2 14)^(1/2) = -0.23, that under a Hann window
+/// 0.12.
+const REACH: usize = 128;
+/// The distance is the lower quartile over so many points to either side: it changes slowly, and near modes it seems to be larger.
+const STRIDE_REACH: usize = 512;
 
 /// The noise of a response.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,65 +121,71 @@ impl Scatter {
         if count < MIN_POINTS {
             return None;
         }
-        let mut scatter = Scatter {
-            variance: vec![0.0; count],
-            correlated_points: vec![0; count],
-        };
-        for stride in STRIDES {
-            let is_last = stride == LAST_STRIDE || count < 2 * stride * WIDE;
-            scatter.fill_in(frequency_hz, response, stride, is_last);
-            if is_last || scatter.correlated_points.iter().all(|points| *points > 0) {
+        let mut estimates: Vec<Vec<PointEstimate>> = Vec::new();
+        let mut independent = vec![None; count];
+        for (step, stride) in STRIDES.into_iter().enumerate() {
+            if step > 0 && count < 2 * stride * WIDE {
+                break;
+            }
+            let at = |k| estimate(frequency_hz, response, k, stride);
+            let found: Vec<PointEstimate> = (0..count).map(at).collect();
+            for (k, first) in independent.iter_mut().enumerate() {
+                let is_independent = low_correlation(&found, k) <= CORRELATED;
+                *first = first.or(is_independent.then_some(step));
+            }
+            estimates.push(found);
+            if independent.iter().all(Option::is_some) {
                 break;
             }
         }
-        scatter.with_rounding(response)
-    }
-
-    /// Fills in the points that have no value yet and independent residuals at a distance.
-    fn fill_in(
-        &mut self,
-        frequency_hz: &[f64],
-        response: &[Complex<f64>],
-        stride: usize,
-        is_last: bool,
-    ) {
-        let at = |k| estimate(frequency_hz, response, k, stride);
-        let estimates: Vec<PointEstimate> = (0..self.variance.len()).map(at).collect();
-        for k in 0..estimates.len() {
-            if self.correlated_points[k] > 0 {
-                continue;
-            }
-            self.variance[k] = estimates[k].variance;
-            if is_last || median_correlation(&estimates, k) <= CORRELATED {
-                self.correlated_points[k] = stride;
-            }
-        }
-    }
-
-    fn with_rounding(mut self, response: &[Complex<f64>]) -> Option<Scatter> {
-        for (variance, value) in self.variance.iter_mut().zip(response) {
-            let least = ROUNDING * value.norm();
-            *variance = variance.max(least * least);
-        }
-        let is_noisy = self.variance.iter().all(|variance| *variance > 0.0);
-        is_noisy.then_some(self)
+        let last = estimates.len() - 1;
+        let steps: Vec<usize> = independent
+            .iter()
+            .map(|step| step.unwrap_or(last))
+            .collect();
+        let points = (0..count).map(|k| {
+            let step = lower_quartile(&steps, k, STRIDE_REACH, usize::cmp);
+            let least = ROUNDING * response[k].norm();
+            (
+                estimates[step][k].variance.max(least * least),
+                STRIDES[step],
+            )
+        });
+        let (variance, correlated_points): (Vec<f64>, Vec<usize>) = points.unzip();
+        let is_noisy = variance.iter().all(|variance| *variance > 0.0);
+        is_noisy.then_some(Scatter {
+            variance,
+            correlated_points,
+        })
     }
 }
 
 /// The noise at a point by one neighbourhood.
+#[derive(Clone, Copy)]
 struct PointEstimate {
     variance: f64,
-    /// Of neighbouring residuals.
+    /// Of neighbouring residuals of the first model: one with more parameters follows correlated errors.
     correlation: f64,
 }
 
-/// The median of the correlation around a point.
-fn median_correlation(estimates: &[PointEstimate], k: usize) -> f64 {
-    let last = (k + MEDIAN_REACH + 1).min(estimates.len());
-    let near = &estimates[k.saturating_sub(MEDIAN_REACH)..last];
-    let mut sorted: Vec<f64> = near.iter().map(|estimate| estimate.correlation).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
+/// The lower quartile of the correlation around a point.
+fn low_correlation(estimates: &[PointEstimate], k: usize) -> f64 {
+    let by_correlation =
+        |a: &PointEstimate, b: &PointEstimate| a.correlation.total_cmp(&b.correlation);
+    lower_quartile(estimates, k, REACH, by_correlation).correlation
+}
+
+/// The lower quartile of some values up to `reach` to either side.
+fn lower_quartile<T: Copy>(
+    values: &[T],
+    k: usize,
+    reach: usize,
+    order: impl FnMut(&T, &T) -> Ordering,
+) -> T {
+    let last = (k + reach + 1).min(values.len());
+    let mut near = values[k.saturating_sub(reach)..last].to_vec();
+    let quarter = near.len() / 4;
+    *near.select_nth_unstable_by(quarter, order).1
 }
 
 /// The noise at a point by the first model that describes its neighbourhood.
@@ -186,12 +196,14 @@ fn estimate(
     stride: usize,
 ) -> PointEstimate {
     let mut best: Option<(Neighbourhood, Curve, Fit)> = None;
+    let mut correlation = None;
     for model in MODELS {
         let near = Neighbourhood::of(frequency_hz, response, k, model.points, stride);
         let equal = vec![1.0; near.x.len()];
         let Some(fit) = near.fit(model.curve, equal) else {
             continue;
         };
+        correlation.get_or_insert_with(|| fit.correlation());
         let least = best
             .as_ref()
             .map_or(f64::INFINITY, |(_, _, fit)| fit.variance);
@@ -199,14 +211,11 @@ fn estimate(
             best = Some((near, model.curve, fit));
         }
     }
-    let none = PointEstimate {
-        variance: f64::INFINITY,
-        correlation: 0.0,
-    };
-    best.map_or(none, |(near, curve, fit)| PointEstimate {
-        variance: near.variance_at_centre(curve, &fit),
-        correlation: fit.correlation(),
-    })
+    let variance = best.map(|(near, curve, fit)| near.variance_at_centre(curve, &fit));
+    PointEstimate {
+        variance: variance.unwrap_or(f64::INFINITY),
+        correlation: correlation.unwrap_or_default(),
+    }
 }
 
 /// A model fitted to a neighbourhood.
