@@ -74,7 +74,7 @@ pub struct ExternalOptions {
         conflicts_with = "rate"
     )]
     pub time: Option<String>,
-    /// Unit of the times [default: that in the name of the column (time_ms, "t [us]") or in a line of units, otherwise s]
+    /// Unit of the times [default: that in the name of the column (time_ms, t_us) or in a line of units, otherwise s]
     #[arg(long, value_name = "UNIT", requires = "time", value_enum)]
     pub time_unit: Option<TimeUnit>,
     /// Sampling rate, for a CSV file without a time column
