@@ -88,7 +88,7 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> 
             let [input, output] = signals.map(|values| at_regular_times(values, &times));
             Ok(Record {
                 signals: Signals {
-                    rate_hz: 1.0 / times.period_s,
+                    rate_hz: times.rate_hz,
                     input,
                     output,
                 },

@@ -265,3 +265,16 @@ fn other_formats_are_named_and_never_printed() {
     let why = refusal("t,\x1b[31mu,y\n0,1,2\n1,2,3\n2,3,4\n", &columns("t", None));
     assert!(!why.contains('\u{1b}'), "{why:?}");
 }
+
+/// Times of 0.4 ms with four decimals, as of a recorder at 2.5 kHz: a rate of 2500.0000000000005 Hz would be no line of a period of 1 s.
+#[test]
+fn rate_has_no_rounding_of_the_times() {
+    for rate_hz in [2500.0, 500.0, 48_000.0, 1024.0] {
+        let rows = table(
+            |k| k as f64 / rate_hz,
+            |k| format!("{:.9}", k as f64 / rate_hz),
+        );
+        let record = record(format!("t,u,y\n{rows}"), "t");
+        assert_eq!(record.signals.rate_hz, rate_hz);
+    }
+}
