@@ -49,19 +49,23 @@ pub(crate) fn check_static_conventions(frf: &Frf, static_sign: f64) -> Result<()
     check_turn(frf)?;
     let size = |k: usize| frf.response[k].norm();
     let is_static = |k: &usize| STATIC.contains(&(size(*k) / size(0)));
-    let count = lowest(frf);
-    let flat = (0..count).take_while(is_static).count();
-    if flat < count.min(2) {
+    let flat = (0..lowest(frf)).take_while(is_static).count();
+    // Above a free body |H| falls to less than half over this range.
+    if flat < near_first(frf).max(2).min(frf.len()) {
         return Ok(());
     }
     check_sign(frf, flat, |_| Complex::from(static_sign))
 }
 
+/// Number of the frequencies up to a multiple of the first one.
+fn near_first(frf: &Frf) -> usize {
+    let limit_hz = LOWEST_RATIO * frf.band_hz().0;
+    frf.frequency_hz.partition_point(|hz| *hz <= limit_hz)
+}
+
 /// Number of the lowest frequencies.
 fn lowest(frf: &Frf) -> usize {
-    let limit_hz = LOWEST_RATIO * frf.band_hz().0;
-    let near = frf.frequency_hz.partition_point(|hz| *hz <= limit_hz);
-    near.max(LOWEST_POINTS).min(frf.len())
+    near_first(frf).max(LOWEST_POINTS).min(frf.len())
 }
 
 fn check_unit_of_phase(frf: &Frf) -> Result<(), FrfError> {
