@@ -1,15 +1,20 @@
 //! The power of the noise over frequency, from the residuals of local models.
 //!
 //! A model with one pole cannot follow two modes and a zero between them, and its residual then contains their response. Where a residual
-//! exceeds those around it, models with more poles are tried, so that modes close together do not count as noise.
+//! exceeds those around it, models with more poles are tried, so that modes close together do not count as noise. A residual below 1 % of
+//! the response always counts as noise: models with more poles also follow an error of few readings, as of a late one at a resonance,
+//! whose spectrum is smooth.
 
 use super::spectra::{Place, Spectra};
 use crate::EstimatorSettings;
 
 /// Residuals are averaged with weights this much wider than those of the models.
 const WIDTH_RATIO: f64 = 2.0;
-/// A residual this much above the median of those around it is fitted again. Its 20 degrees of freedom make this four sigmas.
-const OUTLIER_RATIO: f64 = 2.0;
+/// Residuals are fitted again from this ratio of the output's power on: 1 % of its amplitude.
+const MIN_RELATIVE_POWER: f64 = 1e-4;
+/// Residuals this much above the median of those around them are fitted again. Noise with the 12 degrees of freedom of a window exceeds
+/// it with a probability below 1e-15.
+const OUTLIER_RATIO: f64 = 10.0;
 /// Number of residuals to either side that an outlier is compared with. A pair of modes raises those of two neighbours.
 const COMPARED: usize = 6;
 /// Poles of the models, and of those that are tried where the residual is large.
@@ -23,6 +28,8 @@ struct Residual {
     power: f64,
     /// Expected power for noise of power 1.
     freedom: f64,
+    /// The power over that of the output.
+    relative_power: f64,
 }
 
 impl Residual {
@@ -37,6 +44,7 @@ impl Residual {
             place,
             power: fit.residual_power,
             freedom: fit.freedom,
+            relative_power: 1.0 - fit.coherence,
         })
     }
 
@@ -86,7 +94,8 @@ impl<'a> NoiseFloor<'a> {
         let densities: Vec<f64> = self.residuals.iter().map(Residual::density).collect();
         for (k, residual) in self.residuals.iter_mut().enumerate() {
             let around = k.saturating_sub(COMPARED)..(k + COMPARED + 1).min(densities.len());
-            if densities[k] > OUTLIER_RATIO * median(&densities[around]) {
+            let exceeds_others = densities[k] > OUTLIER_RATIO * median(&densities[around]);
+            if exceeds_others && residual.relative_power > MIN_RELATIVE_POWER {
                 let refitted = Residual::new(spectra, residual.place, self.settings, MORE_POLES);
                 if let Some(refitted) = refitted {
                     *residual = refitted;
@@ -128,4 +137,73 @@ fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[sorted.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Complex;
+    use rand_core::{Rng, SeedableRng};
+    use rand_pcg::Pcg64Mcg;
+
+    use super::super::record_spectra::RecordSpectra;
+    use super::*;
+
+    const BIN_HZ: f64 = 0.05;
+    /// The bin of the resonance.
+    const RESONANCE: f64 = 600.0;
+    const DAMPING_RATIO: f64 = 0.01;
+    /// E|N|^2 of the noise that is added to the response.
+    const NOISE_POWER: f64 = 1e-6;
+
+    fn resonance(bin: f64, at: f64, damping_ratio: f64) -> Complex<f64> {
+        let ratio = bin / at;
+        Complex::new(1.0 - ratio * ratio, 2.0 * damping_ratio * ratio).inv()
+    }
+
+    /// A resonance, and one of half its damping three bins above it with an amplitude that is given as a ratio of the first; with noise.
+    fn with_second_mode(ratio: f64) -> RecordSpectra {
+        let mut random = Pcg64Mcg::seed_from_u64(1);
+        let mut uniform = || random.next_u64() as f64 / u64::MAX as f64 - 0.5;
+        // Each part has a variance of half the power; that of `uniform` is 1/12.
+        let scale = (6.0 * NOISE_POWER).sqrt();
+        let output = (0..2000).map(|bin| {
+            let bin = f64::from(bin);
+            let second = resonance(bin, RESONANCE + 3.0, 0.5 * DAMPING_RATIO) * (0.5 * ratio);
+            let noise = Complex::new(uniform(), uniform()) * scale;
+            resonance(bin, RESONANCE, DAMPING_RATIO) + second + noise
+        });
+        let input = vec![Complex::from(1.0); 2000];
+        RecordSpectra::new(input, output.collect(), BIN_HZ)
+    }
+
+    /// The power at the resonance.
+    fn power_with_second_mode(ratio: f64) -> f64 {
+        let settings = EstimatorSettings::default();
+        let spectra = with_second_mode(ratio);
+        NoiseFloor::new(&spectra, (100.0, 1900.0), &settings).power(RESONANCE)
+    }
+
+    #[test]
+    fn second_mode_within_a_window_is_no_noise() {
+        for ratio in [-1.0, -0.5, 0.5, 1.0] {
+            let power = power_with_second_mode(ratio) / NOISE_POWER;
+            // With one pole it is 4e6. Windows beside the modes, in which the error is below 1 %, are still fitted with one.
+            assert!((0.3..100.0).contains(&power), "{ratio}: {power}");
+        }
+    }
+
+    #[test]
+    fn error_below_one_percent_of_the_response_is_noise() {
+        for ratio in [-0.02, 0.02] {
+            let power = power_with_second_mode(ratio) / NOISE_POWER;
+            // 1 % of the resonance, whose height is 50, would be 2.5e5.
+            assert!((10.0..2.5e5).contains(&power), "{ratio}: {power}");
+        }
+    }
+
+    #[test]
+    fn single_mode_leaves_the_noise() {
+        let power = power_with_second_mode(0.0) / NOISE_POWER;
+        assert!((0.5..2.0).contains(&power), "{power}");
+    }
 }
