@@ -32,12 +32,13 @@ closed() {
   run "$loop" control "$(evidence)" "$@"
 }
 
-# act NAME [OPTION...]: emulated amplifier and probe.
+# act NAME [OPTION...]: emulated amplifier and probe. Like real devices they do not wait for the program that uses them, except for its
+# loop, whose priority is higher: with one of ordinary processes, three commands of 22,000 arrived 0.15 ms late.
 act() {
   log=$1
   shift
   rm -f /tmp/probe # of an emulator that was killed
-  ./bench emulate amplifier probe --config real.toml --pty /tmp/probe --log "$log.jsonl" "$@" >"$log.out" 2>&1 &
+  chrt --fifo 70 ./bench emulate amplifier probe --config real.toml --pty /tmp/probe --log "$log.jsonl" "$@" >"$log.out" 2>&1 &
   device=$!
   sleep 1
 }
