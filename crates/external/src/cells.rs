@@ -71,10 +71,11 @@ impl Format {
     /// The number in a cell; not necessarily finite.
     pub fn number(&self, cell: &str) -> Option<f64> {
         if self.decimal_comma && cell.contains(',') {
-            let point = cell.replacen(',', ".", 1);
-            // A second comma, or a point beside the comma, is no number.
-            (!cell.contains('.')).then_some(())?;
-            return point.parse().ok();
+            // Points separate thousands here, or the cell is no number: both are refused. So is a second comma, by `parse`.
+            if cell.contains('.') {
+                return None;
+            }
+            return cell.replacen(',', ".", 1).parse().ok();
         }
         cell.parse().ok()
     }
