@@ -160,8 +160,8 @@ pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
 /// Reads an FRF in metres per ampere from text.
 ///
 /// # Errors
-/// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies, standard deviations above 0
-/// and a coherence of 0 to 1.
+/// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies above 0, no negative
+/// magnitude, standard deviations above 0 and a coherence of 0 to 1.
 pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     let found = text.lines().next().unwrap_or_default().trim();
     if found != HEADER {
@@ -175,8 +175,8 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     for record in reader.records() {
         let record = record.map_err(|error| not_a_table(&error))?;
         let numbers = finite_numbers(&record)?;
-        push_row(numbers, &mut frf).ok_or_else(|| invalid_row(&record))?;
         check_values(&record, numbers)?;
+        push_row(numbers, &mut frf).ok_or_else(|| invalid_row(&record))?;
     }
     Ok(frf)
 }
@@ -238,10 +238,20 @@ fn finite_numbers(record: &csv::StringRecord) -> Result<[f64; COLUMNS], FrfCsvEr
     numbers.ok_or_else(|| invalid_row(record))
 }
 
-/// Refuses a standard deviation or a coherence that no measurement has.
+/// Refuses a magnitude, a standard deviation or a coherence that no measurement has.
 fn check_values(record: &csv::StringRecord, numbers: [f64; COLUMNS]) -> Result<(), FrfCsvError> {
-    let [_, _, _, coherence, magnitude_sigma, phase_sigma_deg, _] = numbers;
+    let [
+        _,
+        magnitude,
+        _,
+        coherence,
+        magnitude_sigma,
+        phase_sigma_deg,
+        _,
+    ] = numbers;
+    let magnitude_defect = (magnitude < 0.0).then_some(ValueDefect::NegativeMagnitude);
     let found = [
+        (METRES_PER_AMPERE, magnitude, magnitude_defect),
         ("coherence", coherence, coherence_defect(coherence)),
         (
             MAGNITUDE_SIGMA,
@@ -267,15 +277,12 @@ fn check_values(record: &csv::StringRecord, numbers: [f64; COLUMNS]) -> Result<(
     })
 }
 
-/// Appends a row; `None` if its frequency is not above the one before.
+/// Appends a row; `None` if its frequency is not above the one before, or not above 0.
 fn push_row(numbers: [f64; COLUMNS], frf: &mut Frf) -> Option<()> {
     let [frequency, magnitude, phase_deg, rest @ ..] = numbers;
     let [coherence, magnitude_sigma, phase_sigma_deg, resolution] = rest;
-    if frf
-        .frequency_hz
-        .last()
-        .is_some_and(|last| frequency <= *last)
-    {
+    let last = frf.frequency_hz.last().copied().unwrap_or(0.0);
+    if frequency <= last {
         return None;
     }
     let response = Complex::from_polar(magnitude, phase_deg.to_radians());
@@ -314,8 +321,14 @@ mod tests {
 
     #[test]
     fn rejects_sigma_and_coherence_that_no_measurement_has_with_line_column_and_value() {
-        use ValueDefect::{Coherence, NegativeSigma, ZeroSigma};
+        use ValueDefect::{Coherence, NegativeMagnitude, NegativeSigma, ZeroSigma};
         for (row, at, of, is) in [
+            (
+                "1,-2,3,1,1,1,0.1",
+                "magnitude_m_per_a",
+                -2.0,
+                NegativeMagnitude,
+            ),
             ("1,2,3,1,0,1,0.1", "magnitude_sigma", 0.0, ZeroSigma),
             ("1,2,3,1,-0.5,1,0.1", "magnitude_sigma", -0.5, NegativeSigma),
             ("1,2,3,1,1,0,0.1", "phase_sigma_deg", 0.0, ZeroSigma),
@@ -344,6 +357,17 @@ mod tests {
             matches!(&error, FrfCsvError::Cell { line: 2, column: "magnitude_sigma", text, .. } if text == "inf"),
             "{error:?}"
         );
+    }
+
+    #[test]
+    fn rejects_frequencies_that_are_not_above_0() {
+        for frequency in ["0", "-1"] {
+            let error = from_str(&format!("{HEADER}\n{frequency},2,3,1,1,1,0.1\n"));
+            assert!(
+                matches!(error, Err(FrfCsvError::Row { line: 2, .. })),
+                "{frequency}: {error:?}"
+            );
+        }
     }
 
     #[test]

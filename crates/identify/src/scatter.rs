@@ -110,7 +110,7 @@ const STRIDE_REACH: usize = 512;
 pub struct Scatter {
     /// E|error|^2 of each point.
     pub variance: Vec<f64>,
-    /// Points further apart than this number have independent errors, at each point.
+    /// Points at least this number of points apart have independent errors, at each point.
     pub correlated_points: Vec<usize>,
 }
 
@@ -222,19 +222,27 @@ fn estimate(
 struct Fit {
     /// The weights of the points.
     weight: Vec<f64>,
-    /// Response minus model, times the weights.
+    /// The model.
+    model: Vec<Complex<f64>>,
+    /// What the weighted least squares leave.
     residual: Vec<Complex<f64>>,
     /// The power of the residuals over the degrees of freedom.
     variance: f64,
 }
 
 impl Fit {
-    fn new(weight: Vec<f64>, residual: Vec<Complex<f64>>, parameters: usize) -> Option<Fit> {
+    fn new(
+        weight: Vec<f64>,
+        model: Vec<Complex<f64>>,
+        residual: Vec<Complex<f64>>,
+        parameters: usize,
+    ) -> Option<Fit> {
         let freedom = residual.len().checked_sub(parameters)?;
         let power: f64 = residual.iter().map(|r| r.norm_sqr()).sum();
         let variance = power / freedom as f64;
         variance.is_finite().then_some(Fit {
             weight,
+            model,
             residual,
             variance,
         })
@@ -252,7 +260,7 @@ impl Fit {
     }
 
     /// -ln of the likelihood of the residuals for each point, with variances in the ratio 1/weight^2.
-    fn improbability(&self) -> f64 {
+    fn negative_log_likelihood(&self) -> f64 {
         let logs: f64 = self.weight.iter().map(|weight| weight.ln()).sum();
         self.variance.ln() - 2.0 * logs / self.weight.len() as f64
     }
@@ -293,11 +301,9 @@ impl Neighbourhood {
 
     /// The variance by equal errors, or by errors in the ratio of the response if these are more probable.
     fn variance_at_centre(&self, curve: Curve, equal: &Fit) -> f64 {
-        let model = self.response.iter().zip(&equal.residual);
-        let weight = model.map(|(h, residual)| 1.0 / (h - residual).norm());
-        let relative = self.fit(curve, weight.collect());
-        match relative {
-            Some(fit) if fit.improbability() < equal.improbability() => {
+        let weight = equal.model.iter().map(|model| 1.0 / model.norm());
+        match self.fit(curve, weight.collect()) {
+            Some(fit) if fit.negative_log_likelihood() < equal.negative_log_likelihood() => {
                 fit.variance / fit.weight[self.centre].powi(2)
             }
             _ => equal.variance,
@@ -315,13 +321,14 @@ impl Neighbourhood {
         let columns = self.powers().map(|column| weighted(column, &weight));
         let right = weighted(self.response.clone(), &weight);
         let fit = least_squares::solve(columns.to_vec(), right)?;
-        Fit::new(weight, fit.residual, columns.len())
+        let model = self.polynomial(&fit.solution);
+        Fit::new(weight, model, fit.residual, columns.len())
     }
 
     /// (1 + a x) H - b0 - b1 x - b2 x^2, divided by |1 + a x| of the iteration before.
     fn with_pole(&self, weight: Vec<f64>) -> Option<Fit> {
         let mut pole = Complex::default();
-        let mut residual = Vec::new();
+        let (mut model, mut residual) = (Vec::new(), Vec::new());
         for _ in 0..ITERATIONS {
             let denominators = self.x.iter().map(|x| (pole * *x + 1.0).norm());
             let weight = weight.iter().zip(denominators).map(|(w, d)| w / d);
@@ -332,9 +339,21 @@ impl Neighbourhood {
             let right = weighted(self.response.clone(), &weight);
             let fit = least_squares::solve(columns.collect(), right)?;
             pole = fit.solution[3];
+            let numerator = self.polynomial(&fit.solution[..3]);
+            let values = numerator.iter().zip(&self.x);
+            model = values.map(|(b, x)| b / (pole * *x + 1.0)).collect();
             residual = fit.residual;
         }
-        Fit::new(weight, residual, 4)
+        Fit::new(weight, model, residual, 4)
+    }
+
+    /// The sum of powers of x with these coefficients.
+    fn polynomial(&self, coefficients: &[Complex<f64>]) -> Vec<Complex<f64>> {
+        let value = |x: &f64| {
+            let terms = coefficients.iter().rev();
+            terms.fold(Complex::default(), |sum, b| sum * *x + b)
+        };
+        self.x.iter().map(value).collect()
     }
 
     /// 1, x and x^2.

@@ -24,8 +24,8 @@ use super::rational::{self, Order};
 use super::window::{FittedModel, Window};
 use crate::{EstimatorSettings, LocalModel};
 
-/// F statistic above which the rational model is used: Fisher's F of 2 and some 20 degrees of freedom exceeds it with a
-/// probability of 0.1 %.
+/// F statistic above which a rational model is used: Fisher's F of 2 and some 20 degrees of freedom exceeds it with a probability of 0.1
+/// %, and that of a further pole, of 6 and some 10, with 0.1 %.
 const SIGNIFICANT_F: f64 = 10.0;
 
 /// The model of a window with at most this number of poles; `None` where there is no input.

@@ -92,10 +92,13 @@ fn gauss_newton(
     mut coefficients: Coefficients,
 ) -> Option<FittedModel> {
     for step in 0..MAX_STEPS {
-        let linear = linearized(window, order, &coefficients)?;
+        let mut linear = linearized(window, order, &coefficients)?;
         let change = coefficients.add(&linear.solution);
         if change < CONVERGED || step + 1 == MAX_STEPS {
             // After a small step, the residual of the linear model is that of the model to second order.
+            if change >= CONVERGED {
+                linear.residual = error(window, order, &coefficients)?;
+            }
             let fit = LocalFit {
                 response: coefficients.numerator[0],
                 ..window.local_fit(&linear)
@@ -127,10 +130,24 @@ fn linearized(window: &Window, order: Order, coefficients: &Coefficients) -> Opt
     let model = combination(&columns, &coefficients.numerator);
     let over_denominator = (0..model.len()).map(|j| -model[j] * inverse[j]);
     columns.extend(times_powers(window, order, over_denominator));
-    let error = (0..model.len())
-        .map(|j| window.output[j] * window.root_weight[j] - model[j])
-        .collect();
-    least_squares::solve(columns, error)
+    least_squares::solve(columns, weighted_error(window, &model))
+}
+
+/// Y - B U/A, weighted.
+fn error(window: &Window, order: Order, coefficients: &Coefficients) -> Option<Vec<Complex<f64>>> {
+    let inverse = inverse_denominator(window, &coefficients.denominator)?;
+    let columns = numerators(window, order, &inverse);
+    let model = combination(&columns, &coefficients.numerator);
+    Some(weighted_error(window, &model))
+}
+
+/// The output, weighted, minus a model of it.
+fn weighted_error(window: &Window, model: &[Complex<f64>]) -> Vec<Complex<f64>> {
+    let outputs = window.output.iter().zip(&window.root_weight);
+    let errors = outputs
+        .zip(model)
+        .map(|((output, root), model)| output * *root - model);
+    errors.collect()
 }
 
 /// The columns of B, and of a transient.

@@ -304,7 +304,7 @@ impl MeasurementChain {
 
     /// The response at s = j w from the samples of the command to the force and, with a delay of `delay_s` beyond that of the chain, to
     /// the reading, without aliases: that of a signal that is continuous in time.
-    fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
+    pub(super) fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
         let delay = unit_phasor(-s.im * delay_s);
         match self {
             MeasurementChain::Direct => delay,
@@ -349,7 +349,7 @@ impl MeasurementChain {
 }
 
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, from which sampling deviates by a
-/// thousandth.
+/// thousandth near the mode.
 pub(super) fn log_derivatives(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
     let (s, w, zeta) = (
         Complex::new(0.0, omega_rad_s),

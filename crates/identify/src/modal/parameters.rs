@@ -72,7 +72,7 @@ impl ModalParameters {
         self
     }
 
-    /// The parameters with the mode within [`SPLIT_REACH`] half-widths of a frequency replaced by two: one half-width to either side of it,
+    /// The parameters with the nearest mode within [`SPLIT_REACH`] half-widths of a frequency replaced by two: one half-width to either side of it,
     /// with half of its damping. `None` if there is no such mode.
     pub(super) fn with_split_mode(&self, omega_rad_s: f64) -> Option<ModalParameters> {
         let distance = |mode: &ModalTerm| {
@@ -82,7 +82,9 @@ impl ModalParameters {
         let near = |mode: &&ModalTerm| {
             mode.damping_ratio < MAX_SPLIT_DAMPING && distance(mode) < SPLIT_REACH
         };
-        let index = self.modes.iter().position(|mode| near(&mode))?;
+        let modes = self.modes.iter().enumerate();
+        let close = modes.filter(|(_, mode)| near(mode));
+        let (index, _) = close.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
         let mut next = self.clone();
         let one = next.modes[index];
         let half = |side: f64| ModalTerm {

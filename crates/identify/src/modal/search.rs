@@ -163,8 +163,10 @@ impl Search<'_, '_> {
             let problem = Problem { chain, data, nodes };
             let start = std::mem::take(&mut self.parameters);
             let solution = refine(problem, start, pass.tolerance);
-            if first_misfit.is_none() && !solution.parameters.modes.is_empty() {
-                self.orders.push(order(problem, &solution, f64::INFINITY));
+            match first_misfit {
+                None if solution.parameters.modes.is_empty() => {}
+                None => self.orders.push(order(problem, &solution, f64::INFINITY)),
+                Some(_) => self.update_last_order(problem, &solution),
             }
             let first = *first_misfit.get_or_insert(problem.misfit(solution.chi2));
             self.add_modes(pass, problem, first, solution)?;
@@ -174,6 +176,13 @@ impl Search<'_, '_> {
         }
         self.done = pass.progress;
         Ok(())
+    }
+
+    /// Replaces the parameters of the last order by those that were refined with nodes of its own delay.
+    fn update_last_order(&mut self, problem: Problem<'_>, solution: &Solution) {
+        if let Some(last) = self.orders.last_mut() {
+            *last = order(problem, solution, last.evidence);
+        }
     }
 
     /// Adds modes to a solution until none is significant, or until its delay has moved so far that the nodes must be computed again.

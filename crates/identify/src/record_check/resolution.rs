@@ -31,7 +31,7 @@ const COARSE_RANGE_RATIO: f64 = 1e-3;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Resolution {
-    /// Step of the input, if it exceeds a thousandth of its range.
+    /// Step of the input, if it exceeds a thousandth of its range. An input of few levels, as a PRBS or a staircase, has none.
     pub input: Option<f64>,
     /// Step of the output, if it exceeds the standard deviation of its noise.
     pub output: Option<f64>,
@@ -43,7 +43,7 @@ impl Resolution {
         let coarse = |step: &f64| *step > COARSE_RANGE_RATIO * range(&signals.input);
         let noise = Prediction::new(signals, 0.0).map_or(0.0, |prediction| prediction.noise());
         Resolution {
-            input: step(&signals.input).filter(coarse),
+            input: step_of_many_levels(&signals.input).filter(coarse),
             output: step(&signals.output).filter(|step| *step > noise),
         }
     }
@@ -61,18 +61,36 @@ impl Resolution {
 
 /// The step of the grid on which the values lie, if they do.
 pub(super) fn step(samples: &[f64]) -> Option<f64> {
+    let differences = differences(samples);
+    if differences.len() < MIN_DIFFERENCES {
+        few_levels(&differences)
+    } else {
+        many_levels(&differences)
+    }
+}
+
+/// The step of a grid of which the values use many levels.
+fn step_of_many_levels(samples: &[f64]) -> Option<f64> {
+    let differences = differences(samples);
+    let are_many = differences.len() >= MIN_DIFFERENCES;
+    are_many.then(|| many_levels(&differences)).flatten()
+}
+
+/// The differences of neighbouring levels, rising.
+fn differences(samples: &[f64]) -> Vec<f64> {
     let mut levels = samples.to_vec();
     levels.sort_by(f64::total_cmp);
     let same = SAME_RATIO * range(samples);
     let differences = levels.windows(2).map(|pair| pair[1] - pair[0]);
     let mut differences: Vec<f64> = differences.filter(|d| *d > same).collect();
     differences.sort_by(f64::total_cmp);
-    if differences.len() < MIN_DIFFERENCES {
-        return few_levels(&differences);
-    }
+    differences
+}
+
+fn many_levels(differences: &[f64]) -> Option<f64> {
     let first = |quantile: f64| (quantile * differences.len() as f64) as usize;
     let starts = STARTS.into_iter().map(first);
-    starts.into_iter().find_map(|k| grid(&differences, k))
+    starts.into_iter().find_map(|k| grid(differences, k))
 }
 
 /// The step of a record with few levels, all of which must be on the grid.
@@ -156,5 +174,27 @@ mod tests {
         values[9_000] += 0.4321 * q;
         let found = step(&values).expect("a step");
         assert!((found / q - 1.0).abs() < 1e-9, "{found}");
+    }
+
+    #[test]
+    fn an_input_of_few_levels_is_exact() {
+        let signals = |input: Vec<f64>| Signals {
+            rate_hz: 1000.0,
+            output: (0..input.len()).map(sweep).collect(),
+            input,
+        };
+        // A PRBS of +-1 that begins at 0, and a staircase of eight steps.
+        let prbs = (0..4000_usize).map(|n| match n {
+            0..100 => 0.0,
+            n if (n / 7) * 40_503 % 65_536 < 32_768 => 1.0,
+            _ => -1.0,
+        });
+        assert_eq!(Resolution::of(&signals(prbs.collect())).input, None);
+        let staircase = (0..4000_i32).map(|n| f64::from(n / 500));
+        assert_eq!(Resolution::of(&signals(staircase.collect())).input, None);
+        // A rounded sweep has many.
+        let rounded = (0..4000).map(|n| (50.0 * sweep(n)).round() / 50.0);
+        let step = Resolution::of(&signals(rounded.collect())).input;
+        assert!((step.expect("a step") - 0.02).abs() < 1e-9);
     }
 }

@@ -17,7 +17,7 @@ use super::kernel::Place;
 
 /// Largest number of iterations. More of them amplify noise near half the rate, where the interpolation has little response.
 const ITERATIONS: usize = 16;
-/// The iteration ends when all errors are below this ratio of the largest reading: some hundred roundings.
+/// The iteration ends when the RMS error is below this ratio of the largest value of the grid: some hundred roundings.
 const CONVERGED_RATIO: f64 = 1e-13;
 /// Grids up to this ratio wider than the loop's period use the period itself.
 const SAME_SPACING: f64 = 1.05;
@@ -127,9 +127,9 @@ impl Grid {
             add(&mut grid.values, step, &direction);
             add(&mut errors_m, -step, &change);
             gradient = transposed(&places, &errors_m, count);
-            let kept = square(&gradient) / slope;
+            let beta = square(&gradient) / slope;
             for (direction, gradient) in direction.iter_mut().zip(&gradient) {
-                *direction = gradient + kept * *direction;
+                *direction = gradient + beta * *direction;
             }
         }
         grid
@@ -270,7 +270,8 @@ mod tests {
             readings.push(time_s, 99.0);
         });
         assert!(readings.position_m.iter().all(|y| *y < 2.0));
-        // A lost reading is replaced by its neighbour's, and the iteration converges to a consistent signal: 10 % at 170 Hz.
+        // The grid between the readings beside a lost one begins with a line through them and is not determined by readings there: of the
+        // 0.2 at 170 Hz a third is lost.
         assert!(largest_error(&readings, 0.0) < 0.25);
         assert!(
             Readings::default()

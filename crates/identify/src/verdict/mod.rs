@@ -268,14 +268,32 @@ fn no_phase_drop(modes: usize) -> &'static str {
 
 /// Why there are no CNMP zeros. A real zero right of the imaginary axis is none, but limits a controller as well.
 fn excluded(zeros: &[UncertainZero]) -> String {
-    let mut zeros = zeros.iter();
-    let Some(real) = zeros.find(|zero| zero.kind == ZeroKind::Rnmp) else {
-        return NO_CNMP.into();
-    };
-    format!(
-        "all complex zeros of the fit lie left of the imaginary axis, and the phase lag is that which the fit predicts; a real zero lies right of it, at {:.1} Hz: it is no CNMP zero, but limits the bandwidth of a controller in the same way",
-        hertz(real.s.re)
-    )
+    match limiting_zero(zeros) {
+        None => NO_CNMP.into(),
+        Some(real) => format!(
+            "all complex zeros of the fit lie left of the imaginary axis, and the phase lag is that which the fit predicts; a real zero {} right of it, at {:.1} Hz: it is not a CNMP zero, but limits the bandwidth of a controller in the same way",
+            if is_certain_right(real) {
+                "lies".into()
+            } else {
+                format!("may lie ({:.0} %)", 100.0 * real.rhp_probability)
+            },
+            hertz(real.s.re)
+        ),
+    }
+}
+
+/// The lowest real zero that is certain to lie right of the axis, or else the most probable one.
+fn limiting_zero(zeros: &[UncertainZero]) -> Option<&UncertainZero> {
+    let real = || zeros.iter().filter(|zero| zero.kind == ZeroKind::Rnmp);
+    let certain = real().filter(|zero| is_certain_right(zero));
+    let lowest = certain.min_by(|a, b| a.s.re.total_cmp(&b.s.re));
+    lowest.or_else(|| real().max_by(|a, b| a.rhp_probability.total_cmp(&b.rhp_probability)))
+}
+
+/// Whether the whole 95 % interval lies right of the imaginary axis.
+fn is_certain_right(zero: &UncertainZero) -> bool {
+    let real_part = zero.real_part();
+    real_part.value > real_part.half_width_95()
 }
 
 fn cnmp_pairs(zeros: &[UncertainZero]) -> usize {

@@ -250,3 +250,23 @@ fn a_real_zero_right_of_the_axis_is_stated() {
         "{why}"
     );
 }
+
+#[test]
+fn the_lowest_certain_real_zero_is_stated_before_an_uncertain_one() {
+    let real = |re: f64, sigma: f64, rhp_probability| UncertainZero {
+        s: Complex::new(re, 0.0),
+        covariance: [[sigma * sigma, 0.0], [0.0, 0.0]],
+        kind: ZeroKind::Rnmp,
+        rhp_probability,
+    };
+    let why = |zeros: &[UncertainZero]| evaluate(zeros, &[1.0, 1.0], phase_drop(0.0, 0.0)).1;
+    let (certain, higher) = (real(47.123_889_8, 1.0, 1.0), real(100.0, 1.0, 1.0));
+    let uncertain = real(10.0, 32.7, 0.62);
+    let text = why(&[uncertain, higher, certain]);
+    assert!(text.contains("lies right of it, at 7.5 Hz"), "{text}");
+    let text = why(&[uncertain]);
+    assert!(
+        text.contains("a real zero may lie (62 %) right of it, at 1.6 Hz"),
+        "{text}"
+    );
+}
