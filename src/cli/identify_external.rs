@@ -37,6 +37,8 @@ struct Report {
     rate_hz: f64,
     /// Whether the rate was given, the times are regular, or both columns were resampled.
     times: TimeBase,
+    /// Whether the times are taken as seconds only because the file does not state their unit.
+    time_unit_assumed: bool,
     band_hz: (f64, f64),
     /// Hold and lag of the input that were assumed; 0 without them.
     hold_s: f64,
@@ -78,7 +80,11 @@ pub(super) fn run(
     json: bool,
 ) -> Result<Exit, CliError> {
     let columns = options.columns(path)?;
-    let Record { signals, times } = bench_external::read(path, &columns)?;
+    let Record {
+        signals,
+        times,
+        seconds_assumed,
+    } = bench_external::read(path, &columns)?;
     signals.check()?;
     let identification = options.identification(&signals)?;
     let analysis = identification.run(&signals.input, &signals.output);
@@ -98,7 +104,8 @@ pub(super) fn run(
         beside: &in_folder(out, path)?,
         existing: ExistingFile::Keep,
     };
-    let report = Report::write(&record, path, results)?;
+    let mut report = Report::write(&record, path, results)?;
+    report.time_unit_assumed = seconds_assumed;
     print_result(json, &report, Report::text)?;
     Ok(Exit::Done)
 }
@@ -126,6 +133,7 @@ impl Report {
             truncated: false,
             rate_hz: record.rate_hz,
             times: record.times,
+            time_unit_assumed: false,
             band_hz: analysis.band_hz,
             hold_s: analysis.input_path.hold_s,
             input_lag_s: analysis.input_path.lag_s,
@@ -174,12 +182,15 @@ impl Report {
         )
     }
 
-    /// Irregular times, if the file has them.
+    /// The unit of the times if it is assumed, and irregular times.
     fn times_text(&self) -> String {
-        match self.times {
+        let assumed = "taken as seconds, because the file states no unit (--time-unit)";
+        let unit = self.time_unit_assumed.then(|| labelled("times", assumed));
+        let base = match self.times {
             TimeBase::Resampled { .. } => labelled("times", &self.times.to_string()),
             TimeBase::Given | TimeBase::Regular => String::new(),
-        }
+        };
+        unit.unwrap_or_default() + &base
     }
 
     /// The resolution of the channels, if it exceeds their noise.

@@ -22,7 +22,7 @@ pub(crate) struct Format {
 
 impl Format {
     /// All formats, the usual ones first.
-    pub const ALL: [Format; 7] = [
+    pub const ALL: [Format; 8] = [
         Format::new(Separator::Comma, false),
         Format::new(Separator::Tab, false),
         Format::new(Separator::Semicolon, false),
@@ -30,6 +30,8 @@ impl Format {
         Format::new(Separator::Tab, true),
         Format::new(Separator::Semicolon, true),
         Format::new(Separator::Spaces, true),
+        // The numbers are in quotes.
+        Format::new(Separator::Comma, true),
     ];
 
     const fn new(separator: Separator, decimal_comma: bool) -> Format {

@@ -24,6 +24,10 @@ pub enum ForeignFormat {
     Tdms,
     /// MCAP, the format of the recordings of this program.
     Mcap,
+    /// A gzip file that ends too early or has wrong bytes.
+    DamagedGzip,
+    /// A gzip file whose content is too long.
+    LongGzip,
     /// Anything else with bytes that no text has.
     Binary,
 }
@@ -31,19 +35,23 @@ pub enum ForeignFormat {
 impl ForeignFormat {
     /// The format by the first bytes of a file; `None` for text.
     fn of(bytes: &[u8]) -> Option<ForeignFormat> {
-        const MARKS: [(&[u8], ForeignFormat); 9] = [
+        const MARKS: [(&[u8], ForeignFormat); 8] = [
             (b"MATLAB 5.0", ForeignFormat::Mat5),
             (b"MATLAB 7.3", ForeignFormat::Hdf5),
             (b"\x89HDF", ForeignFormat::Hdf5),
             (b"PAR1", ForeignFormat::Parquet),
             (b"PK\x03\x04", ForeignFormat::Zip),
             (b"\x93NUMPY", ForeignFormat::Npy),
-            (b"    -1", ForeignFormat::Universal),
             (b"TDSm", ForeignFormat::Tdms),
             (b"\x89MCAP0\r\n", ForeignFormat::Mcap),
         ];
         let marked = MARKS.iter().find(|(mark, _)| bytes.starts_with(mark));
         let format = marked.map(|(_, format)| *format);
+        // A universal file begins with a line of -1 alone.
+        let first = bytes.split(|byte| b"\r\n".contains(byte)).next();
+        let universal =
+            first.is_some_and(|line| line.starts_with(b" ") && line.trim_ascii() == b"-1");
+        let format = format.or(universal.then_some(ForeignFormat::Universal));
         format.or_else(|| bytes.contains(&0).then_some(ForeignFormat::Binary))
     }
 
@@ -58,6 +66,8 @@ impl ForeignFormat {
             ForeignFormat::Universal => "a universal file",
             ForeignFormat::Tdms => "a TDMS file of LabVIEW",
             ForeignFormat::Mcap => "a recording (MCAP)",
+            ForeignFormat::DamagedGzip => "a damaged or incomplete gzip file",
+            ForeignFormat::LongGzip => "a gzip file with more than 1 GiB of content",
             ForeignFormat::Binary => "not a text file",
         }
     }
@@ -84,6 +94,8 @@ impl ForeignFormat {
             ForeignFormat::Mcap => {
                 "leave out --input and --output: a recording has its own channels"
             }
+            ForeignFormat::DamagedGzip => "copy it again",
+            ForeignFormat::LongGzip => "unpack it and keep the part that is needed",
             ForeignFormat::Binary => "export it as CSV",
         }
     }
@@ -94,7 +106,7 @@ impl ForeignFormat {
 /// # Errors
 /// The format of a file that is no text.
 pub(crate) fn text(bytes: Vec<u8>) -> Result<String, ForeignFormat> {
-    let bytes = unpacked(bytes);
+    let bytes = unpacked(bytes)?;
     if let Some(text) = utf16(&bytes) {
         return Ok(text);
     }
@@ -109,17 +121,20 @@ pub(crate) fn text(bytes: Vec<u8>) -> Result<String, ForeignFormat> {
     })
 }
 
-/// The bytes in a gzip file, as far as they can be read; other bytes as they are.
-fn unpacked(bytes: Vec<u8>) -> Vec<u8> {
+/// The bytes in a gzip file; other bytes as they are.
+fn unpacked(bytes: Vec<u8>) -> Result<Vec<u8>, ForeignFormat> {
     if !bytes.starts_with(b"\x1f\x8b") {
-        return bytes;
+        return Ok(bytes);
     }
     let mut unpacked = Vec::new();
-    let limited = flate2::read::MultiGzDecoder::new(bytes.as_slice()).take(MAX_RECORD_BYTES);
-    match { limited }.read_to_end(&mut unpacked) {
-        Ok(_) => unpacked,
-        // The packed bytes are no text, and are refused as such.
-        Err(_) => bytes,
+    let decoder = flate2::read::MultiGzDecoder::new(bytes.as_slice());
+    let read = decoder
+        .take(MAX_RECORD_BYTES + 1)
+        .read_to_end(&mut unpacked);
+    match read {
+        Err(_) => Err(ForeignFormat::DamagedGzip),
+        Ok(_) if unpacked.len() as u64 > MAX_RECORD_BYTES => Err(ForeignFormat::LongGzip),
+        Ok(_) => Ok(unpacked),
     }
 }
 
@@ -182,12 +197,19 @@ mod tests {
             (b"PK\x03\x04\x14", ForeignFormat::Zip),
             (b"\x93NUMPY\x01\0", ForeignFormat::Npy),
             (b"    -1\n    58\n", ForeignFormat::Universal),
+            (b"    -1  \r\n   151\r\n", ForeignFormat::Universal),
             (b"TDSm\x0e", ForeignFormat::Tdms),
             (b"\x89MCAP0\r\n", ForeignFormat::Mcap),
             (b"t,u\n\0\0\0", ForeignFormat::Binary),
-            (b"\x1f\x8bdamaged\0", ForeignFormat::Binary),
+            (b"\x1f\x8bdamaged\0", ForeignFormat::DamagedGzip),
         ] {
             assert_eq!(text(bytes.to_vec()), Err(format), "{bytes:?}");
         }
+    }
+
+    #[test]
+    fn samples_that_begin_with_minus_one_are_text() {
+        let samples = "    -1   0.5   2e-6\n     0   0.5   2e-6\n";
+        assert_eq!(text(samples.into()), Ok(samples.into()));
     }
 }

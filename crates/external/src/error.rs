@@ -95,7 +95,7 @@ pub enum DataError {
     /// The unit of the times is not known, and they are no seconds by their size.
     #[error(
         "{path}: the times in column `{column}` have steps of {step}, and neither the name nor a line of units states their unit; \
-         give --time-unit s, ms, us or ns, or --rate HZ if it counts the samples",
+         give --time-unit s, ms, us, ns, min, h or d, or --rate HZ if it counts the samples",
         path = .path.display()
     )]
     NoTimeUnit {
@@ -150,7 +150,7 @@ pub enum DataError {
     },
     /// Too few times for a rate.
     #[error(
-        "{path} has {lines} lines of samples, a rate needs at least 2 and an estimate 64; record for longer",
+        "{path} has only {lines} line of samples, a rate needs at least 2 and an estimate 64; record for longer",
         path = .path.display()
     )]
     TooFewLines {
@@ -179,7 +179,7 @@ pub enum DataError {
     },
     /// A time step differs from the others.
     #[error(
-        "{path}, line {line}: {step_s:.9} s after the line before, where the median step is {median_s:.9} s; \
+        "{path}, line {line}: {step_s:.9} s after the line before, where the usual step is {usual_s:.9} s; \
          fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
         path = .path.display()
     )]
@@ -190,8 +190,8 @@ pub enum DataError {
         line: u64,
         /// Time since the line before.
         step_s: f64,
-        /// Median of all such times.
-        median_s: f64,
+        /// Usual time between lines.
+        usual_s: f64,
     },
 }
 
@@ -202,7 +202,14 @@ fn place(line: Option<u64>) -> String {
 
 /// What is wrong with a cell that is not a finite number.
 fn number_remedy(text: &str) -> &'static str {
-    if text.contains(',') {
+    let parts_of_a_date = text.bytes().filter(|byte| b"/:".contains(byte)).count();
+    if text.is_empty() {
+        "is an empty cell; fill it, or cut the file there"
+    } else if parts_of_a_date >= 2 {
+        "is not a date with a time as in 2026-11-26T12:40:48.002Z; write it in this form, or give --rate HZ in place of --time"
+    } else if text.contains(',') && text.contains('.') {
+        "has separators of thousands; write the numbers as in 1085.5"
+    } else if text.contains(',') {
         "has a comma in place of the decimal point; write the numbers as in 0.5"
     } else {
         "is not a finite number; repair the cell, or cut the file there"
@@ -276,13 +283,13 @@ mod tests {
         let ExternalCsvError::Data(DataError::Irregular {
             line,
             step_s,
-            median_s,
+            usual_s,
             ..
         }) = error
         else {
             panic!("{error:?}");
         };
-        assert_eq!((line, step_s, median_s), (5, 2.5, 1.0));
+        assert_eq!((line, step_s, usual_s), (5, 2.5, 1.0));
     }
 
     #[test]

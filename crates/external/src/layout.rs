@@ -9,6 +9,7 @@
 //! ```
 
 use super::cells::Format;
+use super::times::TimeUnit;
 
 /// Lines from which the format is found.
 const SAMPLED: usize = 40;
@@ -180,18 +181,8 @@ impl Heading {
         let fits = |row: &Vec<String>| row.len() == pattern.columns;
         match plain.next() {
             Some(last) if fits(&last) => {
-                let above = plain.next().filter(fits);
-                match above {
-                    Some(names) if are_units(&last) => Heading {
-                        names: Some(names),
-                        units: last,
-                        other_count: None,
-                    },
-                    _ => Heading {
-                        names: Some(last),
-                        ..Heading::default()
-                    },
-                }
+                let above: Vec<Vec<String>> = plain.take_while(fits).take(2).collect();
+                Heading::of_lines(last, above)
             }
             Some(last) if last.len() > 1 => Heading {
                 other_count: Some(last.len()),
@@ -208,16 +199,39 @@ impl Heading {
     }
 }
 
+impl Heading {
+    /// The heading by the line directly before the samples and the lines above it, the lowest first: names, then units, then further
+    /// descriptions.
+    fn of_lines(last: Vec<String>, above: Vec<Vec<String>>) -> Heading {
+        let mut lines = std::iter::once(last.clone()).chain(above);
+        let units = lines.by_ref().find(|line| are_units(line));
+        match (units, lines.next()) {
+            (Some(units), Some(names)) => Heading {
+                names: Some(names),
+                units,
+                other_count: None,
+            },
+            _ => Heading {
+                names: Some(last),
+                ..Heading::default()
+            },
+        }
+    }
+}
+
 /// Whether the cells are units: most of them known ones, or in brackets.
 fn are_units(cells: &[String]) -> bool {
-    const KNOWN: [&str; 41] = [
+    const KNOWN: [&str; 59] = [
         "s", "sec", "ms", "us", "µs", "ns", "min", "n", "mn", "kn", "a", "ma", "v", "mv", "m",
         "mm", "um", "µm", "nm", "m/s", "mm/s", "m/s2", "m/s^2", "m/s²", "g", "deg", "rad", "°",
         "hz", "rad/s", "db", "m/a", "um/a", "mm/a", "%", "-", "1", "none", "pa", "bar", "counts",
+        "volt", "volts", "ampere", "amperes", "amp", "amps", "newton", "newtons", "meter",
+        "meters", "metre", "metres", "micron", "microns", "inch", "degree", "degrees", "hertz",
     ];
     let is_unit = |cell: &String| {
         let bare = cell.trim_matches(['[', ']', '(', ')', '<', '>', ' ']);
-        bare.len() < cell.len() || bare.is_empty() || KNOWN.contains(&bare.to_lowercase().as_str())
+        let is_known = KNOWN.contains(&bare.to_lowercase().as_str());
+        bare.len() < cell.len() || bare.is_empty() || is_known || TimeUnit::is_one(bare)
     };
     2 * cells.iter().filter(|cell| is_unit(cell)).count() > cells.len()
 }

@@ -61,6 +61,8 @@ pub struct Record {
     pub signals: Signals,
     /// The times of the file.
     pub times: TimeBase,
+    /// Whether the times are taken as seconds only because the file does not state their unit.
+    pub seconds_assumed: bool,
 }
 
 /// Reads two columns as a record.
@@ -80,6 +82,7 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> 
                     output,
                 },
                 times: TimeBase::Given,
+                seconds_assumed: false,
             })
         }
         Sampling::TimeColumn { name, unit } => {
@@ -93,6 +96,7 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> 
                     output,
                 },
                 times: times.base,
+                seconds_assumed: times.seconds_assumed,
             })
         }
     }

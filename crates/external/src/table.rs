@@ -221,12 +221,12 @@ impl<'a> Table<'a> {
             TimeDefect::Gap {
                 at,
                 step_s,
-                median_s,
+                usual_s,
             } => DataError::Irregular {
                 path,
                 line: lines[at],
                 step_s,
-                median_s,
+                usual_s,
             },
         }
     }

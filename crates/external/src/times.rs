@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! d_k = t_k - (t + k T)            deviation from the regular times of least squares
-//! |d_k| < 0.75 digits of the file  regular times, rounded: the period is T, which is more exact than that of both ends
+//! |d_k| < 0.75 last digits of t_k  regular times, rounded: the period is T, which is more exact than that of both ends
 //! larger                           irregular times, which are true: the samples are resampled
 //! a step of 1.5 median steps       a gap, refused
 //! ```
@@ -21,8 +21,11 @@ const MAX_IRREGULARITY: f64 = 0.5;
 const ROUNDED: f64 = 0.75;
 /// A deviation from regular times of this ratio of the period changes nothing: at half the rate it turns the phase by 0.02 degrees.
 const NEGLIGIBLE: f64 = 1e-4;
-/// A longer step is probably not in seconds, if the file does not say so.
-const LONGEST_STEP: f64 = 0.5;
+/// Steps outside of this range are probably not in seconds, if the file does not say so.
+const STEPS_IN_SECONDS: std::ops::Range<f64> = 1e-7..0.5;
+/// The line through rounded times is less accurate than the finest of them: part of the coarsest digit that counts as its error. That of
+/// 64 times is 2 x 0.29/8 digits at the ends.
+const LINE_ERROR: f64 = 0.1;
 
 /// A unit of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -39,6 +42,10 @@ pub enum TimeUnit {
     Ns,
     /// Minutes.
     Min,
+    /// Hours.
+    H,
+    /// Days.
+    D,
 }
 
 impl TimeUnit {
@@ -50,6 +57,8 @@ impl TimeUnit {
             TimeUnit::Us => 1e-6,
             TimeUnit::Ns => 1e-9,
             TimeUnit::Min => 60.0,
+            TimeUnit::H => 3600.0,
+            TimeUnit::D => 86_400.0,
         }
     }
 
@@ -63,18 +72,25 @@ impl TimeUnit {
     /// ```
     pub fn stated_in(text: &str) -> Option<TimeUnit> {
         let words = text.split(|c: char| !c.is_alphanumeric());
-        words
-            .rev()
-            .find_map(|word| match word.to_lowercase().as_str() {
-                "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::S),
-                "ms" | "msec" | "millisecond" | "milliseconds" => Some(TimeUnit::Ms),
-                "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" => {
-                    Some(TimeUnit::Us)
-                }
-                "ns" | "nsec" | "nanosecond" | "nanoseconds" => Some(TimeUnit::Ns),
-                "min" | "minute" | "minutes" => Some(TimeUnit::Min),
-                _ => None,
-            })
+        words.rev().find_map(TimeUnit::of_word)
+    }
+
+    /// Whether a text is a unit of time.
+    pub(crate) fn is_one(text: &str) -> bool {
+        TimeUnit::of_word(text).is_some()
+    }
+
+    fn of_word(word: &str) -> Option<TimeUnit> {
+        match word.to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::S),
+            "ms" | "msec" | "millisecond" | "milliseconds" => Some(TimeUnit::Ms),
+            "us" | "µs" | "μs" | "usec" | "microsecond" | "microseconds" => Some(TimeUnit::Us),
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => Some(TimeUnit::Ns),
+            "min" | "mins" | "minute" | "minutes" => Some(TimeUnit::Min),
+            "h" | "hr" | "hrs" | "hour" | "hours" => Some(TimeUnit::H),
+            "d" | "day" | "days" => Some(TimeUnit::D),
+            _ => None,
+        }
     }
 }
 
@@ -102,10 +118,20 @@ impl fmt::Display for TimeBase {
                 largest_deviation_s,
             } => write!(
                 f,
-                "the times deviate by up to {:.3} ms from regular ones, and are taken as true: both columns are resampled",
-                1e3 * largest_deviation_s
+                "the times deviate by up to {} from regular ones, and are taken as true: both columns are resampled",
+                duration(*largest_deviation_s)
             ),
         }
+    }
+}
+
+/// A duration with three digits in a unit that suits it.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        1.0.. => format!("{seconds:.3} s"),
+        1e-3.. => format!("{:.3} ms", 1e3 * seconds),
+        1e-6.. => format!("{:.3} us", 1e6 * seconds),
+        _ => format!("{:.3} ns", 1e9 * seconds),
     }
 }
 
@@ -116,6 +142,8 @@ pub(crate) struct Stamp {
     fraction: f64,
     /// Digits after the point; `None` for a number with an exponent.
     decimals: Option<u32>,
+    /// Digits from the first one that is not 0.
+    significant: u32,
     /// Whether it is a date, whose unit is the second.
     is_date: bool,
 }
@@ -166,6 +194,7 @@ impl Stamp {
             whole,
             fraction,
             decimals: Some(digits.len() as u32),
+            significant: significant_digits(cell),
             is_date: false,
         })
     }
@@ -180,6 +209,8 @@ impl Stamp {
             whole: ns.div_euclid(NS_PER_S),
             fraction: ns.rem_euclid(NS_PER_S) as f64 * 1e-9,
             decimals: Some(digits),
+            // A date has as many digits as its time since 1970.
+            significant: 11 + digits,
             is_date: true,
         })
     }
@@ -191,8 +222,19 @@ impl Stamp {
             whole: number.trunc() as i128,
             fraction: number.fract(),
             decimals: None,
+            significant: significant_digits(text),
             is_date: false,
         })
+    }
+
+    /// The last digit that it would have with this number of significant digits, in its unit.
+    fn digit(&self, significant: u32) -> f64 {
+        let size = (self.whole as f64 + self.fraction).abs();
+        if size > 0.0 {
+            10_f64.powi(size.log10().floor() as i32 + 1 - significant as i32)
+        } else {
+            0.0
+        }
     }
 
     /// The time from another one, in the unit of both.
@@ -201,11 +243,18 @@ impl Stamp {
     }
 }
 
+/// Digits of a number from the first one that is not 0, without an exponent.
+fn significant_digits(text: &str) -> u32 {
+    let mantissa = text.split(['e', 'E']).next().unwrap_or_default();
+    let digits = mantissa.bytes().filter(u8::is_ascii_digit);
+    digits.skip_while(|digit| *digit == b'0').count() as u32
+}
+
 /// Why times are refused. Places are indices of samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TimeDefect {
     TooFew,
-    /// The unit is not stated, and the steps are long for seconds.
+    /// The unit is not stated, and the steps are long or short for seconds.
     NoUnit {
         step: f64,
     },
@@ -217,7 +266,7 @@ pub(crate) enum TimeDefect {
     Gap {
         at: usize,
         step_s: f64,
-        median_s: f64,
+        usual_s: f64,
     },
 }
 
@@ -229,6 +278,8 @@ pub(crate) struct Times {
     pub period_s: f64,
     /// 1/`period_s`, without the rounding of the times: the number of fewest digits that they allow.
     pub rate_hz: f64,
+    /// Whether they are seconds only because no unit is stated.
+    pub seconds_assumed: bool,
     pub base: TimeBase,
 }
 
@@ -258,28 +309,38 @@ impl Times {
         let time_s: Vec<f64> = stamps_s.collect();
         check_rising(&time_s)?;
         let line = Line::through(&time_s);
-        if unit.is_none() && line.period_s >= LONGEST_STEP {
+        let seconds_assumed = unit.is_none();
+        if seconds_assumed && !STEPS_IN_SECONDS.contains(&line.period_s) {
             let step = line.period_s;
             return Err(TimeDefect::NoUnit { step });
         }
-        let largest_s = line.largest_deviation_s(&time_s);
-        let rounding_s = ROUNDED * unit_s * rounding(stamps);
+        let deviations_s = line.deviations_s(&time_s);
+        let largest_s = deviations_s.iter().copied().fold(0.0, f64::max);
+        let digits_s: Vec<f64> = digits(stamps).iter().map(|digit| unit_s * digit).collect();
+        let coarsest_s = digits_s.iter().copied().fold(0.0, f64::max);
+        let allowed_s = |digit_s: f64| {
+            let rounding_s = ROUNDED * digit_s + LINE_ERROR * coarsest_s;
+            rounding_s.max(NEGLIGIBLE * line.period_s)
+        };
+        let mut rounded = deviations_s.iter().zip(&digits_s);
         let span_s = time_s[time_s.len() - 1];
-        if largest_s <= rounding_s.max(NEGLIGIBLE * line.period_s) {
+        if rounded.all(|(deviation_s, digit_s)| *deviation_s <= allowed_s(*digit_s)) {
             let tolerance = largest_s / span_s + ROUNDING_OF_SUMS;
             return Ok(Times {
                 time_s,
                 period_s: line.period_s,
                 rate_hz: roundest(1.0 / line.period_s, tolerance),
+                seconds_assumed,
                 base: TimeBase::Regular,
             });
         }
-        check_gaps(&time_s)?;
+        check_gaps(&time_s, coarsest_s)?;
         let mean_s = span_s / (time_s.len() - 1) as f64;
         Ok(Times {
             time_s,
             period_s: mean_s,
             rate_hz: roundest(1.0 / mean_s, ROUNDING_OF_SUMS),
+            seconds_assumed,
             base: TimeBase::Resampled {
                 largest_deviation_s: largest_s,
             },
@@ -310,32 +371,39 @@ impl Line {
         }
     }
 
-    fn largest_deviation_s(&self, time_s: &[f64]) -> f64 {
+    fn deviations_s(&self, time_s: &[f64]) -> Vec<f64> {
         let regular = (0..time_s.len()).map(|k| self.start_s + k as f64 * self.period_s);
         let deviations = regular.zip(time_s).map(|(regular, t)| (t - regular).abs());
-        deviations.fold(0.0, f64::max)
+        deviations.collect()
     }
 }
 
-fn check_gaps(time_s: &[f64]) -> Result<(), TimeDefect> {
+/// Refuses the step that differs most from the others, if it differs by more than half of them and the rounding of the times. Rounded
+/// steps are 0 or a digit, so that their median may be 0: they are compared with the mean as well.
+fn check_gaps(time_s: &[f64], digit_s: f64) -> Result<(), TimeDefect> {
     let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mean_s = (time_s[time_s.len() - 1] - time_s[0]) / steps_s.len() as f64;
     let median_s = median(&steps_s);
-    let limit_s = MAX_IRREGULARITY * median_s;
-    let gap = steps_s
-        .iter()
-        .position(|step_s| (step_s - median_s).abs() > limit_s);
-    match gap {
-        Some(k) if steps_s[k] <= 0.0 => Err(TimeDefect::NotRising {
-            at: k + 1,
-            time_s: time_s[k + 1],
-            previous_s: time_s[k],
-        }),
+    let usual_s = if median_s > digit_s { median_s } else { mean_s };
+    let limit_s = MAX_IRREGULARITY * usual_s + digit_s;
+    let difference_s = |k: &usize| (steps_s[*k] - usual_s).abs();
+    let widest = (0..steps_s.len()).max_by(|a, b| difference_s(a).total_cmp(&difference_s(b)));
+    match widest.filter(|k| difference_s(k) > limit_s) {
+        Some(k) if steps_s[k] <= 0.0 => Err(not_rising(time_s, k)),
         Some(k) => Err(TimeDefect::Gap {
             at: k + 1,
             step_s: steps_s[k],
-            median_s,
+            usual_s,
         }),
         None => Ok(()),
+    }
+}
+
+fn not_rising(time_s: &[f64], k: usize) -> TimeDefect {
+    TimeDefect::NotRising {
+        at: k + 1,
+        time_s: time_s[k + 1],
+        previous_s: time_s[k],
     }
 }
 
@@ -348,22 +416,21 @@ fn check_rising(time_s: &[f64]) -> Result<(), TimeDefect> {
     };
     let falls = time_s.windows(2).position(is_wrong);
     match falls {
-        Some(k) => Err(TimeDefect::NotRising {
-            at: k + 1,
-            time_s: time_s[k + 1],
-            previous_s: time_s[k],
-        }),
+        Some(k) => Err(not_rising(time_s, k)),
         None => Ok(()),
     }
 }
 
-/// One digit of the finest stamp: times with fewer digits at the end of a number have lost zeros.
-fn rounding(stamps: &[Stamp]) -> f64 {
-    let digits = stamps.iter().map(|stamp| stamp.decimals);
-    let most = digits
-        .collect::<Option<Vec<u32>>>()
-        .and_then(|digits| digits.into_iter().max());
-    most.map_or(0.0, |digits| 0.1_f64.powi(digits as i32))
+/// The last digit of each stamp. A program writes all with the same number of decimals or of significant digits, and may leave out
+/// zeros at the end: the most of each count, and the coarser digit of both.
+fn digits(stamps: &[Stamp]) -> Vec<f64> {
+    let significant = stamps.iter().map(|stamp| stamp.significant).max();
+    let significant = significant.unwrap_or_default();
+    let decimals: Option<Vec<u32>> = stamps.iter().map(|stamp| stamp.decimals).collect();
+    let most = decimals.and_then(|decimals| decimals.into_iter().max());
+    let finest = most.map_or(0.0, |decimals| 0.1_f64.powi(decimals as i32));
+    let digit = |stamp: &Stamp| finest.max(stamp.digit(significant));
+    stamps.iter().map(digit).collect()
 }
 
 /// The median of at least one value.

@@ -79,6 +79,9 @@ fn every_form_of_a_record_gives_the_same_signals() {
     assert_eq!(expected.times, TimeBase::Regular);
     assert_eq!(expected.signals.len(), SAMPLES);
     let semicolons = plain.replace(',', ";");
+    let with_commas = semicolons.replace('.', ",").replace(';', "\",\"");
+    let quoted = with_commas.lines().map(|line| format!("\"{line}\"\n"));
+    let quoted: String = quoted.collect();
     let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
     packed.write_all(plain.as_bytes()).expect("in memory");
     let utf16 = std::iter::once(0xfeff).chain(plain.encode_utf16());
@@ -104,6 +107,15 @@ fn every_form_of_a_record_gives_the_same_signals() {
             format!("Recorder 2\nSerial number: 17\n\n{plain}").into(),
         ),
         ("units", format!("t,u,y\ns,N,m\n{rows}").into()),
+        (
+            "units in words",
+            format!("t,u,y\nsecond,Volt,Volt\n{rows}").into(),
+        ),
+        (
+            "units and remarks",
+            format!("t,u,y\ns,N,m\nrun7,run7b,run7c\n{rows}").into(),
+        ),
+        ("quoted decimal commas", quoted.into()),
         ("a last separator", plain.replace('\n', ",\n").into()),
         ("CR LF", plain.replace('\n', "\r\n").into()),
         ("CR", plain.replace('\n', "\r").into()),
@@ -111,8 +123,68 @@ fn every_form_of_a_record_gives_the_same_signals() {
         ("UTF-16", utf16.flat_map(u16::to_le_bytes).collect()),
     ];
     for (form, bytes) in forms {
-        assert_eq!(record(bytes, "t"), expected, "{form}");
+        let found = record(bytes, "t");
+        assert_eq!(found.signals, expected.signals, "{form}");
+        assert_eq!(found.times, expected.times, "{form}");
+        assert_eq!(found.seconds_assumed, !form.starts_with("units"), "{form}");
     }
+}
+
+#[test]
+fn every_unit_of_time_gives_the_rate() {
+    let unit_s = [
+        ("h", 3600.0),
+        ("days", 86_400.0),
+        ("min", 60.0),
+        ("ms", 1e-3),
+    ];
+    for (unit, seconds) in unit_s {
+        let rows = table(regular, |k| format!("{:.15e}", regular(k) / seconds));
+        let found = record(
+            format!("Time [{unit}],u,y\n{rows}"),
+            &format!("Time [{unit}]"),
+        );
+        assert!(
+            (found.signals.rate_hz / RATE_HZ - 1.0).abs() < 1e-9,
+            "{unit}"
+        );
+        assert!(!found.seconds_assumed, "{unit}");
+    }
+    // Days that are not named: 2.3e-8 s are not seconds.
+    let rows = table(regular, |k| format!("{:.15}", regular(k) / 86_400.0));
+    let text = refusal(format!("t,u,y\n{rows}"), &columns("t", None));
+    assert!(
+        text.contains("give --time-unit s, ms, us, ns, min, h or d"),
+        "{text}"
+    );
+}
+
+#[test]
+fn times_with_a_fixed_number_of_significant_digits_are_regular() {
+    // As `%g` of C writes them: six digits, so that the last one grows at 1 s and at 10 s.
+    let six_digits = |k: usize| {
+        let time = 0.0123 + k as f64 / 37.0;
+        let decimals = (5 - time.log10().floor() as i32).max(0) as usize;
+        let text = format!("{time:.decimals$}");
+        text.trim_end_matches('0').to_string()
+    };
+    let found = record(format!("t,u,y\n{}", table(regular, six_digits)), "t");
+    assert_eq!(found.times, TimeBase::Regular);
+    assert!((found.signals.rate_hz / 37.0 - 1.0).abs() < 1e-5);
+}
+
+#[test]
+fn a_gap_in_rounded_times_is_refused_with_its_line() {
+    // 1.5 kHz in milliseconds: steps of 0 and 1 ms. Ten lines are missing after the 200th sample.
+    let cells = |k: usize| {
+        let sample = if k < 200 { k } else { k + 10 };
+        format!("{:.3}", sample as f64 / 1500.0)
+    };
+    let text = refusal(
+        format!("t,u,y\n{}", table(regular, cells)),
+        &columns("t", None),
+    );
+    assert!(text.contains("line 202: 0.00"), "{text}");
 }
 
 #[test]

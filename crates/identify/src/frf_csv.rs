@@ -163,10 +163,7 @@ pub fn read(path: &Path) -> Result<Frf, FrfCsvError> {
 /// When the header differs from [`HEADER`], or a row is not seven finite numbers with rising frequencies above 0, no negative
 /// magnitude, standard deviations above 0 and a coherence of 0 to 1.
 pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
-    let found = text.lines().next().unwrap_or_default().trim();
-    if found != HEADER {
-        return Err(wrong_header(found));
-    }
+    check_unit(text)?;
     let mut reader = csv::ReaderBuilder::new()
         .flexible(true)
         .trim(csv::Trim::All)
@@ -185,6 +182,19 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
 pub fn has_own_columns(text: &str) -> bool {
     let found = text.lines().next().unwrap_or_default().trim();
     !matches!(wrong_header(found), FrfCsvError::Header { .. })
+}
+
+/// Checks that a text with the columns of [`HEADER`] has the magnitude in metres per ampere.
+///
+/// # Errors
+/// When it has another unit.
+pub fn check_unit(text: &str) -> Result<(), FrfCsvError> {
+    let found = text.lines().next().unwrap_or_default().trim();
+    if found == HEADER {
+        Ok(())
+    } else {
+        Err(wrong_header(found))
+    }
 }
 
 /// The columns are those of another file, or of a response in another unit.

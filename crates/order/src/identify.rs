@@ -74,10 +74,10 @@ pub struct ExternalOptions {
         conflicts_with = "rate"
     )]
     pub time: Option<String>,
-    /// Unit of the times [default: that in the name of the column (time_ms, t_us) or in a line of units, otherwise s]
+    /// Unit of the times, if they are numbers [default: that in the name of the column (time_ms, t_us) or in a line of units, otherwise s]
     #[arg(long, value_name = "UNIT", requires = "time", value_enum)]
     pub time_unit: Option<TimeUnit>,
-    /// Sampling rate, for a CSV file without a time column
+    /// Sampling rate, for a CSV file without a time column, or with inaccurate times of regular samples
     #[arg(
         long,
         value_name = "HZ",

@@ -174,10 +174,15 @@ impl MeasuredFrf {
         let bytes = input_file::read(path, MAX_TABLE_BYTES);
         let bytes =
             bytes.map_err(|why| csv_error(path, FrfCsvError::File(path.to_owned(), why)))?;
-        let text = std::str::from_utf8(&bytes).ok();
-        match text.filter(|text| frf_csv::has_own_columns(text) && phase.is_none()) {
-            Some(text) => MeasuredFrf::of_own_csv(path, text),
-            None => MeasuredFrf::of_external(path, phase),
+        let own = std::str::from_utf8(&bytes).ok();
+        let own = own.filter(|text| frf_csv::has_own_columns(text));
+        match (own, phase) {
+            (None, _) => MeasuredFrf::of_external(path, phase),
+            (Some(text), None) => MeasuredFrf::of_own_csv(path, text),
+            (Some(text), Some(_)) => {
+                frf_csv::check_unit(text).map_err(|why| csv_error(path, why))?;
+                MeasuredFrf::of_external(path, phase)
+            }
         }
     }
 

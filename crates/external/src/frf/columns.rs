@@ -74,7 +74,8 @@ impl Words {
     fn of(name: &str, unit: &str) -> Words {
         let text = format!("{name} {unit}")
             .to_lowercase()
-            .replace('°', " deg ");
+            .replace('°', " deg ")
+            .replace('%', " percent ");
         let words = text.split(|c: char| !c.is_alphanumeric());
         let words = words.filter(|word| !word.is_empty());
         Words(words.map(String::from).collect())
@@ -93,35 +94,42 @@ impl Words {
         if self.has(&["sigma", "std", "stddev", "uncertainty", "σ"]) {
             return (!is_phase && !self.has(&["deg", "rad"])).then_some(Role::MagnitudeSigma);
         }
-        const ROLES: [(Role, &[&str]); 5] = [
+        // Words of one letter, and those that stand in other names as well, decide only where no other does.
+        const ROLES: [(Role, &[&str]); 12] = [
             (Role::Coherence, &["coherence", "coh", "gamma2", "γ2"]),
             (Role::Resolution, &["resolution"]),
-            (Role::Real, &["real", "re"]),
-            (Role::Imaginary, &["imag", "imaginary", "im"]),
+            (Role::Phase, &["phase", "phi", "φ", "arg"]),
+            (Role::Real, &["real"]),
+            (Role::Imaginary, &["imag", "imaginary"]),
+            (
+                Role::Magnitude,
+                &[
+                    "magnitude",
+                    "mag",
+                    "amplitude",
+                    "ampl",
+                    "amp",
+                    "gain",
+                    "abs",
+                    "compliance",
+                    "db",
+                ],
+            ),
             (
                 Role::Frequency,
-                &["frequency", "frequencies", "freq", "f", "omega", "w", "ω"],
+                &["frequency", "frequencies", "freq", "omega", "ω"],
             ),
-        ];
-        const MAGNITUDES: [&str; 10] = [
-            "magnitude",
-            "mag",
-            "amplitude",
-            "ampl",
-            "amp",
-            "gain",
-            "abs",
-            "g",
-            "h",
-            "compliance",
+            (Role::Phase, &["angle"]),
+            (Role::Frequency, &["f", "w"]),
+            (Role::Real, &["re"]),
+            (Role::Imaginary, &["im"]),
+            (Role::Magnitude, &["g", "h"]),
         ];
         let named = ROLES.iter().find(|(_, words)| self.has(words));
         if let Some((role, _)) = named {
             Some(*role)
-        } else if is_phase || self.is_only(&["deg"]) {
+        } else if self.is_only(&["deg"]) {
             Some(Role::Phase)
-        } else if self.has(&MAGNITUDES) || self.has(&["db"]) {
-            Some(Role::Magnitude)
         } else {
             self.is_only(&["hz", "khz"]).then_some(Role::Frequency)
         }
@@ -157,8 +165,10 @@ impl Words {
 
     /// Whether the unit is another one than metres per ampere.
     fn has_other_unit(&self) -> bool {
-        const OTHERS: [&str; 13] = [
-            "um", "µm", "μm", "mm", "nm", "n", "mn", "v", "mv", "ma", "s2", "counts", "percent",
+        const OTHERS: [&str; 30] = [
+            "um", "µm", "μm", "micron", "microns", "mm", "nm", "inch", "mil", "mils", "n", "mn",
+            "newton", "newtons", "v", "mv", "volt", "volts", "ma", "s", "ms", "s2", "ms2", "rad",
+            "rads", "mrad", "urad", "ohm", "counts", "percent",
         ];
         self.0.len() > 1
             && self.0[1..]
@@ -237,6 +247,9 @@ impl<'a> Named<'a> {
 
     fn columns(&self) -> Result<Columns, FrfTableError> {
         let frequency = self.require(Role::Frequency, "frequency")?;
+        if let Some(sigma) = self.get(Role::MagnitudeSigma) {
+            self.check_sigma_unit(sigma)?;
+        }
         Ok(Columns {
             frequency: frequency.name.clone(),
             hz_per_unit: frequency.words.hz_per_unit(),
@@ -268,12 +281,24 @@ impl<'a> Named<'a> {
         })
     }
 
+    /// A standard deviation in dB or per cent is that of a ratio.
+    fn check_sigma_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
+        match column.words.scale() {
+            Scale::Decibels => Err(self.other_unit(column)),
+            Scale::Linear => self.check_unit(column),
+        }
+    }
+
+    fn other_unit(&self, column: &NamedColumn<'_>) -> FrfTableError {
+        FrfTableError::Unit {
+            path: self.table.path().to_owned(),
+            column: column.name.clone(),
+        }
+    }
+
     fn check_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
         if column.words.has_other_unit() {
-            return Err(FrfTableError::Unit {
-                path: self.table.path().to_owned(),
-                column: column.name.clone(),
-            });
+            return Err(self.other_unit(column));
         }
         Ok(())
     }

@@ -54,12 +54,22 @@ impl Numbers {
         };
         let mut defect = None;
         table.each_row(&names, |cells| {
+            if numbers.leaves_out_zero(table.number(&cells[0])?) {
+                return Ok(());
+            }
             let row = row(table, columns, cells)?;
             let found = numbers.push(row, cells, columns);
             defect = defect.take().or(found.err());
             Ok(())
         })?;
         defect.map_or(Ok(numbers), Err)
+    }
+
+    /// Leaves out a first line at 0 Hz, whose other cells may be no numbers: the logarithm of 0, or a coherence of 0/0.
+    fn leaves_out_zero(&mut self, frequency: f64) -> bool {
+        let is_left_out = frequency == 0.0 && self.rows.is_empty() && !self.without_zero;
+        self.without_zero |= is_left_out;
+        is_left_out
     }
 
     fn push(
@@ -69,10 +79,6 @@ impl Numbers {
         columns: &Columns,
     ) -> Result<(), FrfTableError> {
         let previous = self.rows.last().map_or(0.0, |last| last.frequency);
-        if row.frequency == 0.0 && self.rows.is_empty() && !self.without_zero {
-            self.without_zero = true;
-            return Ok(());
-        }
         if row.frequency <= previous {
             return Err(FrfTableError::NotRising {
                 path: self.path.clone(),

@@ -58,7 +58,7 @@ type RowOf = fn(f64, Complex<f64>) -> [f64; 3];
 
 #[test]
 fn units_are_those_of_the_names() {
-    let cases: [(&str, RowOf); 9] = [
+    let cases: [(&str, RowOf); 12] = [
         ("frequency_hz,magnitude_m_per_a,phase_deg", |hz, h| {
             [hz, h.norm(), h.arg().to_degrees()]
         }),
@@ -76,6 +76,16 @@ fn units_are_those_of_the_names() {
         ("imag,freq_hz,real", |hz, h| [h.im, hz, h.re]),
         ("freq_hz,Re(G) [m/A],Im(G) [m/A]", |hz, h| [hz, h.re, h.im]),
         ("f,gain,phase\nHz,m/A,rad", |hz, h| [hz, h.norm(), h.arg()]),
+        ("f [Hz],Magnitude (dB re 1 m/A),Phase [deg]", |hz, h| {
+            [hz, db(h), h.arg().to_degrees()]
+        }),
+        ("f [Hz],|G(f)| [dB],arg G(f) [deg]", |hz, h| {
+            [hz, db(h), h.arg().to_degrees()]
+        }),
+        (
+            "Frequency [Hz],Frequency response magnitude (m/A),Frequency response phase (deg)",
+            |hz, h| [hz, h.norm(), h.arg().to_degrees()],
+        ),
     ];
     for (names, row) in cases {
         let found = is_stage(of(table(&format!("{names}\n"), ",", row), None));
@@ -206,6 +216,21 @@ fn defects_are_refused_with_their_place() {
         ("a,b,c\n1,2,3\n2,3,4\n", "no column of the frequency"),
         ("f,b,c\n1,2,3\n2,3,4\n", "no column of the magnitude"),
         ("f_hz,mag_um_per_a,phase_deg\n1,2,3\n2,3,4\n", "not in m/A"),
+        ("f_hz,Mag (m/s/A),phase_deg\n1,2,3\n2,3,4\n", "not in m/A"),
+        ("f_hz,Mag (m/s^2/A),phase_deg\n1,2,3\n2,3,4\n", "not in m/A"),
+        ("f_hz,Mag (rad/A),phase_deg\n1,2,3\n2,3,4\n", "not in m/A"),
+        (
+            "f_hz,magnitude_angle_rad_per_current_a,phase_deg\n1,2,3\n2,3,4\n",
+            "not in m/A",
+        ),
+        (
+            "f_hz,mag,phase_deg,Mag std (dB)\n1,2,3,1\n2,3,4,1\n",
+            "`Mag std (dB)` is not in m/A",
+        ),
+        (
+            "f_hz,mag,phase_deg,sigma (%)\n1,2,3,1\n2,3,4,1\n",
+            "`sigma (%)` is not in m/A",
+        ),
         (
             "f_hz,magnitude_a_per_m,phase_deg\n1,2,3\n2,3,4\n",
             "not in m/A",
@@ -234,7 +259,11 @@ fn defects_are_refused_with_their_place() {
 
 #[test]
 fn line_at_zero_hertz_is_left_out() {
-    let text = table("f_hz,real,imag\n0,1,0\n", ",", |hz, h| [hz, h.re, h.im]);
-    let found = is_stage(of(text, None));
-    assert_eq!(found.assumptions, ["the line at 0 Hz is left out"]);
+    // Also one with the logarithm of 0.
+    for line in ["0,1,0", "0,-inf,nan"] {
+        let heading = format!("f_hz,real,imag\n{line}\n");
+        let text = table(&heading, ",", |hz, h| [hz, h.re, h.im]);
+        let found = is_stage(of(text, None));
+        assert_eq!(found.assumptions, ["the line at 0 Hz is left out"]);
+    }
 }
