@@ -159,7 +159,7 @@ fn rejects_invalid_data_with_line_and_column() {
         ),
         (
             gap,
-            &["line 40", "0.002000000 s after", "median step", "--rate"],
+            &["line 40", "0.002000000 s after", "usual step", "--rate"],
         ),
         (
             with_line(50, |line| format!("{line}\n{line}\n")),
@@ -169,7 +169,7 @@ fn rejects_invalid_data_with_line_and_column() {
             with_line(60, |_| "-1,1,1\n".into()),
             &["line 60", "-1 s", "not after"],
         ),
-        (lines[..2].join("\n"), &["1 lines of samples"]),
+        (lines[..2].join("\n"), &["only 1 line of samples"]),
         (
             lines[..1].join("\n"),
             &["no lines with numbers", "one sample per line"],

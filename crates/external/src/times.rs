@@ -27,6 +27,10 @@ const STEPS_IN_SECONDS: std::ops::Range<f64> = 1e-7..0.5;
 /// 64 times is 2 x 0.29/8 digits at the ends.
 const LINE_ERROR: f64 = 0.1;
 
+/// Steps that differ by less than this ratio are equal, apart from the few that rounding or a clock changes.
+const EQUAL_STEPS: f64 = 0.2;
+const MOST: f64 = 0.8;
+
 /// A unit of time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
@@ -378,14 +382,21 @@ impl Line {
     }
 }
 
-/// Refuses the step that differs most from the others, if it differs by more than half of them and the rounding of the times. Rounded
-/// steps are 0 or a digit, so that their median may be 0: they are compared with the mean as well.
+/// Refuses the step that differs most from the others, if it differs by more than half of them. Steps that rounding makes unequal, as 0
+/// or a digit, are compared with their mean, and may differ by a digit in addition.
 fn check_gaps(time_s: &[f64], digit_s: f64) -> Result<(), TimeDefect> {
     let steps_s: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mean_s = (time_s[time_s.len() - 1] - time_s[0]) / steps_s.len() as f64;
     let median_s = median(&steps_s);
-    let usual_s = if median_s > digit_s { median_s } else { mean_s };
-    let limit_s = MAX_IRREGULARITY * usual_s + digit_s;
+    let is_equal = |step_s: &&f64| (**step_s - median_s).abs() < EQUAL_STEPS * median_s;
+    let equal = steps_s.iter().filter(is_equal).count();
+    let are_equal = equal as f64 > MOST * steps_s.len() as f64;
+    let (usual_s, rounding_s) = if are_equal || digit_s < EQUAL_STEPS * median_s {
+        (median_s, 0.0)
+    } else {
+        let span_s = time_s[time_s.len() - 1] - time_s[0];
+        (span_s / steps_s.len() as f64, digit_s)
+    };
+    let limit_s = MAX_IRREGULARITY * usual_s + rounding_s;
     let difference_s = |k: &usize| (steps_s[*k] - usual_s).abs();
     let widest = (0..steps_s.len()).max_by(|a, b| difference_s(a).total_cmp(&difference_s(b)));
     match widest.filter(|k| difference_s(k) > limit_s) {
