@@ -172,8 +172,8 @@ pub fn from_str(text: &str) -> Result<Frf, FrfCsvError> {
     for record in reader.records() {
         let record = record.map_err(|error| not_a_table(&error))?;
         let numbers = finite_numbers(&record)?;
-        check_values(&record, numbers)?;
         push_row(numbers, &mut frf).ok_or_else(|| invalid_row(&record))?;
+        check_values(&record, numbers)?;
     }
     Ok(frf)
 }
