@@ -169,7 +169,10 @@ fn rejects_invalid_data_with_line_and_column() {
             with_line(60, |_| "-1,1,1\n".into()),
             &["line 60", "-1 s", "not after"],
         ),
-        (lines[..2].join("\n"), &["only 1 line of samples"]),
+        (
+            lines[..2].join("\n"),
+            &["fewer than two lines of samples (1)"],
+        ),
         (
             lines[..1].join("\n"),
             &["no lines with numbers", "one sample per line"],

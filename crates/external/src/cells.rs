@@ -73,7 +73,7 @@ impl Format {
     /// The number in a cell; not necessarily finite.
     pub fn number(&self, cell: &str) -> Option<f64> {
         if self.decimal_comma && cell.contains(',') {
-            // Points separate thousands here, or the cell is no number: both are refused. So is a second comma, by `parse`.
+            // A point beside the decimal comma may separate thousands: it is refused, not guessed. A second comma does not parse.
             if cell.contains('.') {
                 return None;
             }

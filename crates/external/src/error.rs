@@ -150,7 +150,7 @@ pub enum DataError {
     },
     /// Too few times for a rate.
     #[error(
-        "{path} has only {lines} line of samples, a rate needs at least 2 and an estimate 64; record for longer",
+        "{path} has fewer than two lines of samples ({lines}), and an estimate needs 64; record for longer",
         path = .path.display()
     )]
     TooFewLines {

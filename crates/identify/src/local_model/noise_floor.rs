@@ -13,7 +13,7 @@ const WIDTH_RATIO: f64 = 2.0;
 /// Residuals are fitted again from this ratio of the output's power on: 1 % of its amplitude.
 const MIN_RELATIVE_POWER: f64 = 1e-4;
 /// Residuals this much above the median of those around them are fitted again. Noise with the 12 degrees of freedom of a window exceeds
-/// it with a probability below 1e-15.
+/// it with a probability below 1e-13, also where the median is 20 % too small.
 const OUTLIER_RATIO: f64 = 10.0;
 /// Number of residuals to either side that an outlier is compared with. A pair of modes raises those of two neighbours.
 const COMPARED: usize = 6;
