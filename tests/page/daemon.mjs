@@ -46,9 +46,13 @@ export class Daemon {
     this.folder = mkdtempSync(join(tmpdir(), "bench-page-"));
   }
 
-  /** Starts the daemon; the first time at a free port, later at the same one. A busy machine misses ticks: neither they nor the motion that follows them trip. */
+  /**
+   * Starts the daemon; the first time at a free port, later at the same one. A busy machine misses ticks and delays threads for seconds:
+   * neither missed ticks, nor the motion that follows them, nor a late renewal end a run.
+   */
   async start() {
-    const settings = ["--set", "interlock.overruns_per_s=1000000", "--set", "interlock.model_error_off=a busy machine misses ticks"];
+    const changes = ["interlock.overruns_per_s=1000000", "interlock.model_error_off=a busy machine misses ticks", "loop.arm_lease_s=60"];
+    const settings = changes.flatMap((change) => ["--set", change]);
     this.process = spawn(PROGRAM, ["serve", "--listen", `127.0.0.1:${this.port ?? 0}`, "--out", "recordings", ...settings], {
       cwd: this.folder, env: { ...process.env, BENCH_SOCKET: join(this.folder, "bench.sock") }, stdio: ["ignore", "pipe", "inherit"],
     });
