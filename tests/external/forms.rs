@@ -90,11 +90,11 @@ fn names_the_format_of_another_program() {
     for (name, start, word) in [
         (
             "a.mat",
-            b"MATLAB 5.0 MAT-file, Platform: GLNXA64".as_slice(),
-            "MATLAB",
+            b"MATLAB 7.3 MAT-file, Platform: GLNXA64".as_slice(),
+            "'-v7'",
         ),
         ("a.parquet", b"PAR1\x15\x04".as_slice(), "Parquet"),
-        ("a.npz", b"PK\x03\x04".as_slice(), "zip"),
+        ("a.xlsx", b"PK\x03\x04".as_slice(), "zip"),
         ("a.h5", b"\x89HDF\r\n\x1a\n".as_slice(), "HDF5"),
     ] {
         let bench = Bench::new();

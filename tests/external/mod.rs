@@ -1,5 +1,6 @@
-//! External records: a CSV with named columns, periodic or not, in any units.
+//! External records: a CSV with named columns or a file of arrays, periodic or not, in any units.
 
+mod arrays;
 mod distortion;
 mod existing_results;
 mod forms;

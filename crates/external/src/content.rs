@@ -1,25 +1,31 @@
-//! What a file contains: text, whatever its encoding. Other contents are named and refused.
+//! What a file contains: text, whatever its encoding, or arrays. Other contents are named and refused.
 
 use std::io::Read;
 
+use bench_arrays::Format;
 use bench_base::input_file::MAX_RECORD_BYTES;
 
-/// A format that is no table of text.
+/// The content of a file, unpacked.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Content {
+    /// Text.
+    Text(String),
+    /// The bytes of a file of arrays.
+    Arrays(Format, Vec<u8>),
+}
+
+/// A format that is not read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForeignFormat {
-    /// MAT-file of version 5 to 7.
-    Mat5,
+    /// Arrays, where only a table of text is read.
+    Arrays(Format),
     /// HDF5, which is also the format of a MAT-file of version 7.3.
     Hdf5,
     /// Parquet.
     Parquet,
-    /// A zip archive: NPZ, a workbook, or an archive of other files.
+    /// A zip archive that is no NPZ file: a workbook, or an archive of other files.
     Zip,
-    /// One NumPy array.
-    Npy,
-    /// Universal file format.
-    Universal,
     /// TDMS of LabVIEW.
     Tdms,
     /// MCAP, the format of the recordings of this program.
@@ -35,35 +41,26 @@ pub enum ForeignFormat {
 impl ForeignFormat {
     /// The format by the first bytes of a file; `None` for text.
     fn of(bytes: &[u8]) -> Option<ForeignFormat> {
-        const MARKS: [(&[u8], ForeignFormat); 8] = [
-            (b"MATLAB 5.0", ForeignFormat::Mat5),
+        const MARKS: [(&[u8], ForeignFormat); 6] = [
             (b"MATLAB 7.3", ForeignFormat::Hdf5),
             (b"\x89HDF", ForeignFormat::Hdf5),
             (b"PAR1", ForeignFormat::Parquet),
             (b"PK\x03\x04", ForeignFormat::Zip),
-            (b"\x93NUMPY", ForeignFormat::Npy),
             (b"TDSm", ForeignFormat::Tdms),
             (b"\x89MCAP0\r\n", ForeignFormat::Mcap),
         ];
         let marked = MARKS.iter().find(|(mark, _)| bytes.starts_with(mark));
         let format = marked.map(|(_, format)| *format);
-        // A universal file begins with a line of -1 alone.
-        let first = bytes.split(|byte| b"\r\n".contains(byte)).next();
-        let universal =
-            first.is_some_and(|line| line.starts_with(b" ") && line.trim_ascii() == b"-1");
-        let format = format.or(universal.then_some(ForeignFormat::Universal));
         format.or_else(|| bytes.contains(&0).then_some(ForeignFormat::Binary))
     }
 
     /// What it is, for a message.
     pub fn name(self) -> &'static str {
         match self {
-            ForeignFormat::Mat5 => "a MATLAB file",
+            ForeignFormat::Arrays(format) => format.name(),
             ForeignFormat::Hdf5 => "an HDF5 or MATLAB 7.3 file",
             ForeignFormat::Parquet => "a Parquet file",
-            ForeignFormat::Zip => "a zip archive, such as an NPZ file or a workbook",
-            ForeignFormat::Npy => "a NumPy file",
-            ForeignFormat::Universal => "a universal file",
+            ForeignFormat::Zip => "a zip archive, such as a workbook",
             ForeignFormat::Tdms => "a TDMS file of LabVIEW",
             ForeignFormat::Mcap => "a recording (MCAP)",
             ForeignFormat::DamagedGzip => "a damaged or incomplete gzip file",
@@ -75,21 +72,16 @@ impl ForeignFormat {
     /// How to get a table of text from it.
     pub fn remedy(self) -> &'static str {
         match self {
-            ForeignFormat::Mat5 => {
-                "write the columns as CSV, in MATLAB: writetable(table(t, u, y), 'record.csv')"
+            ForeignFormat::Arrays(_) => {
+                "write it as CSV, in Python: numpy.savetxt('response.csv', columns, delimiter=',', header='frequency_hz,real,imag', comments='')"
             }
             ForeignFormat::Hdf5 => {
-                "write the columns as CSV, in MATLAB: writetable(table(t, u, y), 'record.csv'), or in Python with h5py and numpy.savetxt"
+                "save it in MATLAB with save('record.mat', 't', 'u', 'y', '-v7'), or write the columns as CSV, in Python with h5py and numpy.savetxt"
             }
             ForeignFormat::Parquet => {
                 "write it as CSV, in Python: pandas.read_parquet(FILE).to_csv('record.csv', index=False)"
             }
-            ForeignFormat::Zip | ForeignFormat::Npy => {
-                "write the columns as CSV, in Python: numpy.savetxt('record.csv', columns, delimiter=',', header='t,u,y', comments='')"
-            }
-            ForeignFormat::Universal => {
-                "write the signals as CSV, for example in Python with pyuff and numpy.savetxt"
-            }
+            ForeignFormat::Zip => "unpack it, or export the sheet as CSV",
             ForeignFormat::Tdms => "export the channels as text or CSV",
             ForeignFormat::Mcap => {
                 "leave out --input and --output: a recording has its own channels"
@@ -101,24 +93,29 @@ impl ForeignFormat {
     }
 }
 
-/// The text of a file.
-///
-/// # Errors
-/// The format of a file that is no text.
-pub(crate) fn text(bytes: Vec<u8>) -> Result<String, ForeignFormat> {
-    let bytes = unpacked(bytes)?;
-    if let Some(text) = utf16(&bytes) {
-        return Ok(text);
+impl Content {
+    /// The content of a file.
+    ///
+    /// # Errors
+    /// The format of a file that is not read.
+    pub fn of(bytes: Vec<u8>) -> Result<Content, ForeignFormat> {
+        let bytes = unpacked(bytes)?;
+        if let Some(text) = utf16(&bytes) {
+            return Ok(Content::Text(text));
+        }
+        if let Some(format) = Format::of(&bytes) {
+            return Ok(Content::Arrays(format, bytes));
+        }
+        if let Some(format) = ForeignFormat::of(&bytes) {
+            return Err(format);
+        }
+        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
+        Ok(Content::Text(match std::str::from_utf8(text) {
+            Ok(text) => text.into(),
+            // Latin-1, in which every byte is a character.
+            Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
+        }))
     }
-    if let Some(format) = ForeignFormat::of(&bytes) {
-        return Err(format);
-    }
-    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
-    Ok(match std::str::from_utf8(text) {
-        Ok(text) => text.into(),
-        // Latin-1, in which every byte is a character.
-        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
-    })
 }
 
 /// The bytes in a gzip file; other bytes as they are.
@@ -181,35 +178,52 @@ mod tests {
             utf16(u16::to_be_bytes),
             packed.finish().unwrap(),
         ] {
-            assert_eq!(text(bytes.clone()).as_deref(), Ok(plain), "{bytes:?}");
+            assert_eq!(
+                Content::of(bytes.clone()),
+                Ok(Content::Text(plain.into())),
+                "{bytes:?}"
+            );
         }
     }
 
     #[test]
     fn other_formats_are_named() {
         for (bytes, format) in [
+            (&b"\x89HDF\r\n\x1a\n"[..], ForeignFormat::Hdf5),
             (
-                &b"MATLAB 5.0 MAT-file, Platform: GLNXA64"[..],
-                ForeignFormat::Mat5,
+                b"MATLAB 7.3 MAT-file, Platform: GLNXA64",
+                ForeignFormat::Hdf5,
             ),
-            (b"\x89HDF\r\n\x1a\n", ForeignFormat::Hdf5),
             (b"PAR1\x15\x04", ForeignFormat::Parquet),
             (b"PK\x03\x04\x14", ForeignFormat::Zip),
-            (b"\x93NUMPY\x01\0", ForeignFormat::Npy),
-            (b"    -1\n    58\n", ForeignFormat::Universal),
-            (b"    -1  \r\n   151\r\n", ForeignFormat::Universal),
             (b"TDSm\x0e", ForeignFormat::Tdms),
             (b"\x89MCAP0\r\n", ForeignFormat::Mcap),
             (b"t,u\n\0\0\0", ForeignFormat::Binary),
             (b"\x1f\x8bdamaged\0", ForeignFormat::DamagedGzip),
         ] {
-            assert_eq!(text(bytes.to_vec()), Err(format), "{bytes:?}");
+            assert_eq!(Content::of(bytes.to_vec()), Err(format), "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn files_of_arrays_are_recognised() {
+        for (bytes, format) in [
+            (&b"MATLAB 5.0 MAT-file, Platform: GLNXA64"[..], Format::Mat),
+            (b"\x93NUMPY\x01\0", Format::Npy),
+            (b"    -1\n    58\n", Format::Universal),
+            (b"    -1  \r\n   151\r\n", Format::Universal),
+        ] {
+            let expected = Content::Arrays(format, bytes.to_vec());
+            assert_eq!(Content::of(bytes.to_vec()), Ok(expected));
         }
     }
 
     #[test]
     fn samples_that_begin_with_minus_one_are_text() {
         let samples = "    -1   0.5   2e-6\n     0   0.5   2e-6\n";
-        assert_eq!(text(samples.into()), Ok(samples.into()));
+        assert_eq!(
+            Content::of(samples.into()),
+            Ok(Content::Text(samples.into()))
+        );
     }
 }

@@ -1,7 +1,9 @@
 //! Why an external record cannot be read.
 
+use std::fmt;
 use std::path::PathBuf;
 
+use bench_arrays::ArraysError;
 use thiserror::Error;
 
 use super::content::ForeignFormat;
@@ -19,6 +21,31 @@ pub enum ExternalCsvError {
     /// The file is not a table of numbers with regular times.
     #[error(transparent)]
     Data(#[from] DataError),
+}
+
+/// Where a number stands, counted from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A line of a text.
+    Line(u64),
+    /// A number of an array.
+    Sample(u64),
+}
+
+impl Place {
+    fn noun(self) -> &'static str {
+        match self {
+            Place::Line(_) => "line",
+            Place::Sample(_) => "sample",
+        }
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (Place::Line(number) | Place::Sample(number)) = self;
+        write!(f, "{} {number}", self.noun())
+    }
 }
 
 /// Why columns cannot be selected.
@@ -69,6 +96,39 @@ pub enum ColumnsError {
         /// Number of columns.
         columns: usize,
     },
+    /// A variable that is no column of real numbers.
+    #[error(
+        "`{name}` in {path} is {what}, not a column of real numbers; choose one of {}",
+        .available.join(", "),
+        path = .path.display()
+    )]
+    NoColumn {
+        /// The file.
+        path: PathBuf,
+        /// Name of the variable.
+        name: String,
+        /// What it is.
+        what: String,
+        /// Names of the columns of the file.
+        available: Vec<String>,
+    },
+    /// Arrays of different lengths.
+    #[error(
+        "{path}: `{first}` has {first_length} numbers and `{second}` has {second_length}; give arrays of the same length, one number per sample",
+        path = .path.display()
+    )]
+    OtherLength {
+        /// The file.
+        path: PathBuf,
+        /// A column.
+        first: String,
+        /// How many numbers it has.
+        first_length: usize,
+        /// Another column.
+        second: String,
+        /// How many numbers it has.
+        second_length: usize,
+    },
 }
 
 /// Why a file is not a table of numbers with regular times. Lines are those of the file, from 1.
@@ -82,6 +142,22 @@ pub enum DataError {
         path: PathBuf,
         /// Its format.
         format: ForeignFormat,
+    },
+    /// The arrays of the file cannot be read.
+    #[error("{path}: {why}; save it again, only with the variables of the record, or write them as CSV", path = .path.display())]
+    Arrays {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        why: ArraysError,
+    },
+    /// A file of arrays without one that is a column.
+    #[error("{path} has no arrays of several numbers{}; save the signals as arrays of numbers", in_brackets(.found), path = .path.display())]
+    NoArrays {
+        /// The file.
+        path: PathBuf,
+        /// What it has, as in `c is a cell array`.
+        found: Vec<String>,
     },
     /// No line has two numbers.
     #[error(
@@ -109,7 +185,7 @@ pub enum DataError {
     /// The text is not a table.
     #[error(
         "{path}{}: {reason}; repair the file: a record is a table with one sample per line",
-        place(*.line),
+        after_path(*.line),
         path = .path.display()
     )]
     Table {
@@ -134,15 +210,15 @@ pub enum DataError {
     },
     /// A cell is not a finite number.
     #[error(
-        "{path}, line {line}: {text:?} in column `{column}` {}",
+        "{path}, {place}: {text:?} in column `{column}` {}",
         number_remedy(.text),
         path = .path.display()
     )]
     Cell {
         /// The file.
         path: PathBuf,
-        /// The line.
-        line: u64,
+        /// Its place.
+        place: Place,
         /// Name of the column.
         column: String,
         /// Text of the cell.
@@ -161,43 +237,53 @@ pub enum DataError {
     },
     /// A time is not after the one before.
     #[error(
-        "{path}, line {line}: the time {time_s} s in column `{column}` is not after \
-         the previous time of {previous_s} s; sort the lines, or cut the file there",
+        "{path}, {place}: the time {time_s} s in column `{column}` is not after \
+         the previous time of {previous_s} s; sort the {}s, or cut the file there",
+        .place.noun(),
         path = .path.display()
     )]
     NotRising {
         /// The file.
         path: PathBuf,
-        /// The line.
-        line: u64,
+        /// Its place.
+        place: Place,
         /// Name of the column of times.
         column: String,
         /// The time.
         time_s: f64,
-        /// The time of the line before.
+        /// The time before it.
         previous_s: f64,
     },
     /// A time step differs from the others.
     #[error(
-        "{path}, line {line}: {step_s:.9} s after the line before, where the usual step is {usual_s:.9} s; \
+        "{path}, {place}: {step_s:.9} s after the {} before, where the usual step is {usual_s:.9} s; \
          fill the gap, cut the file there, or give --rate in place of --time if only the times are inaccurate",
+        .place.noun(),
         path = .path.display()
     )]
     Irregular {
         /// The file.
         path: PathBuf,
-        /// The line.
-        line: u64,
-        /// Time since the line before.
+        /// Its place.
+        place: Place,
+        /// Time since the one before.
         step_s: f64,
-        /// Usual time between lines.
+        /// Usual time between two.
         usual_s: f64,
     },
 }
 
 /// The line after the name of the file, if it is known.
-fn place(line: Option<u64>) -> String {
+fn after_path(line: Option<u64>) -> String {
     line.map_or_else(String::new, |line| format!(", line {line}"))
+}
+
+/// The contents of a file, for a message.
+fn in_brackets(contents: &[String]) -> String {
+    if contents.is_empty() {
+        return String::new();
+    }
+    format!(" ({})", contents.join(", "))
 }
 
 /// What is wrong with a cell that is not a finite number.
@@ -239,14 +325,17 @@ mod tests {
         let error = error_of("0,1,2\n1,1,off\n");
         let ExternalCsvError::Data(DataError::Cell {
             path,
-            line,
+            place,
             column,
             text,
         }) = &error
         else {
             panic!("{error:?}");
         };
-        assert_eq!((path.as_path(), *line), (Path::new("data.csv"), 3));
+        assert_eq!(
+            (path.as_path(), *place),
+            (Path::new("data.csv"), Place::Line(3))
+        );
         assert_eq!((column.as_str(), text.as_str()), ("y", "off"));
         assert_eq!(
             error.to_string(),
@@ -281,7 +370,7 @@ mod tests {
     fn error_of_an_irregular_time_holds_line_and_steps() {
         let error = error_of("0,1,2\n1,1,2\n2,1,2\n4.5,1,2\n");
         let ExternalCsvError::Data(DataError::Irregular {
-            line,
+            place,
             step_s,
             usual_s,
             ..
@@ -289,14 +378,14 @@ mod tests {
         else {
             panic!("{error:?}");
         };
-        assert_eq!((line, step_s, usual_s), (5, 2.5, 1.0));
+        assert_eq!((place, step_s, usual_s), (Place::Line(5), 2.5, 1.0));
     }
 
     #[test]
     fn error_of_a_time_that_does_not_rise_holds_both_times() {
         let error = error_of("0,1,2\n1,1,2\n0.5,1,2\n");
         let ExternalCsvError::Data(DataError::NotRising {
-            line,
+            place,
             time_s,
             previous_s,
             ..
@@ -304,7 +393,7 @@ mod tests {
         else {
             panic!("{error:?}");
         };
-        assert_eq!((line, time_s, previous_s), (4, 0.5, 1.0));
+        assert_eq!((place, time_s, previous_s), (Place::Line(4), 0.5, 1.0));
     }
 
     #[test]

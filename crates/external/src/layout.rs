@@ -148,7 +148,7 @@ impl Pattern {
 /// Which cells of a line are numbers or stamps of time.
 fn numeric_cells(format: Format, line: &str) -> Vec<bool> {
     let cells = format.cells(line);
-    let is_numeric = |cell: &str| format.number(cell).is_some() || super::times::is_stamp(cell);
+    let is_numeric = |cell: &str| format.number(cell).is_some() || super::stamp::is_stamp(cell);
     cells.iter().map(|cell| is_numeric(cell)).collect()
 }
 

@@ -1,24 +1,29 @@
-//! Records and frequency responses ([`frf`]) of other programs: tables of text, one sample or frequency per line.
+//! Records and frequency responses ([`frf`]) of other programs: tables of text, one sample or frequency per line, and arrays.
 //!
 //! ```text
-//! file -> content (gzip, UTF-8, UTF-16, Latin-1; other formats are named) -> layout (preamble, names, units, separator)
-//!      -> table (numbers of the selected columns) -> times (unit, regular or not) -> signals
+//! file -> content (gzip, UTF-8, UTF-16, Latin-1; other formats are named)
+//!      -> text: layout (preamble, names, units, separator) -> table (numbers of the selected columns) ---> times (unit, regular or not)
+//!      -> arrays (MAT-file, NPZ, NPY, universal file) -> series of the selected names ------------------/      -> signals
 //! ```
 //!
 //! Input and output may have any units: the [`Signals`] have them as well, and a residue is output per input per second squared.
 
 #![deny(unsafe_code)]
 
+mod array_table;
 mod cells;
 mod content;
 mod error;
 pub mod frf;
 mod layout;
+mod open;
+mod source;
+mod stamp;
 mod table;
 mod times;
 
 pub use content::ForeignFormat;
-pub use error::{ColumnsError, DataError, ExternalCsvError};
+pub use error::{ColumnsError, DataError, ExternalCsvError, Place};
 pub use times::{TimeBase, TimeUnit};
 
 use std::path::Path;
@@ -26,7 +31,7 @@ use std::path::Path;
 use bench_identify::Signals;
 use bench_identify::resampling::Readings;
 
-use table::Table;
+use source::Source;
 use times::Times;
 
 /// The columns of a record.
@@ -68,13 +73,13 @@ pub struct Record {
 /// Reads two columns as a record.
 ///
 /// # Errors
-/// When the file is not a table, lacks a column, holds something else than numbers, or when its times are not known: see
+/// When the file is no table and has no arrays, lacks a column, holds something else than numbers, or when its times are not known: see
 /// [`ExternalCsvError`]. Use [`Signals::check`] to check that an estimator can process the signals.
 pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> {
-    let table = Table::open(path)?;
+    let source = Source::open(path)?;
     match &columns.sampling {
         Sampling::RateHz(rate_hz) => {
-            let [input, output] = table.numbers([&columns.input, &columns.output])?;
+            let [input, output] = source.numbers([&columns.input, &columns.output])?;
             Ok(Record {
                 signals: Signals {
                     rate_hz: *rate_hz,
@@ -87,7 +92,7 @@ pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> 
         }
         Sampling::TimeColumn { name, unit } => {
             let names = [&columns.input, &columns.output];
-            let (signals, times) = table.numbers_and_times(names, name, *unit)?;
+            let (signals, times) = source.numbers_and_times(names, name, *unit)?;
             let [input, output] = signals.map(|values| at_regular_times(values, &times));
             Ok(Record {
                 signals: Signals {
@@ -118,7 +123,27 @@ fn at_regular_times(values: Vec<f64>, times: &Times) -> Vec<f64> {
 /// The names of the columns of a file; their numbers from 1 if it has none.
 ///
 /// # Errors
-/// When the file cannot be read, or is not a table.
+/// When the file cannot be read, is not a table, and has no arrays.
 pub fn names(path: &Path) -> Result<Vec<String>, ExternalCsvError> {
-    Ok(Table::open(path)?.names().to_vec())
+    Ok(Source::open(path)?.names())
+}
+
+/// The names of the columns of a file as text, with the single numbers of a file of arrays, one of which may be the rate:
+/// `t, u, y; single numbers: fs = 1000`.
+///
+/// # Errors
+/// Those of [`names`].
+pub fn listing(path: &Path) -> Result<String, ExternalCsvError> {
+    let source = Source::open(path)?;
+    let names = source.names().join(", ");
+    let numbers: Vec<String> = source
+        .scalars()
+        .iter()
+        .map(|(name, number)| format!("{name} = {number}"))
+        .collect();
+    Ok(if numbers.is_empty() {
+        names
+    } else {
+        format!("{names}; single numbers: {}", numbers.join(", "))
+    })
 }

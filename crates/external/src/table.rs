@@ -3,11 +3,12 @@
 use std::path::Path;
 
 use super::cells::{Format, Separator};
-use super::content;
-use super::error::{ColumnsError, DataError, ExternalCsvError};
+use super::content::{Content, ForeignFormat};
+use super::error::{ColumnsError, DataError, ExternalCsvError, Place};
 use super::layout::{Layout, NoLayout, is_skipped};
-use super::times::{Stamp, TimeDefect, TimeUnit, Times};
-use bench_base::input_file::{self, MAX_RECORD_BYTES};
+use super::open;
+use super::stamp::Stamp;
+use super::times::{TimeUnit, Times};
 
 /// A text with its layout.
 pub(crate) struct Table<'a> {
@@ -25,13 +26,14 @@ pub(crate) struct Cell<'a> {
 
 impl<'a> Table<'a> {
     pub fn open(path: &'a Path) -> Result<Table<'a>, ExternalCsvError> {
-        let bytes = input_file::read(path, MAX_RECORD_BYTES);
-        let bytes = bytes.map_err(|source| ExternalCsvError::File(path.to_owned(), source))?;
-        let text = content::text(bytes).map_err(|format| DataError::Foreign {
-            path: path.to_owned(),
-            format,
-        })?;
-        Table::of(path, text)
+        match open::content(path)? {
+            Content::Text(text) => Table::of(path, text),
+            Content::Arrays(format, _) => Err(DataError::Foreign {
+                path: path.to_owned(),
+                format: ForeignFormat::Arrays(format),
+            }
+            .into()),
+        }
     }
 
     /// A table of text that was read from a file.
@@ -89,12 +91,12 @@ impl<'a> Table<'a> {
                 column.push(self.number(cell)?);
             }
             stamps.push(self.stamp(last)?);
-            places.push(last.line);
+            places.push(Place::Line(last.line));
             Ok(())
         })?;
         let unit = unit.or_else(|| self.unit_of(time));
         let times = Times::new(&stamps, unit);
-        let times = times.map_err(|defect| self.time_error(defect, time, &places));
+        let times = times.map_err(|defect| defect.in_file(self.path, time, &places));
         Ok((numbers, times?))
     }
 
@@ -189,45 +191,9 @@ impl<'a> Table<'a> {
     fn cell_error(&self, cell: &Cell<'_>) -> DataError {
         DataError::Cell {
             path: self.path.to_owned(),
-            line: cell.line,
+            place: Place::Line(cell.line),
             column: cell.column.into(),
             text: cell.text.into(),
-        }
-    }
-
-    fn time_error(&self, defect: TimeDefect, column: &str, lines: &[u64]) -> DataError {
-        let path = self.path.to_owned();
-        match defect {
-            TimeDefect::TooFew => DataError::TooFewLines {
-                path,
-                lines: lines.len(),
-            },
-            TimeDefect::NoUnit { step } => DataError::NoTimeUnit {
-                path,
-                column: column.into(),
-                step,
-            },
-            TimeDefect::NotRising {
-                at,
-                time_s,
-                previous_s,
-            } => DataError::NotRising {
-                path,
-                line: lines[at],
-                column: column.into(),
-                time_s,
-                previous_s,
-            },
-            TimeDefect::Gap {
-                at,
-                step_s,
-                usual_s,
-            } => DataError::Irregular {
-                path,
-                line: lines[at],
-                step_s,
-                usual_s,
-            },
         }
     }
 }

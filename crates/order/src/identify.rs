@@ -272,5 +272,5 @@ fn period_samples(text: &str, rate_hz: f64) -> Option<usize> {
 }
 
 fn names(path: &Path) -> Result<String, ExternalCsvError> {
-    Ok(bench_external::names(path)?.join(", "))
+    bench_external::listing(path)
 }
