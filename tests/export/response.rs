@@ -71,6 +71,40 @@ fn response_is_read_back_by_scipy_pandas_pyuff_and_python_control() {
 }
 
 #[test]
+fn exported_responses_are_read_back_as_they_were() {
+    let bench = recorded_chirp();
+    let frf = response(&bench);
+    // A universal file has 13 digits of each ordinate, and at least 9 of a frequency.
+    for (format, file, tolerance, of_frequency) in [
+        ("mat", "run_frf.mat", 1e-12, 1e-14),
+        ("uff58", "run_frf.uff", 1e-12, 1e-9),
+    ] {
+        bench.json(&format!("export run.mcap --frf --format {format}"));
+        let found = bench_external::frf::read(&bench.path(file), None).expect("a response");
+        assert!(found.assumptions.is_empty(), "{:?}", found.assumptions);
+        assert_eq!(found.frf.len(), frf.len());
+        for k in 0..frf.len() {
+            let frequency = found.frf.frequency_hz[k] / frf.frequency_hz[k];
+            assert!(
+                (frequency - 1.0).abs() < of_frequency,
+                "{format}: {frequency}"
+            );
+            let response = (found.frf.response[k] - frf.response[k]).norm();
+            assert!(
+                response < tolerance * frf.response[k].norm(),
+                "{format}: {response}"
+            );
+            if format == "mat" {
+                let sigma = found.frf.magnitude_sigma[k] / frf.magnitude_sigma[k];
+                assert!((sigma - 1.0).abs() < 1e-12, "{sigma}");
+                assert_eq!(found.frf.coherence[k], frf.coherence[k]);
+                assert_eq!(found.frf.resolution_hz[k], frf.resolution_hz[k]);
+            }
+        }
+    }
+}
+
+#[test]
 #[cfg(not(feature = "parquet"))]
 fn rejects_parquet_without_the_feature() {
     let bench = short_recording();

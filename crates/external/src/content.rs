@@ -18,8 +18,6 @@ pub(crate) enum Content {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForeignFormat {
-    /// Arrays, where only a table of text is read.
-    Arrays(Format),
     /// HDF5, which is also the format of a MAT-file of version 7.3.
     Hdf5,
     /// Parquet.
@@ -57,7 +55,6 @@ impl ForeignFormat {
     /// What it is, for a message.
     pub fn name(self) -> &'static str {
         match self {
-            ForeignFormat::Arrays(format) => format.name(),
             ForeignFormat::Hdf5 => "an HDF5 or MATLAB 7.3 file",
             ForeignFormat::Parquet => "a Parquet file",
             ForeignFormat::Zip => "a zip archive, such as a workbook",
@@ -72,9 +69,6 @@ impl ForeignFormat {
     /// How to get a table of text from it.
     pub fn remedy(self) -> &'static str {
         match self {
-            ForeignFormat::Arrays(_) => {
-                "write it as CSV, in Python: numpy.savetxt('response.csv', columns, delimiter=',', header='frequency_hz,real,imag', comments='')"
-            }
             ForeignFormat::Hdf5 => {
                 "save it in MATLAB with save('record.mat', 't', 'u', 'y', '-v7'), or write the columns as CSV, in Python with h5py and numpy.savetxt"
             }

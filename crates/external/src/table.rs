@@ -3,10 +3,8 @@
 use std::path::Path;
 
 use super::cells::{Format, Separator};
-use super::content::{Content, ForeignFormat};
 use super::error::{ColumnsError, DataError, ExternalCsvError, Place};
 use super::layout::{Layout, NoLayout, is_skipped};
-use super::open;
 use super::stamp::Stamp;
 use super::times::{TimeUnit, Times};
 
@@ -25,17 +23,6 @@ pub(crate) struct Cell<'a> {
 }
 
 impl<'a> Table<'a> {
-    pub fn open(path: &'a Path) -> Result<Table<'a>, ExternalCsvError> {
-        match open::content(path)? {
-            Content::Text(text) => Table::of(path, text),
-            Content::Arrays(format, _) => Err(DataError::Foreign {
-                path: path.to_owned(),
-                format: ForeignFormat::Arrays(format),
-            }
-            .into()),
-        }
-    }
-
     /// A table of text that was read from a file.
     pub fn of(path: &'a Path, text: String) -> Result<Table<'a>, ExternalCsvError> {
         let layout = Layout::of(&lines(&text)).map_err(|why| no_layout(path, &why))?;

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::error::FrfTableError;
-use crate::table::Table;
+use super::table::FrfTable;
 
 /// Unit of phases.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -180,7 +180,7 @@ impl Words {
 
 impl Columns {
     /// The columns of a table by their names; three columns without names are a frequency and two of the response.
-    pub fn of(table: &Table<'_>) -> Result<Columns, FrfTableError> {
+    pub fn of(table: &FrfTable<'_>) -> Result<Columns, FrfTableError> {
         if let ([frequency, first, second], false) = (table.names(), table.has_names()) {
             return Ok(Columns {
                 frequency: frequency.clone(),
@@ -203,12 +203,12 @@ struct NamedColumn<'a> {
 }
 
 struct Named<'a> {
-    table: &'a Table<'a>,
+    table: &'a FrfTable<'a>,
     columns: Vec<NamedColumn<'a>>,
 }
 
 impl<'a> Named<'a> {
-    fn of(table: &'a Table<'_>) -> Result<Named<'a>, FrfTableError> {
+    fn of(table: &'a FrfTable<'_>) -> Result<Named<'a>, FrfTableError> {
         let columns = table.names().iter().enumerate().map(|(index, name)| {
             let words = Words::of(name, table.unit(index));
             let role = words.role();

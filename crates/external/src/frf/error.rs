@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use bench_identify::frf_value::ValueDefect;
 use thiserror::Error;
 
-use crate::error::ExternalCsvError;
+use crate::error::{ExternalCsvError, Place};
 
 /// A valid line of names, for messages.
 const EXAMPLE: &str = "frequency_hz,magnitude_m_per_a,phase_deg";
@@ -66,12 +66,12 @@ pub enum FrfTableError {
         largest: f64,
     },
     /// A frequency that is not above the one before.
-    #[error("{path}, line {line}: {value} in column `{column}` is not a frequency above the one before ({previous}); sort the lines by frequency", path = .path.display())]
+    #[error("{path}, {place}: {value} in column `{column}` is not a frequency above the one before ({previous}); sort them by frequency", path = .path.display())]
     NotRising {
         /// The file.
         path: PathBuf,
-        /// The line.
-        line: u64,
+        /// Its place.
+        place: Place,
         /// The column.
         column: String,
         /// The frequency in the unit of the file.
@@ -80,18 +80,42 @@ pub enum FrfTableError {
         previous: f64,
     },
     /// A number that no measurement has.
-    #[error("{path}, line {line}, column `{column}`: {value} {defect}", path = .path.display())]
+    #[error("{path}, {place}, column `{column}`: {value} {defect}", path = .path.display())]
     Value {
         /// The file.
         path: PathBuf,
-        /// The line.
-        line: u64,
+        /// Its place.
+        place: Place,
         /// The column.
         column: String,
         /// The value.
         value: f64,
         /// What is wrong, with the remedy.
         defect: ValueDefect,
+    },
+    /// The unit of the frequencies of a file of arrays is not known.
+    #[error("{path}: {place} states {}, not Hz or rad/s; state the unit, or save the frequencies as `frequency_hz` or `frequency_rad_s` and the complex response as `response`", stated(.unit), path = .path.display())]
+    FrequencyUnit {
+        /// The file.
+        path: PathBuf,
+        /// Where it would stand.
+        place: String,
+        /// What stands there.
+        unit: String,
+    },
+    /// A universal file without a frequency response.
+    #[error("{path} has no frequency response (dataset 58 of function type 4); export the response from current to displacement", path = .path.display())]
+    NoResponse {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Several responses in a universal file.
+    #[error("{path} has {} frequency responses ({}); save only the one from current to displacement", .names.len(), .names.join(", "), path = .path.display())]
+    Several {
+        /// The file.
+        path: PathBuf,
+        /// Names of the responses.
+        names: Vec<String>,
     },
     /// The standard deviations cannot be estimated.
     #[error("{path} has no standard deviations, and they cannot be estimated from the scatter of {points} frequencies (at least {least}, with a response above 0); add a column magnitude_sigma (m/A), or measure more frequencies", path = .path.display())]
@@ -103,4 +127,12 @@ pub enum FrfTableError {
         /// The fewest from which they can be estimated.
         least: usize,
     },
+}
+
+fn stated(unit: &str) -> String {
+    if unit.is_empty() {
+        "no unit".into()
+    } else {
+        format!("the unit `{unit}`")
+    }
 }

@@ -1,7 +1,7 @@
 //! Frequency responses of other programs, from current (A) to displacement (m).
 //!
 //! ```text
-//! table -> columns (role and unit by name, or by the numbers) -> points -> sigma, as in the file or by the scatter -> Frf
+//! table or arrays -> columns (role and unit by name, or by the numbers) -> points -> sigma, as in the file or by the scatter -> Frf
 //! ```
 //!
 //! | column | names |
@@ -12,10 +12,13 @@
 //! | in place of both | `real` and `imag` |
 //! | not required | `coherence`, `magnitude_sigma`, `resolution_hz` |
 
+mod arrays;
 mod columns;
+mod entry;
 mod error;
 mod numbers;
 mod points;
+mod table;
 
 pub use columns::PhaseUnit;
 pub use error::FrfTableError;
@@ -27,8 +30,7 @@ use bench_identify::scatter::SigmaSource;
 
 use columns::Columns;
 use numbers::Numbers;
-
-use crate::table::Table;
+use table::FrfTable;
 
 /// A response of another program.
 #[derive(Clone, Debug, PartialEq)]
@@ -44,9 +46,9 @@ pub struct ImportedFrf {
 /// Reads a response; `phase` is the unit of its phases, whatever the file states.
 ///
 /// # Errors
-/// When the file is not a table of a response, or does not determine what its columns are: see [`FrfTableError`].
+/// When the file has no response, or does not determine what its columns are: see [`FrfTableError`].
 pub fn read(path: &Path, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
-    let table = Table::open(path)?;
+    let table = FrfTable::open(path)?;
     let columns = Columns::of(&table)?;
     let numbers = Numbers::read(&table, &columns)?;
     points::response(&numbers, columns, phase)

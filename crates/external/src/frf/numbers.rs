@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use bench_identify::frf_value::{ValueDefect, coherence_defect, sigma_defect};
 
 use super::columns::{Columns, Pair, Scale};
+use super::entry::Entry;
 use super::error::FrfTableError;
-use crate::error::DataError;
-use crate::table::{Cell, Table};
+use super::table::FrfTable;
+use crate::error::{DataError, Place};
 
 /// The numbers of the lines of a table, the line at 0 Hz left out.
 pub(super) struct Numbers {
@@ -28,11 +29,8 @@ pub(super) struct Row {
     pub resolution: Option<f64>,
 }
 
-/// A cell with the column that it belongs to.
-type Cells<'a, 'b> = &'a [Cell<'b>];
-
 impl Numbers {
-    pub fn read(table: &Table<'_>, columns: &Columns) -> Result<Numbers, FrfTableError> {
+    pub fn read(table: &FrfTable<'_>, columns: &Columns) -> Result<Numbers, FrfTableError> {
         let pair = match &columns.pair {
             Pair::Polar {
                 magnitude, phase, ..
@@ -53,12 +51,12 @@ impl Numbers {
             without_zero: false,
         };
         let mut defect = None;
-        table.each_row(&names, |cells| {
-            if numbers.leaves_out_zero(table.number(&cells[0])?) {
+        table.each_row(&names, |entries| {
+            if numbers.leaves_out_zero(entries[0].finite(table.path())?) {
                 return Ok(());
             }
-            let row = row(table, columns, cells)?;
-            let found = numbers.push(row, cells, columns);
+            let row = row(table.path(), columns, entries)?;
+            let found = numbers.push(row, entries[0].place, columns);
             defect = defect.take().or(found.err());
             Ok(())
         })?;
@@ -72,47 +70,42 @@ impl Numbers {
         is_left_out
     }
 
-    fn push(
-        &mut self,
-        row: Row,
-        cells: Cells<'_, '_>,
-        columns: &Columns,
-    ) -> Result<(), FrfTableError> {
+    fn push(&mut self, row: Row, place: Place, columns: &Columns) -> Result<(), FrfTableError> {
         let previous = self.rows.last().map_or(0.0, |last| last.frequency);
         if row.frequency <= previous {
             return Err(FrfTableError::NotRising {
                 path: self.path.clone(),
-                line: cells[0].line,
+                place,
                 column: columns.frequency.clone(),
                 value: row.frequency,
                 previous,
             });
         }
-        check(&self.path, cells[0].line, &row, columns)?;
+        check(&self.path, place, &row, columns)?;
         self.rows.push(row);
         Ok(())
     }
 }
 
-fn row(table: &Table<'_>, columns: &Columns, cells: Cells<'_, '_>) -> Result<Row, DataError> {
+fn row(path: &Path, columns: &Columns, entries: &[Entry<'_>]) -> Result<Row, DataError> {
     let at = |name: &Option<String>| {
         let name = name.as_deref()?;
-        cells.iter().find(|cell| cell.column == name)
+        entries.iter().find(|entry| entry.column == name)
     };
-    let stated = |name: &Option<String>| at(name).map(|cell| table.number(cell)).transpose();
+    let stated = |name: &Option<String>| at(name).map(|entry| entry.finite(path)).transpose();
     // No value: not known.
-    let sigma = at(&columns.magnitude_sigma).filter(|cell| !cell.text.is_empty());
+    let sigma = at(&columns.magnitude_sigma).filter(|entry| !entry.text.is_empty());
     Ok(Row {
-        frequency: table.number(&cells[0])?,
-        pair: [table.number(&cells[1])?, table.number(&cells[2])?],
+        frequency: entries[0].finite(path)?,
+        pair: [entries[1].finite(path)?, entries[2].finite(path)?],
         coherence: stated(&columns.coherence)?,
-        magnitude_sigma: sigma.map(|cell| table.number(cell)).transpose()?,
+        magnitude_sigma: sigma.map(|entry| entry.finite(path)).transpose()?,
         resolution: stated(&columns.resolution)?,
     })
 }
 
 /// Refuses numbers that no measurement has.
-fn check(path: &Path, line: u64, row: &Row, columns: &Columns) -> Result<(), FrfTableError> {
+fn check(path: &Path, place: Place, row: &Row, columns: &Columns) -> Result<(), FrfTableError> {
     let linear = match &columns.pair {
         Pair::Polar {
             magnitude,
@@ -145,7 +138,7 @@ fn check(path: &Path, line: u64, row: &Row, columns: &Columns) -> Result<(), Frf
         if let (Some(column), Some(defect)) = (column, defect) {
             return Err(FrfTableError::Value {
                 path: path.to_owned(),
-                line,
+                place,
                 column: column.clone(),
                 value,
                 defect,

@@ -7,6 +7,7 @@ use num_complex::Complex;
 use super::columns::Columns;
 use super::numbers::Numbers;
 use super::*;
+use crate::table::Table;
 
 /// A mode at 30 Hz with a delay of 0.5 ms, and a scatter of one part in 10 000.
 fn stage(hz: f64) -> Complex<f64> {
@@ -21,7 +22,7 @@ fn grid() -> impl Iterator<Item = f64> {
 }
 
 fn of(text: String, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
-    let table = Table::of(Path::new("frf.csv"), text)?;
+    let table = FrfTable::Text(Table::of(Path::new("frf.csv"), text)?);
     let columns = Columns::of(&table)?;
     points::response(&Numbers::read(&table, &columns)?, columns, phase)
 }
