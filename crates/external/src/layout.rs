@@ -6,6 +6,7 @@
 //! time   force   position        names, in a line of their own or as the last comment
 //! s      N       m               units, in a line of their own
 //! 0.000  0.0     -2.5e-07        samples: the lines that most lines look like
+//! Comment: stopped by hand       remarks behind the last sample
 //! ```
 
 use super::cells::Format;
@@ -27,6 +28,8 @@ pub(crate) struct Layout {
     pub units: Vec<String>,
     /// Index of the first line of samples.
     pub first: usize,
+    /// Index behind the last line of samples.
+    pub end: usize,
 }
 
 /// Why a text has no layout.
@@ -71,8 +74,10 @@ impl Layout {
                 format: pattern.format,
             });
         }
+        let end = pattern.end(lines);
         let numbers = (1..=pattern.columns).map(|number| number.to_string());
         Ok(Layout {
+            end,
             format: pattern.format,
             has_names: heading.names.is_some(),
             names: heading.names.unwrap_or_else(|| numbers.collect()),
@@ -142,6 +147,24 @@ impl Pattern {
         let numbers = numeric.iter().filter(|is_number| **is_number).count();
         let expected = self.numeric.iter().filter(|is_number| **is_number).count();
         numeric.len() == self.columns && 2 * numbers >= expected && numbers >= 1
+    }
+}
+
+impl Pattern {
+    /// The index behind the last line that is no remark: remarks begin with a letter, and have another number of cells than a sample.
+    fn end(&self, lines: &[&str]) -> usize {
+        let is_remark = |line: &str| {
+            let cells = self.format.cells(line);
+            let first = cells.first().map_or("", |cell| cell.as_ref());
+            let is_word = first.starts_with(char::is_alphabetic) && !self.is_numeric(first);
+            is_skipped(line) || is_word && cells.len() != self.columns
+        };
+        let last = lines.iter().rposition(|line| !is_remark(line));
+        last.map_or(0, |last| last + 1)
+    }
+
+    fn is_numeric(&self, cell: &str) -> bool {
+        self.format.number(cell).is_some()
     }
 }
 
@@ -284,6 +307,23 @@ mod tests {
             assert_eq!(found.names, ["t", "u", "y"], "{units}");
             assert_eq!(found.units.join(","), units);
             assert_eq!(found.first, 2);
+        }
+    }
+
+    #[test]
+    fn remarks_behind_the_last_sample_are_no_samples_and_others_stay() {
+        for (behind, end) in [
+            ("", 5),
+            ("Comment: stopped by hand\n", 5),
+            ("\n# end\nEnd of record\nOperator: A, B\n\n", 5),
+            // Damaged samples.
+            ("off,off,off\n", 6),
+            ("2.0,1\n", 6),
+            ("nan,1\n", 6),
+            ("Pause\n2,1,2\nComment: end\n", 7),
+        ] {
+            let found = layout(&format!("t,u,y\n{ROWS}{behind}")).expect("a layout");
+            assert_eq!((found.first, found.end), (1, end), "{behind}");
         }
     }
 

@@ -104,7 +104,7 @@ impl<'a> Table<'a> {
         let indices = self.column_indices(names)?;
         let columns = self.layout.names.len();
         let lines = lines(&self.text).into_iter().enumerate();
-        let samples = lines.skip(self.layout.first);
+        let samples = lines.take(self.layout.end).skip(self.layout.first);
         for (index, line) in samples.filter(|(_, line)| !is_skipped(line)) {
             let cells = self.layout.format.row(line, columns);
             let line = index as u64 + 1;
