@@ -65,6 +65,7 @@ impl Layout {
         let pattern = Pattern::of(lines).ok_or(NoLayout::NoColumns)?;
         let first = lines.iter().position(|line| pattern.begins(line));
         let first = first.ok_or(NoLayout::NoColumns)?;
+        let first = first + usize::from(pattern.is_numbering(&lines[first..]));
         let heading = Heading::of(&lines[..first], &pattern);
         if let Some(header) = heading.other_count {
             return Err(NoLayout::OtherHeader {
@@ -150,7 +151,44 @@ impl Pattern {
     }
 }
 
+/// Fewest columns whose numbers are a heading: two numbers may well be a sample.
+const NUMBERED_COLUMNS: usize = 3;
+/// A first number that is as far from the second as the second from the third, apart from this part of the distance, is a time.
+const EQUAL_DISTANCE: f64 = 0.01;
+
 impl Pattern {
+    /// Whether the first of some lines has the numbers of the columns in place of names: 0, 1, 2 or 1, 2, 3, where the lines below have
+    /// decimals, and do not continue it as the times of samples do.
+    fn is_numbering(&self, lines: &[&str]) -> bool {
+        let rows = lines.iter().filter(|line| !is_skipped(line)).take(3);
+        let rows: Vec<Vec<f64>> = rows.map(|line| self.numbers(line)).collect();
+        let [heading, second, third] = rows.as_slice() else {
+            return false;
+        };
+        let has_all = rows.iter().all(|row| row.len() == self.columns);
+        if !has_all || self.columns < NUMBERED_COLUMNS {
+            return false;
+        }
+        let counts_from = |start: usize| (start..).zip(heading).all(|(k, cell)| *cell == k as f64);
+        let has_decimals = |row: &Vec<f64>| row.iter().any(|cell| cell.fract() != 0.0);
+        let continues = (0..self.columns).any(|k| {
+            let step = third[k] - second[k];
+            step != 0.0 && (second[k] - heading[k] - step).abs() < EQUAL_DISTANCE * step.abs()
+        });
+        (counts_from(0) || counts_from(1))
+            && has_decimals(second)
+            && has_decimals(third)
+            && !continues
+    }
+
+    fn numbers(&self, line: &str) -> Vec<f64> {
+        let cells = self.format.row(line, self.columns);
+        cells
+            .iter()
+            .filter_map(|cell| self.format.number(cell))
+            .collect()
+    }
+
     /// The index behind the last line that is no remark: remarks begin with a letter, and have another number of cells than a sample.
     fn end(&self, lines: &[&str]) -> usize {
         let is_remark = |line: &str| {
@@ -307,6 +345,26 @@ mod tests {
             assert_eq!(found.names, ["t", "u", "y"], "{units}");
             assert_eq!(found.units.join(","), units);
             assert_eq!(found.first, 2);
+        }
+    }
+
+    #[test]
+    fn numbers_of_the_columns_are_names_and_a_first_sample_is_none() {
+        for (text, names, first) in [
+            ("0,1,2\n0.0,0.1,0.2\n0.5,0.3,0.4\n1.0,0.5,0.1\n", "0,1,2", 1),
+            ("1,2,3\n0.0,0.1,0.2\n0.5,0.3,0.4\n1.0,0.5,0.1\n", "1,2,3", 1),
+            // Times go on from 0; integers may be samples; two columns; other numbers.
+            ("0,1,2\n0.5,0.1,0.2\n1.0,0.3,0.4\n1.5,0.5,0.1\n", "1,2,3", 0),
+            ("1,2,3\n5,0,1\n9,1,0\n11,3,2\n", "1,2,3", 0),
+            ("0,1\n0.0,0.1\n0.5,0.3\n1.0,0.5\n", "1,2", 0),
+            ("0,2,3\n0.0,0.1,0.2\n0.5,0.3,0.4\n1.0,0.5,0.1\n", "1,2,3", 0),
+        ] {
+            let found = layout(text).expect("a layout");
+            assert_eq!(
+                (found.names.join(",").as_str(), found.first),
+                (names, first),
+                "{text}"
+            );
         }
     }
 
