@@ -12,7 +12,7 @@
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use bench_control::{ClosedLoop, ControllerText, Margins, Section};
-use bench_plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{LoopPlant, Mode, OutputKind, SignalPath};
 use bench_test_support::seeds::over_seeds;
 use nalgebra::{Complex, DVector};
 use rand_core::Rng;
@@ -204,6 +204,7 @@ impl RandomLoop {
             amplifier_bandwidth_hz: self.bandwidth_hz,
             force_constant_n_per_a: FORCE_CONSTANT_N_PER_A,
             delays_s: vec![self.delay_periods * self.period_s],
+            output: OutputKind::Position,
         };
         let plant = LoopPlant::of(&path, &self.modes);
         let (modes, design) = (self.modes.clone(), Box::new(self.sections.clone()));
@@ -419,6 +420,7 @@ fn mode_above_half_the_rate_limits_the_modulus_margin_at_its_alias() {
         amplifier_bandwidth_hz: 2000.0,
         force_constant_n_per_a: 10.0,
         delays_s: vec![1e-3],
+        output: OutputKind::Position,
     };
     let sections = vec![section([0.006, 0.0, 0.0], [0.0, 1.0, 0.0])];
     let plant = LoopPlant::of(&path, &modes);
@@ -446,6 +448,7 @@ fn gain_margin_at_half_the_rate_is_found() {
         amplifier_bandwidth_hz: 5000.0,
         force_constant_n_per_a: 1.0,
         delays_s: vec![0.0],
+        output: OutputKind::Position,
     };
     let controller = ControllerText {
         name: "static".into(),

@@ -1,7 +1,7 @@
 //! The signal path between command and reading, from the settings of loop, motor, amplifier and probe.
 
 use super::Config;
-use bench_plant::SignalPath;
+use bench_plant::{OutputKind, SignalPath};
 
 impl From<&Config> for SignalPath {
     fn from(config: &Config) -> SignalPath {
@@ -14,6 +14,7 @@ impl From<&Config> for SignalPath {
             amplifier_bandwidth_hz: config.amplifier.bandwidth_hz,
             force_constant_n_per_a: config.motor.force_constant_n_per_a,
             delays_s: SignalPath::delays_of_probe_s(least_s, probe_period_s),
+            output: OutputKind::Position,
         }
     }
 }

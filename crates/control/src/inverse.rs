@@ -176,7 +176,7 @@ fn negligible<'a>(weights: impl Iterator<Item = &'a f64>, limit: f64) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench_plant::{Mode, SignalPath};
+    use bench_plant::{Mode, OutputKind, SignalPath};
 
     fn plant(modes: &[Mode]) -> LoopPlant {
         let path = SignalPath {
@@ -184,6 +184,7 @@ mod tests {
             amplifier_bandwidth_hz: 1000.0,
             force_constant_n_per_a: 11.12,
             delays_s: vec![2e-4],
+            output: OutputKind::Position,
         };
         LoopPlant::of(&path, modes)
     }

@@ -5,15 +5,17 @@ use serde::Serialize;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::observation::{Observation, Source, describes};
+use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Periods, Repetition};
-use crate::plausibility::{describes, hint, implausible, unless_undetermined};
+use crate::plausibility::{hint, implausible, unless_undetermined};
 use crate::record_check::Resolution;
 use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
     excited_band_hz, record_check, with_distortion,
 };
-use bench_plant::PlantError;
+use bench_plant::{OutputKind, PlantError};
 
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
 const RELATIVE_ERROR: f64 = 0.01;
@@ -31,6 +33,8 @@ pub struct ExternalAnalysis {
     pub verdict: Verdict,
     /// The hold and the lag of the input that were assumed.
     pub input_path: InputPath,
+    /// What the output measures: as stated, or a position. The modes and zeros are those of the position.
+    pub output_kind: OutputKind,
     /// The chain from the input to the force that follows from them.
     pub chain: MeasurementChain,
     /// The analysed band in hertz.
@@ -120,7 +124,9 @@ pub enum IdentificationError {
 /// How two signals are identified.
 ///
 /// Units: with input in newtons and output in metres, residues are in 1/kg. With another unit of the input or the output, residues and
-/// responses are in that unit over this one; frequencies, damping ratios, signs, zeros and verdict are the same.
+/// responses are in that unit over this one; frequencies, damping ratios, signs, zeros and verdict are the same. Of a velocity or an
+/// acceleration, modes, residues, zeros and verdict are those of the position: the residue of a velocity in m/s is in 1/kg as well, and
+/// the zeros at s = 0 that the derivatives add are left out.
 ///
 /// ```
 /// use bench_identify::Identification;
@@ -164,17 +170,19 @@ pub struct Identification {
     band_hz: Option<(f64, f64)>,
     repetition: Option<Repetition>,
     input_path: InputPath,
+    output_kind: Option<OutputKind>,
 }
 
 impl Identification {
     /// Signals with a constant number of samples per second. Without further settings the band is the one that the input excites, the
-    /// record begins and ends at rest, and the input is the force itself.
+    /// record begins and ends at rest, the input is the force itself, and the output is a position.
     pub fn new(rate_hz: f64) -> Identification {
         Identification {
             rate_hz,
             band_hz: None,
             repetition: None,
             input_path: InputPath::default(),
+            output_kind: None,
         }
     }
 
@@ -206,6 +214,16 @@ impl Identification {
         self
     }
 
+    /// What the output measures. Unless stated it is taken as a position, and the verdict is undecided if it looks like an acceleration.
+    ///
+    /// The acceleration by a held input without a lag steps at the samples: both readings are tried, that before the step of a sample
+    /// and that after it, and the one that describes the data better is used.
+    #[must_use]
+    pub fn output_kind(mut self, kind: OutputKind) -> Identification {
+        self.output_kind = Some(kind);
+        self
+    }
+
     /// Identifies an output as the response to an input, both with the sample of the same time at the same index.
     ///
     /// # Errors
@@ -220,19 +238,22 @@ impl Identification {
             input: input.to_vec(),
             output: output.to_vec(),
         };
-        analyse(&signals, self.band_hz, self.repetition, self.input_path)
+        analyse(&signals, *self)
     }
 }
 
 /// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
-/// without one, the record must begin and end at rest. `input_path` lies between the recorded input and the force.
+/// without one, the record must begin and end at rest.
 fn analyse(
     signals: &Signals,
-    band_hz: Option<(f64, f64)>,
-    repetition: Option<Repetition>,
-    input_path: InputPath,
+    identification: Identification,
 ) -> Result<ExternalAnalysis, IdentificationError> {
-    let chain = input_path.chain(signals.rate_hz);
+    let Identification {
+        band_hz,
+        repetition,
+        input_path,
+        ..
+    } = identification;
     signals.check()?;
     // The lines of a periodic record are estimated one by one.
     let stray_lines = match repetition {
@@ -251,12 +272,30 @@ fn analyse(
     } else {
         requested_hz
     };
-    let fit = match &periodic {
-        Some(periodic) => fit_of_periods(&frf.data, periodic.linearity.as_ref(), &chain),
-        None => modal::fit(&frf.data, &chain),
+    let stated = identification.output_kind;
+    let output_kind = stated.unwrap_or_default();
+    let source = Source {
+        rate_hz: signals.rate_hz,
+        input_path,
+    };
+    let chain = source.chain(output_kind, &frf.data);
+    let other = modes_of_other_kind(&source, &frf.data, &chain);
+    let clear_kind = other.as_ref().map(|(kind, _)| *kind);
+    let fit = match (other, &periodic) {
+        (Some((_, few)), _) => Ok(few),
+        (None, Some(part)) => fit_of_periods(&frf.data, part.linearity.as_ref(), &chain),
+        (None, None) => modal::fit(&frf.data, &chain),
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let why = listed(&defects).or_else(|| implausible(signals.rate_hz, &frf, &fit, &chain));
+    let observation = Observation {
+        source,
+        frf: &frf,
+        fit: &fit,
+        chain: &chain,
+        stated,
+        clear_kind,
+    };
+    let why = listed(&defects).or_else(|| implausible(&observation));
     let verdict = match why {
         Some(why) => Verdict::undecided(why),
         None => {
@@ -272,6 +311,7 @@ fn analyse(
         fit,
         verdict,
         input_path,
+        output_kind,
         chain,
         band_hz,
         judged_up_to_rad_s,

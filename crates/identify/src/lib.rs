@@ -45,6 +45,8 @@ mod mean;
 pub mod modal;
 mod multisine_lines;
 mod noise_parts;
+mod observation;
+mod other_kind;
 mod plausibility;
 pub mod record_check;
 pub mod repeated;
@@ -56,6 +58,7 @@ pub mod verdict;
 pub mod welch;
 
 pub use bench_base::estimate::{Estimate, SIGMAS_95};
+pub use bench_plant::OutputKind;
 pub use error::{BandError, IdentifyError, Signal, SignalsError};
 pub use excited_band::excited_band_hz;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};

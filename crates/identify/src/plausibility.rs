@@ -1,13 +1,17 @@
 //! Signs that the columns of an external record are not input and output of a plant that was at rest.
 
-use crate::modal::{self, FitError, MeasurementChain, ModalFit, ModeGroup};
-use crate::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
-use crate::{Frf, FrfDatum, Signals, record_check};
+use bench_plant::OutputKind;
+
+use crate::modal::{FitError, ModalFit, ModeGroup};
+use crate::observation::{Observation, describes};
+use crate::other_kind::{explained_otherwise, vanishes_at_rest};
+use crate::verdict::{Cnmp, Verdict};
+use crate::{Frf, Signals, record_check};
 
 /// Half of the frequencies must have at least this coherence.
 const MIN_COHERENCE: f64 = 0.5;
-/// At the end of the band a mechanical response does not grow with a higher power of frequency than this, unless the next mode
-/// lies just above it.
+/// At the end of the band the position by a force does not grow with a higher power of frequency than this, unless the next mode
+/// lies just above it; a velocity grows with one power more, an acceleration with two.
 const MAX_SLOPE: f64 = 1.0;
 /// The slope is measured over this fraction of the band, in ln f, at its end.
 const SLOPE_PART: f64 = 0.25;
@@ -15,57 +19,19 @@ const SLOPE_PART: f64 = 0.25;
 const EARLY_SAMPLES: f64 = 0.5;
 /// A deviation of more standard deviations is not noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
-/// Number of data of the inverse of a response that are fitted first.
-const INVERSE_DATA: usize = 400;
 /// More modes than these that cannot be determined are no modes.
 const MANY_MODES: usize = 8;
 /// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
 const ACTIVE_RATIO: f64 = 0.3;
-const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output; exchange --input and --output, which are swapped";
 
 /// The reason, if the signals cannot be input and output of a mechanical system.
-pub(super) fn implausible(
-    rate_hz: f64,
-    frf: &Frf,
-    fit: &Result<ModalFit, FitError>,
-    chain: &MeasurementChain,
-) -> Option<String> {
+pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
+    let Observation { frf, fit, .. } = seen;
     incoherent(frf, fit)
-        .or_else(|| growing(frf, fit))
-        .or_else(|| inverse_fits(&frf.data, fit, chain))
-        .or_else(|| early(rate_hz, fit.as_ref().ok()?))
-}
-
-/// Whether the fit describes the data.
-pub(super) fn describes(fit: &ModalFit) -> bool {
-    fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
-}
-
-/// Whether modes describe the inverse of the response, but not the response.
-fn inverse_fits(
-    data: &[FrfDatum],
-    fit: &Result<ModalFit, FitError>,
-    chain: &MeasurementChain,
-) -> Option<String> {
-    if fit.as_ref().is_ok_and(describes) {
-        return None;
-    }
-    let mut inverse: Vec<FrfDatum> = data.iter().map(inverse_datum).collect();
-    inverse.retain(|datum| datum.variance.is_normal());
-    // The inverse of a response is seldom a sum of modes, and many modes are then fitted to it: a part of the data shows that at less cost.
-    let every = inverse.len().div_ceil(INVERSE_DATA).max(1);
-    let part: Vec<FrfDatum> = inverse.iter().step_by(every).copied().collect();
-    let is_sum_of_modes =
-        |data: &[FrfDatum]| modal::fit(data, chain).is_ok_and(|fit| describes(&fit));
-    (is_sum_of_modes(&part) && is_sum_of_modes(&inverse)).then(|| SWAPPED.into())
-}
-
-fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
-    FrfDatum {
-        response: datum.response.inv(),
-        variance: datum.variance / datum.response.norm_sqr().powi(2),
-        ..*datum
-    }
+        .or_else(|| explained_otherwise(seen))
+        .or_else(|| vanishes_at_rest(seen))
+        .or_else(|| growing(frf, fit, seen.chain.output()))
+        .or_else(|| early(seen.source.rate_hz, fit.as_ref().ok()?))
 }
 
 /// Modes that describe the response may lie in less than half of the band.
@@ -84,7 +50,7 @@ fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
 
 /// A displacement falls with frequency above its modes; a force as output would grow. Frequencies at which the output is noise do not
 /// count. Below a mode at the end of the band a displacement grows as well.
-fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
+fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>, kind: OutputKind) -> Option<String> {
     let (first_hz, last_hz) = (frf.frequency_hz.first()?, frf.frequency_hz.last()?);
     let from_hz = last_hz * (first_hz / last_hz).powf(SLOPE_PART);
     if ends_with_a_mode(fit, from_hz, *last_hz) {
@@ -95,7 +61,8 @@ fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
         .filter(|k| frf.frequency_hz[*k] >= from_hz)
         .map(|k| (frf.frequency_hz[k].ln(), frf.response[k].norm().ln()));
     let slope = slope(end.filter(|(_, y)| y.is_finite()).collect())?;
-    (slope > MAX_SLOPE).then(|| {
+    let max_slope = MAX_SLOPE + f64::from(kind.derivatives());
+    (slope > max_slope).then(|| {
         format!(
             "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
         )

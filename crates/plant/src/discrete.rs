@@ -2,7 +2,8 @@
 //!
 //! The current follows the set-point through the amplifier's lag, i' = wa (u - i). Each mode is driven by the force of that
 //! current, q'' + 2 zeta w q' + w^2 q = b Kf i + f, with f any other force on the mode (floor, stop), held as well. One
-//! matrix exponential per mode advances its state over a period without error, whatever the period's length.
+//! matrix exponential per mode advances its state over a period without error, whatever the period's length. With an infinite
+//! bandwidth the force is that of the set-point, and the current state is the set-point of the period before.
 //!
 //! The states of a mode are q and q'/w, so that both are of one size; of a free body, w = 0, they are q and q' (over 1 rad/s).
 
@@ -153,10 +154,15 @@ fn rates(mode: &Mode, lag_rad_s: f64, force_constant_n_per_a: f64) -> Matrix5<f6
     rates[(0, 1)] = scale;
     rates[(1, 0)] = -w;
     rates[(1, 1)] = -2.0 * mode.damping_ratio * w;
-    rates[(1, 2)] = mode.force_gain * force_constant_n_per_a / scale;
     rates[(1, 4)] = 1.0 / scale;
-    rates[(2, 2)] = -lag_rad_s;
-    rates[(2, 3)] = lag_rad_s;
+    let force = mode.force_gain * force_constant_n_per_a / scale;
+    if lag_rad_s.is_finite() {
+        rates[(1, 2)] = force;
+        rates[(2, 2)] = -lag_rad_s;
+        rates[(2, 3)] = lag_rad_s;
+    } else {
+        rates[(1, 3)] = force;
+    }
     rates
 }
 

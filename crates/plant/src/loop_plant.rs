@@ -12,13 +12,22 @@
 //!  y(k T - d) = C x((k - n - 1) T + (T - r)) = C (A x + B_i i + B_u u) at tick k - n - 1,   A, B over T - r        (r > 0)
 //! ```
 //!
-//! which is exact. A free-running probe is represented by the mean over its ages (nodes evenly over its period): its first
+//! which is exact. C is that of the output: the displacement q, the velocity q', or the acceleration
+//!
+//! ```text
+//!  q'' = -w^2 q - 2 zeta w q' + b Kf i
+//! ```
+//!
+//! with the current of the time of measurement. Without a lag of the amplifier the acceleration is discontinuous at the ticks. A
+//! reading without delay is then measured before the step of its tick; an advance, a delay below 0, gives the value after it.
+//!
+//! A free-running probe is represented by the mean over its ages (nodes evenly over its period): its first
 //! harmonic, with the delay and the roll-off of a hold. The side bands of such a probe are left out.
 
 use nalgebra::{Complex, DMatrix};
 
 use super::discrete::zero_system;
-use super::{DiscreteMode, DiscretePlant, Mode, PlantState};
+use super::{DiscretePlant, Mode, OutputKind, PlantState};
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
 const NODES: usize = 64;
@@ -31,13 +40,15 @@ const ROUNDING: f64 = 1e-9;
 pub struct SignalPath {
     /// Period of the loop in seconds.
     pub period_s: f64,
-    /// Bandwidth of the amplifier's current loop in hertz.
+    /// Bandwidth of the amplifier's current loop in hertz; infinite without a lag.
     pub amplifier_bandwidth_hz: f64,
     /// Force constant of the motor in newtons per ampere.
     pub force_constant_n_per_a: f64,
     /// Delays in seconds from a command to the position of its reading, hold and amplifier lag excluded. The response is
-    /// the mean over them.
+    /// the mean over them. A response exists for advances (above minus a period) as well, a simulation does not.
     pub delays_s: Vec<f64>,
+    /// What the probe measures.
+    pub output: OutputKind,
 }
 
 impl SignalPath {
@@ -87,6 +98,33 @@ pub struct LoopPlant {
     held: DiscretePlant,
     taps: Vec<Tap>,
     delay_s: f64,
+}
+
+/// The output of a mode at a time: state . [q, q'/w] + current i.
+struct OutputRow {
+    state: [f64; 2],
+    current: f64,
+}
+
+impl OutputRow {
+    fn new(mode: &Mode, path: &SignalPath) -> OutputRow {
+        let (w, gain) = (mode.omega_rad_s, mode.sensor_gain);
+        let rate = gain * mode.rate_scale_rad_s();
+        let (state, current) = match path.output {
+            OutputKind::Position => ([gain, 0.0], 0.0),
+            OutputKind::Velocity => ([0.0, rate], 0.0),
+            OutputKind::Acceleration => (
+                [-w * w * gain, -2.0 * mode.damping_ratio * w * rate],
+                gain * mode.force_gain * path.force_constant_n_per_a,
+            ),
+        };
+        OutputRow { state, current }
+    }
+
+    /// state . column.
+    fn along(&self, column: [f64; 2]) -> f64 {
+        self.state[0] * column[0] + self.state[1] * column[1]
+    }
 }
 
 /// The part of a reading that arrives `periods` after its tick: rows . x + current i + setpoint u.
@@ -161,7 +199,7 @@ impl LoopPlant {
         self.delay_s
     }
 
-    /// Response in metres per ampere from command to reading, at w.
+    /// Response from command to reading, at w: in metres per ampere, or in m/s or m/s^2 per ampere by the output.
     pub fn response(&self, omega_rad_s: f64) -> Complex<f64> {
         let (sine, cosine) = libm::sincos(omega_rad_s * self.held.period_s);
         self.response_at(Complex::new(cosine, sine))
@@ -249,34 +287,36 @@ impl Tap {
         let ratio = delay_s / held.period_s;
         let whole = libm::floor(ratio + ROUNDING);
         let rest = ratio - whole;
+        let outputs = modes.iter().map(|mode| OutputRow::new(mode, path));
+        let outputs: Vec<OutputRow> = outputs.collect();
         if rest > ROUNDING {
             let within = path.discrete(modes, held.period_s * (1.0 - rest));
-            return Tap::within_period(&within, whole as usize + 1);
+            return Tap::within_period(&within, &outputs, (whole + 1.0) as usize);
         }
-        let rows = held.modes.iter().map(|mode| [mode.output, 0.0]);
         Tap {
             periods: whole as usize,
-            rows: rows.collect(),
-            current: 0.0,
+            rows: outputs.iter().map(|output| output.state).collect(),
+            current: outputs.iter().map(|output| output.current).sum(),
             setpoint: 0.0,
         }
     }
 
     /// The reading within a period, after the time span of `within`.
-    fn within_period(within: &DiscretePlant, periods: usize) -> Tap {
-        let sum = |of: fn(&DiscreteMode) -> f64| {
-            let modes = within.modes.iter();
-            modes.map(|mode| mode.output * of(mode)).sum()
-        };
-        let rows = within.modes.iter();
-        Tap {
+    fn within_period(within: &DiscretePlant, outputs: &[OutputRow], periods: usize) -> Tap {
+        let mut tap = Tap {
             periods,
-            rows: rows
-                .map(|mode| mode.a[0].map(|a| mode.output * a))
-                .collect(),
-            current: sum(|mode| mode.current[0]),
-            setpoint: sum(|mode| mode.setpoint[0]),
+            rows: Vec::with_capacity(outputs.len()),
+            current: 0.0,
+            setpoint: 0.0,
+        };
+        for (mode, output) in within.modes.iter().zip(outputs) {
+            let [[a11, a12], [a21, a22]] = mode.a;
+            tap.rows
+                .push([[a11, a21], [a12, a22]].map(|column| output.along(column)));
+            tap.current += output.along(mode.current) + output.current * within.lag;
+            tap.setpoint += output.along(mode.setpoint) + output.current * (1.0 - within.lag);
         }
+        tap
     }
 
     fn scaled(self, share: f64) -> Tap {
@@ -329,3 +369,6 @@ fn join(taps: &mut Vec<Tap>, tap: Tap) {
         None => taps.push(tap),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use nalgebra::DVector;
 
 use super::*;
 use crate::StateSpaceLaw;
-use bench_plant::SignalPath;
+use bench_plant::{OutputKind, SignalPath};
 
 const PERIOD_S: f64 = 1e-3;
 const FORCE_CONSTANT_N_PER_A: f64 = 10.0;
@@ -28,6 +28,7 @@ fn closed_with(modes: Vec<Mode>, design: Box<dyn ControlDesign>) -> ClosedLoop {
         amplifier_bandwidth_hz: 300.0,
         force_constant_n_per_a: FORCE_CONSTANT_N_PER_A,
         delays_s: vec![1.3e-3],
+        output: OutputKind::Position,
     };
     let plant = LoopPlant::of(&path, &modes);
     ClosedLoop::new(plant, modes, FORCE_CONSTANT_N_PER_A, design).expect("linear")

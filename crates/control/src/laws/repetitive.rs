@@ -210,7 +210,7 @@ mod tests {
 
     use super::*;
     use crate::{ClosedLoop, StateSpaceLaw};
-    use bench_plant::{LoopPlant, Mode, SignalPath};
+    use bench_plant::{LoopPlant, Mode, OutputKind, SignalPath};
 
     fn settings() -> RepetitiveLaw {
         RepetitiveLaw {
@@ -327,6 +327,7 @@ mod tests {
             amplifier_bandwidth_hz: 300.0,
             force_constant_n_per_a: 10.0,
             delays_s: vec![1.3e-3],
+            output: OutputKind::Position,
         };
         let mode = |omega_rad_s, force_gain| Mode {
             omega_rad_s,

@@ -148,6 +148,7 @@ mod tests {
             amplifier_bandwidth_hz: 1000.0,
             force_constant_n_per_a: 11.0,
             delays_s: vec![2e-4],
+            output: bench_plant::OutputKind::Position,
         }
     }
 

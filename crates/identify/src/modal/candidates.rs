@@ -35,7 +35,7 @@ pub(super) fn candidates(problem: Problem<'_>, solution: &Solution) -> Vec<Modal
         solution,
         delays: problem.nodes.delays(*delay_s),
     };
-    let mut ranked: Vec<(f64, ModalTerm)> = largest_residuals(solution, problem.data)
+    let mut ranked: Vec<(f64, ModalTerm)> = largest_residuals(problem, solution)
         .into_iter()
         .filter_map(|index| trials.best_damping(problem.data[index].omega_rad_s()))
         .collect();
@@ -126,8 +126,9 @@ fn delay_step_s(data: &[FrfDatum]) -> f64 {
 }
 
 /// The data with the largest excess over the noise in each part of the band, the largest first.
-fn largest_residuals(solution: &Solution, data: &[FrfDatum]) -> Vec<usize> {
-    let excess = excess_over_noise(solution, data);
+fn largest_residuals(problem: Problem<'_>, solution: &Solution) -> Vec<usize> {
+    let data = problem.data;
+    let excess = excess_over_noise(problem, solution);
     let size = data.len().div_ceil(BAND_PARTS);
     let parts = (0..data.len())
         .step_by(size)
@@ -141,10 +142,11 @@ fn largest_residuals(solution: &Solution, data: &[FrfDatum]) -> Vec<usize> {
 }
 
 /// The power of the residual over that of the noise for each datum; without a model, the squared velocity.
-fn excess_over_noise(solution: &Solution, data: &[FrfDatum]) -> Vec<f64> {
+fn excess_over_noise(problem: Problem<'_>, solution: &Solution) -> Vec<f64> {
+    let Problem { chain, data, .. } = problem;
     if solution.parameters.modes.is_empty() {
-        let velocities = data.iter().map(|datum| datum.response * datum.frequency_hz);
-        return velocities.map(|velocity| velocity.norm_sqr()).collect();
+        let velocities = data.iter().map(|datum| chain.velocity(datum));
+        return velocities.map(|velocity| velocity * velocity).collect();
     }
     let residuals = solution.residual.iter().zip(data);
     residuals

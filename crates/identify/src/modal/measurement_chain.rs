@@ -4,20 +4,23 @@ use nalgebra::{Complex, DVector};
 
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
-use bench_plant::{LoopPlant, Mode, PathResponse, SignalPath};
+use bench_plant::{LoopPlant, Mode, OutputKind, PathResponse, SignalPath};
 
 /// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
 const FAR_RAD_S: f64 = 1e6;
 
 /// The signal path between set-point and reading, without the mechanics.
+///
+/// A velocity or an acceleration is s or s^2 times the response of the mechanics: modes, R and delay of a fit are those of the position
+/// whatever the chain measures, and so is what [`MeasurementChain::mechanics`] returns.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
     /// A command held over each period, amplifier, motor and delays; input in amperes for a bench. Exact, aliasing included.
     Bench(SignalPath),
-    /// No chain: the input is a force in newtons, or another input unit.
+    /// No chain: the input is a force in newtons, or another input unit, and the output a position.
     Direct,
-    /// Lag between the measured input and the force, or a hold that is not a period of the samples. Without aliasing.
-    Input(InputPath),
+    /// Lag between the measured input and the force, or a hold that is not a period of the samples; any output. Without aliasing.
+    Input(InputPath, OutputKind),
 }
 
 /// What lies between the samples of an input and the force, apart from a delay.
@@ -35,25 +38,46 @@ pub struct InputPath {
 
 /// Aliases, turned by the sampling frequency times a change of the delay, are the same below this angle.
 const ALIAS_PHASE_RAD: f64 = 0.1;
+/// The angle is smaller by this factor for each derivative of the output: derivatives raise the aliases.
+const ALIAS_PHASE_RATIO: f64 = 0.1;
 /// A hold that differs from a period by less than this ratio is one: the times of a file are rounded.
 const HOLD_ROUNDING: f64 = 1e-6;
-/// Lag of a held input without one, as a ratio of the period: the exact discretisation contains a lag. It delays the response by itself,
-/// which the fitted delay removes, and changes its magnitude by (w tau)^2/2: 5e-8 at the Nyquist frequency.
-const LEAST_LAG_RATIO: f64 = 1e-4;
+/// Advance of a reading that is measured after the step of its sample, as a ratio of the period. It turns the response by 3e-6 rad at
+/// the Nyquist frequency, which the fitted delay removes.
+const ADVANCE_RATIO: f64 = 1e-6;
 
 impl InputPath {
     /// The chain of signals with this many samples per second. A sample held for its period is observed exactly, aliases included.
     pub fn chain(&self, rate_hz: f64) -> MeasurementChain {
         let held_periods = self.hold_s * rate_hz;
         if (held_periods - 1.0).abs() > HOLD_ROUNDING {
-            return MeasurementChain::Input(*self);
+            return MeasurementChain::Input(*self, OutputKind::Position);
         }
-        let lag_s = self.lag_s.max(LEAST_LAG_RATIO * self.hold_s);
         MeasurementChain::Bench(SignalPath {
             period_s: self.hold_s,
-            amplifier_bandwidth_hz: 1.0 / (2.0 * std::f64::consts::PI * lag_s),
+            // Infinite without a lag.
+            amplifier_bandwidth_hz: 1.0 / (2.0 * std::f64::consts::PI * self.lag_s),
             force_constant_n_per_a: 1.0,
             delays_s: vec![0.0],
+            output: OutputKind::Position,
+        })
+    }
+
+    /// The chain of an acceleration that steps with its input, read after the step; `None` of any other output.
+    ///
+    /// A held force without a lag steps at the samples, and so does the acceleration: the reading of a sample may have been taken before
+    /// its step ([`InputPath::chain`]), as in a loop that reads before it writes, or after it, as in most simulations. Only the data show
+    /// which.
+    pub fn chain_after_step(&self, rate_hz: f64, output: OutputKind) -> Option<MeasurementChain> {
+        let MeasurementChain::Bench(path) = self.chain(rate_hz).observing(output) else {
+            return None;
+        };
+        let steps = output == OutputKind::Acceleration && self.lag_s == 0.0;
+        steps.then(|| {
+            MeasurementChain::Bench(SignalPath {
+                delays_s: vec![-ADVANCE_RATIO * path.period_s],
+                ..path
+            })
         })
     }
 
@@ -120,14 +144,23 @@ impl ObservedMode {
 impl Node {
     fn new(chain: &MeasurementChain, far: &ObservedMode, frequency_hz: f64) -> Node {
         let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * frequency_hz);
+        let continuous = chain.continuous_response(s, 0.0) / (FAR_RAD_S * FAR_RAD_S);
+        let output = chain.output();
         let chain = match (chain, &far.plant) {
             (MeasurementChain::Bench(path), Some(plant)) => {
                 ChainResponse::Bench(plant.path_response(unit_phasor(s.im * path.period_s)))
             }
-            (MeasurementChain::Input(path), _) => ChainResponse::Input(path.response(s)),
+            (MeasurementChain::Input(path, output), _) => {
+                ChainResponse::Input(path.response(s) * output.factor(s))
+            }
             (MeasurementChain::Bench(_) | MeasurementChain::Direct, _) => ChainResponse::Direct,
         };
-        let far = far.response(s, &chain);
+        // The velocity of such a mode is a pulse after each step, of which samples show nothing: its aliases cancel it. Of modes that
+        // are not that far, samples show the compliance.
+        let far = match output {
+            OutputKind::Position => far.response(s, &chain),
+            OutputKind::Velocity | OutputKind::Acceleration => continuous,
+        };
         Node { s, chain, far }
     }
 
@@ -213,15 +246,19 @@ impl Nodes {
         )
     }
 
-    /// Whether the aliases of the chain with this delay differ from those of the nodes: by 0.1 rad and more.
+    /// Whether the aliases of the chain with this delay differ from those of the nodes: by [`ALIAS_PHASE_RAD`] and more.
     pub(super) fn have_other_aliases(&self, delay_s: f64) -> bool {
         let MeasurementChain::Bench(path) = &self.chain else {
             return false;
         };
+        if is_advanced(path) {
+            return false;
+        }
         let sampling_rad_s = 2.0 * std::f64::consts::PI / path.period_s;
         // The whole delay is not negative.
         let least_s = self.delay_s - path.mean_delay_s();
-        (delay_s.max(least_s) - self.delay_s).abs() * sampling_rad_s > ALIAS_PHASE_RAD
+        let turn_rad = (delay_s.max(least_s) - self.delay_s).abs() * sampling_rad_s;
+        turn_rad > ALIAS_PHASE_RAD * ALIAS_PHASE_RATIO.powi(path.output.derivatives())
     }
 
     /// The response of a mode of residue 1, its own excluded.
@@ -261,12 +298,43 @@ impl MeasurementChain {
         MeasurementChain::Bench(path.into().with_mean_age())
     }
 
+    /// The same chain with another output.
+    #[must_use]
+    pub fn observing(self, output: OutputKind) -> MeasurementChain {
+        match (self, output) {
+            (MeasurementChain::Bench(path), _) => {
+                MeasurementChain::Bench(SignalPath { output, ..path })
+            }
+            (MeasurementChain::Direct, OutputKind::Position) => MeasurementChain::Direct,
+            (MeasurementChain::Direct, _) => MeasurementChain::Input(InputPath::default(), output),
+            (MeasurementChain::Input(path, _), _) => MeasurementChain::Input(path, output),
+        }
+    }
+
+    /// What is measured.
+    pub fn output(&self) -> OutputKind {
+        match self {
+            MeasurementChain::Bench(path) => path.output,
+            MeasurementChain::Direct => OutputKind::Position,
+            MeasurementChain::Input(_, output) => *output,
+        }
+    }
+
+    /// The magnitude of a response as a velocity, up to a factor: modes are its peaks.
+    pub(super) fn velocity(&self, datum: &FrfDatum) -> f64 {
+        let integrations = 1 - self.output().derivatives();
+        datum.response.norm() * datum.frequency_hz.powi(integrations)
+    }
+
     /// The chain of a bench with an additional delay, as far as its whole delay is not negative, and the delay that was added. Nothing
-    /// is added to the other chains: their delay multiplies the response by exp(-s tau).
+    /// is added to the other chains: their delay multiplies the response by exp(-s tau). A reading after the step of its sample remains one.
     fn with_added_delay(&self, delay_s: f64) -> (MeasurementChain, f64) {
         let MeasurementChain::Bench(path) = self else {
             return (self.clone(), 0.0);
         };
+        if is_advanced(path) {
+            return (self.clone(), 0.0);
+        }
         let delayed = path.with_added_delay(delay_s);
         let added_s = delayed.mean_delay_s() - path.mean_delay_s();
         (MeasurementChain::Bench(delayed), added_s)
@@ -297,18 +365,18 @@ impl MeasurementChain {
         };
         let plant = match self {
             MeasurementChain::Bench(path) => Some(LoopPlant::of(path, std::slice::from_ref(&mode))),
-            MeasurementChain::Direct | MeasurementChain::Input(_) => None,
+            MeasurementChain::Direct | MeasurementChain::Input(..) => None,
         };
         ObservedMode { mode, plant }
     }
 
-    /// The response at s = j w from the samples of the command to the force and, with a delay of `delay_s` beyond that of the chain, to
-    /// the reading, without aliases: that of a signal that is continuous in time.
+    /// The response at s = j w from the samples of the command to the force and, with a delay of `delay_s` beyond that of the chain and
+    /// the derivatives s^k of its output, from the position to the reading, without aliases: that of a signal that is continuous in time.
     pub(super) fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
-        let delay = unit_phasor(-s.im * delay_s);
+        let delay = unit_phasor(-s.im * delay_s) * self.output().factor(s);
         match self {
             MeasurementChain::Direct => delay,
-            MeasurementChain::Input(path) => path.response(s) * delay,
+            MeasurementChain::Input(path, _) => path.response(s) * delay,
             MeasurementChain::Bench(path) => {
                 let bandwidth_rad_s = 2.0 * std::f64::consts::PI * path.amplifier_bandwidth_hz;
                 let held = InputPath {
@@ -323,7 +391,7 @@ impl MeasurementChain {
         }
     }
 
-    /// The response of the mechanics alone in m/N, of data that were measured through this chain: without hold, motor, amplifier and
+    /// The response of the mechanics alone in m/N, a position whatever the output is, of data that were measured through this chain: without hold, motor, amplifier and
     /// delays, and without the aliases that the fit `through_chain`, of the mechanics `fitted`, has at the data.
     ///
     /// ```text
@@ -348,8 +416,13 @@ impl MeasurementChain {
     }
 }
 
+/// Whether readings are taken after the step of their samples.
+fn is_advanced(path: &SignalPath) -> bool {
+    path.mean_delay_s() < 0.0
+}
+
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, from which sampling deviates by a
-/// thousandth near the mode.
+/// thousandth near the mode. Factors s^k of the output do not change them.
 pub(super) fn log_derivatives(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
     let (s, w, zeta) = (
         Complex::new(0.0, omega_rad_s),

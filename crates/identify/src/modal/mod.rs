@@ -79,13 +79,33 @@ pub fn fit_with_progress(
     chain: &MeasurementChain,
     progress: &mut Progress<'_>,
 ) -> Result<ModalFit, FitError> {
+    fit_up_to(data, chain, search::MAX_MODES, progress)
+}
+
+/// As [`fit`], with at most `max_modes` modes: enough to see whether modes describe data.
+pub(crate) fn fit_few(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    max_modes: usize,
+) -> Result<ModalFit, FitError> {
+    fit_up_to(data, chain, max_modes, &mut |_| ControlFlow::Continue(()))
+}
+
+fn fit_up_to(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    max_modes: usize,
+    progress: &mut Progress<'_>,
+) -> Result<ModalFit, FitError> {
     let [first, .., last] = data else {
         return Err(too_few(data));
     };
     let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
     let nodes = &chain.nodes(data, 0.0);
     let problem = Problem { chain, data, nodes };
-    let orders = search::orders(problem, &mut |done| progress(SEARCH_PROGRESS * done))?;
+    let orders = search::orders(problem, max_modes, &mut |done| {
+        progress(SEARCH_PROGRESS * done)
+    })?;
     let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
     report(progress, SEARCH_PROGRESS)?;
     let fit = ModalFit {

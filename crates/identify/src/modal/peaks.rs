@@ -21,7 +21,7 @@ const DAMPING_RATIO: (f64, f64) = (1e-3, 0.06);
 
 /// Modes at the peaks, with the delays of least chi^2; none with fewer than two peaks.
 pub(super) fn peak_starts(problem: Problem<'_>) -> Vec<ModalParameters> {
-    let modes = peaks(problem.data);
+    let modes = peaks(problem);
     let [first, _, ..] = modes[..] else {
         return Vec::new();
     };
@@ -45,11 +45,9 @@ pub(super) fn peak_starts(problem: Problem<'_>) -> Vec<ModalParameters> {
 }
 
 /// A mode of residue 0 at each peak of |velocity|, lowest frequency first.
-fn peaks(data: &[FrfDatum]) -> Vec<ModalTerm> {
-    let velocity: Vec<f64> = data
-        .iter()
-        .map(|datum| datum.response.norm() * datum.frequency_hz)
-        .collect();
+fn peaks(problem: Problem<'_>) -> Vec<ModalTerm> {
+    let Problem { chain, data, .. } = problem;
+    let velocity: Vec<f64> = data.iter().map(|datum| chain.velocity(datum)).collect();
     let mut peaks: Vec<usize> = (0..data.len())
         .filter(|k| is_peak(data, &velocity, *k))
         .collect();

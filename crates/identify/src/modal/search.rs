@@ -17,7 +17,7 @@ use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
 
 /// Largest number of modes.
-const MAX_MODES: usize = 24;
+pub(super) const MAX_MODES: usize = 24;
 
 /// No data are left out below this number of data, as of the lines of a multisine.
 const MIN_DATA: usize = 400;
@@ -84,16 +84,18 @@ impl Serialize for ModelOrder {
     }
 }
 
-/// All orders that are significant, from one mode on.
+/// All orders that are significant, from one mode on to `max_modes`.
 ///
 /// A relative error is added to the noise: a large one first, then a small one, then none. So modes are found in the order of
 /// their effect on the response rather than of the accuracy of the data, and an approximate model of all of them exists before
 /// small differences count.
 pub(super) fn orders(
     problem: Problem<'_>,
+    max_modes: usize,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<ModelOrder>, FitError> {
     let mut search = Search {
+        max_modes,
         orders: Vec::new(),
         parameters: ModalParameters::default(),
         done: 0.0,
@@ -109,6 +111,7 @@ pub(super) fn orders(
 
 /// The state of the search between two passes.
 struct Search<'a, 'p> {
+    max_modes: usize,
     /// The orders found so far.
     orders: Vec<ModelOrder>,
     /// Result of the pass before.
@@ -158,7 +161,7 @@ impl Search<'_, '_> {
         let data = &pass.data(problem.data, &self.parameters);
         let chain = problem.chain;
         let mut first_misfit = None;
-        for _ in 0..MAX_MODES {
+        for _ in 0..self.max_modes {
             let nodes = &chain.nodes(data, self.parameters.delay_s);
             let problem = Problem { chain, data, nodes };
             let start = std::mem::take(&mut self.parameters);
@@ -193,7 +196,7 @@ impl Search<'_, '_> {
         first_misfit: f64,
         mut solution: Solution,
     ) -> Result<(), FitError> {
-        while solution.parameters.modes.len() < MAX_MODES {
+        while solution.parameters.modes.len() < self.max_modes {
             let fraction = pass_progress(first_misfit, problem.misfit(solution.chi2));
             self.report(pass, fraction)?;
             let Some(next) = with_another_mode(problem, &solution, pass.tolerance) else {

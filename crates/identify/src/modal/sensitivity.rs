@@ -70,6 +70,7 @@ mod tests {
 
     use super::*;
     use crate::modal::ModalParameters;
+    use bench_plant::OutputKind;
 
     /// Two modes through a path with a hold of 1 ms and a delay of 2 ms.
     fn fit() -> (ModalFit, MeasurementChain) {
@@ -94,7 +95,7 @@ mod tests {
             hold_s: 1e-3,
             lag_s: 0.0,
         };
-        (fit, MeasurementChain::Input(path))
+        (fit, MeasurementChain::Input(path, OutputKind::Position))
     }
 
     #[test]

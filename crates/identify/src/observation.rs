@@ -1,0 +1,79 @@
+//! A response with the modes that were fitted to it, and how it was observed.
+
+use bench_plant::OutputKind;
+
+use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::verdict::MAX_CHI2_PER_FREEDOM;
+use crate::{Frf, FrfDatum};
+
+/// Where signals come from, apart from the kind of the output.
+#[derive(Clone, Copy)]
+pub(super) struct Source {
+    /// Samples per second.
+    pub(super) rate_hz: f64,
+    /// What lies between the samples of the input and the force.
+    pub(super) input_path: InputPath,
+}
+
+/// Number of data of a part.
+const PART_DATA: usize = 400;
+/// Largest number of modes that are fitted to a part.
+pub(super) const PART_MODES: usize = 8;
+/// As many modes as show on which side of a step an acceleration was read.
+const STEP_MODES: usize = 4;
+
+impl Source {
+    /// The chain of an output of this kind. An acceleration that steps with its input may have been read before the step or after it: the
+    /// chain is the one that describes a part of the data better.
+    pub(super) fn chain(&self, kind: OutputKind, data: &[FrfDatum]) -> MeasurementChain {
+        let before = self.input_path.chain(self.rate_hz).observing(kind);
+        let Some(after) = self.input_path.chain_after_step(self.rate_hz, kind) else {
+            return before;
+        };
+        let data = part(data);
+        if cost(&data, &after) < cost(&data, &before) {
+            after
+        } else {
+            before
+        }
+    }
+}
+
+/// chi^2 and a penalty for each mode, as for a mode that is significant: modes may take the place of another chain.
+fn cost(data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
+    let Ok(fit) = modal::fit_few(data, chain, STEP_MODES) else {
+        return f64::INFINITY;
+    };
+    let n = data.len() as f64;
+    2.0 * n * fit.chi2_per_freedom + 5.0 * n.ln() * fit.parameters.modes.len() as f64
+}
+
+/// A few modes of some data.
+pub(super) fn fit_part(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
+    modal::fit_few(data, chain, PART_MODES)
+}
+
+/// Some of the data: many modes are fitted to what is no sum of modes, and a part shows that at less cost.
+pub(super) fn part(data: &[FrfDatum]) -> Vec<FrfDatum> {
+    let every = data.len().div_ceil(PART_DATA).max(1);
+    data.iter().step_by(every).copied().collect()
+}
+
+/// A response with its modes.
+#[derive(Clone, Copy)]
+pub(super) struct Observation<'a> {
+    pub(super) source: Source,
+    pub(super) frf: &'a Frf,
+    pub(super) fit: &'a Result<ModalFit, FitError>,
+    /// The chain of the fit.
+    pub(super) chain: &'a MeasurementChain,
+    /// The kind of the output, if the user states it.
+    pub(super) stated: Option<OutputKind>,
+    /// The kind of an output that is clearly another one.
+    pub(super) clear_kind: Option<OutputKind>,
+}
+
+/// Whether the fit describes the data.
+pub(super) fn describes(fit: &ModalFit) -> bool {
+    fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM
+}

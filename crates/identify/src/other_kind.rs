@@ -1,0 +1,129 @@
+//! Whether another kind of output, or swapped columns, describe what modes do not.
+//!
+//! The dual of an accelerance s^2 G is a mobility in the wrong direction: 1/(s^2 G) is a sum of modes as well, one of them a free body,
+//! and a constant. So modes describe the inverse of an acceleration, and swapped columns as an acceleration. An explanation with a free
+//! body and a constant that exceeds all modes at the end of the band is therefore not counted.
+
+use bench_plant::OutputKind;
+use nalgebra::Complex;
+
+use crate::modal::{self, MeasurementChain, ModalFit};
+use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
+use crate::{Estimate, FrfDatum};
+
+/// A constant below this ratio of the response at the end of the band does not dominate it.
+const CONSTANT_RATIO: f64 = 0.7;
+/// A static compliance that is known to be below this ratio of the sum of its parts is zero ...
+const STATIC_RATIO: f64 = 0.05;
+/// ... unless it exceeds this multiple of its standard deviation.
+const STATIC_SIGMAS: f64 = 5.0;
+const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output; exchange --input and --output, which are swapped";
+
+/// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do.
+/// With these few modes of the assumed kind; many more would be fitted in vain.
+pub(super) fn modes_of_other_kind(
+    source: &Source,
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+) -> Option<(OutputKind, ModalFit)> {
+    let few = fit_part(&part(data), chain).ok()?;
+    if describes(&few) {
+        return None;
+    }
+    let (kind, other) = other_kind(source, data, chain.output())?;
+    (2 * other.parameters.modes.len() <= PART_MODES).then_some((kind, few))
+}
+
+/// What describes the data in place of modes with the kind of output of the fit.
+pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
+    if seen.fit.as_ref().is_ok_and(describes) {
+        return None;
+    }
+    let assumed = seen.chain.output();
+    let found = || Some(other_kind(&seen.source, &seen.frf.data, assumed)?.0);
+    match seen.clear_kind.or_else(found) {
+        Some(kind) => Some(give_kind(assumed, kind)),
+        None => inverse_fits(seen).then(|| SWAPPED.into()),
+    }
+}
+
+fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {
+    let (assumed, kind) = (assumed.name(), kind.name());
+    format!("modes describe the output as {kind}, but not as {assumed}; give --output-kind {kind}")
+}
+
+/// The only other kind of output of which modes describe the data, with these modes.
+fn other_kind(
+    source: &Source,
+    data: &[FrfDatum],
+    assumed: OutputKind,
+) -> Option<(OutputKind, ModalFit)> {
+    let others = OutputKind::ALL.into_iter().filter(|kind| *kind != assumed);
+    let mut found = others.filter_map(|kind| Some((kind, modes_as(source, data, kind)?)));
+    let first = found.next()?;
+    found.next().is_none().then_some(first)
+}
+
+/// Modes that describe a part of the data as an output of this kind.
+fn modes_as(source: &Source, data: &[FrfDatum], kind: OutputKind) -> Option<ModalFit> {
+    let fit = fit_part(&part(data), &source.chain(kind, data)).ok()?;
+    let is_acceleration = kind == OutputKind::Position && vanishes(&fit);
+    (describes(&fit) && !is_dual(&fit) && !is_acceleration).then_some(fit)
+}
+
+/// Whether modes describe the inverse of the response.
+fn inverse_fits(seen: &Observation<'_>) -> bool {
+    let mut inverse: Vec<FrfDatum> = seen.frf.data.iter().map(inverse_datum).collect();
+    inverse.retain(|datum| datum.variance.is_normal());
+    let is_sum_of_modes = |data: &[FrfDatum]| {
+        modal::fit(data, seen.chain).is_ok_and(|fit| describes(&fit) && !is_dual(&fit))
+    };
+    is_sum_of_modes(&part(&inverse)) && is_sum_of_modes(&inverse)
+}
+
+fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
+    FrfDatum {
+        response: datum.response.inv(),
+        variance: datum.variance / datum.response.norm_sqr().powi(2),
+        ..*datum
+    }
+}
+
+/// Whether modes are those of the inverse of another response: a free body, below the band, and a constant that dominates its end.
+fn is_dual(fit: &ModalFit) -> bool {
+    let (low_hz, high_hz) = fit.band_hz;
+    let [low_rad_s, high_rad_s] = [low_hz, high_hz].map(|hz| std::f64::consts::TAU * hz);
+    let parameters = &fit.parameters;
+    let s = Complex::new(0.0, high_rad_s);
+    let modes = parameters.modes.iter();
+    let sum: Complex<f64> = modes
+        .map(|mode| mode.resonance(s) * mode.residue_per_kg)
+        .sum();
+    let constant = parameters.remainder_m_per_n;
+    let has_free_body = parameters
+        .modes
+        .iter()
+        .any(|mode| mode.omega_rad_s < low_rad_s);
+    has_free_body && constant.abs() > CONSTANT_RATIO * (sum + constant).norm()
+}
+
+/// Whether the response of a fit vanishes at rest, which that of a position of a supported stage does not, but an acceleration does:
+/// near its modes s^2 is about -w^2, so that modes with residues of the opposite signs, and a constant, describe it.
+pub(super) fn vanishes_at_rest(seen: &Observation<'_>) -> Option<String> {
+    let fit = seen.fit.as_ref().ok().filter(|fit| describes(fit))?;
+    if seen.stated.is_some() || !vanishes(fit) {
+        return None;
+    }
+    Some("the static response of the modes is zero within its error, so that the output may be an acceleration, of which the signs would be the opposite ones; give --output-kind acceleration, or --output-kind position if it is a displacement".into())
+}
+
+fn vanishes(fit: &ModalFit) -> bool {
+    let Some(compliance) = fit.static_compliance_m_per_n() else {
+        return false;
+    };
+    let modes = fit.parameters.modes.iter();
+    let parts = modes.map(|mode| (mode.residue_per_kg / mode.omega_rad_s.powi(2)).abs());
+    let size = parts.sum::<f64>() + fit.parameters.remainder_m_per_n.abs();
+    let Estimate { value, sigma } = compliance;
+    value.abs().max(sigma) < STATIC_RATIO * size && value.abs() < STATIC_SIGMAS * sigma
+}

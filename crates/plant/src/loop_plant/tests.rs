@@ -1,0 +1,202 @@
+//! Responses of each kind of output against closed forms and a dense matrix exponential.
+
+use nalgebra::DVector;
+
+use super::*;
+
+const PERIOD_S: f64 = 1e-3;
+const OMEGA_RAD_S: f64 = 300.0;
+const DAMPING_RATIO: f64 = 0.02;
+const FORCE_CONSTANT_N_PER_A: f64 = 11.0;
+/// Up to 0.45 of the rate.
+const FREQUENCIES_RAD_S: [f64; 4] = [50.0, 290.0, 301.0, 0.9 * std::f64::consts::PI / PERIOD_S];
+
+fn mode() -> Mode {
+    Mode {
+        omega_rad_s: OMEGA_RAD_S,
+        damping_ratio: DAMPING_RATIO,
+        shape: DVector::zeros(0),
+        force_gain: 0.7,
+        sensor_gain: 0.6,
+        floor_gain: 0.0,
+    }
+}
+
+fn plant(output: OutputKind, amplifier_bandwidth_hz: f64, delay_s: f64) -> LoopPlant {
+    let path = SignalPath {
+        period_s: PERIOD_S,
+        amplifier_bandwidth_hz,
+        force_constant_n_per_a: FORCE_CONSTANT_N_PER_A,
+        delays_s: vec![delay_s],
+        output,
+    };
+    LoopPlant::of(&path, &[mode()])
+}
+
+fn z_at(omega_rad_s: f64) -> Complex<f64> {
+    Complex::from_polar(1.0, omega_rad_s * PERIOD_S)
+}
+
+/// The response without a lag by the pole p: x' = p x + f, q = Im x/Im p, q' = Im(p x)/Im p, q'' = Im(p^2 x)/Im p + f, with f held and
+/// x[k + 1] = e x[k] + (e - 1)/p f[k], e = exp(p T). The reading of tick k is that at `after` periods after the tick k - `ticks`; at a tick
+/// itself the force is that of the tick before.
+fn closed_form(output: OutputKind, z: Complex<f64>, ticks: i32, after: f64) -> Complex<f64> {
+    let damped = (1.0 - DAMPING_RATIO * DAMPING_RATIO).sqrt();
+    let pole = Complex::new(-DAMPING_RATIO, damped) * OMEGA_RAD_S;
+    let power = output.derivatives();
+    let part = |p: Complex<f64>| {
+        let (e, within) = ((p * PERIOD_S).exp(), (p * PERIOD_S * after).exp());
+        let x = (e - 1.0) / p / (z - e);
+        p.powi(power) * (within * x + (within - 1.0) / p)
+    };
+    let modal = (part(pole) - part(pole.conj())) / Complex::new(0.0, 2.0 * pole.im);
+    // The constants of both parts hold the force within the period.
+    let direct = match output {
+        OutputKind::Acceleration if after > 0.0 => Complex::new(1.0, 0.0),
+        OutputKind::Acceleration => z.inv(),
+        OutputKind::Position | OutputKind::Velocity => Complex::new(0.0, 0.0),
+    };
+    (modal + direct) * z.powi(-ticks) * (0.42 * FORCE_CONSTANT_N_PER_A)
+}
+
+fn assert_responses(plant: &LoopPlant, expected: impl Fn(Complex<f64>) -> Complex<f64>) {
+    for omega_rad_s in FREQUENCIES_RAD_S {
+        let found = plant.response(omega_rad_s);
+        let expected = expected(z_at(omega_rad_s));
+        // The exponential is accurate to some 1e-15 of its largest element, 1; at 0.45 of the rate the response of a position is 2e-3 of
+        // its parts.
+        let error = (found - expected).norm() / expected.norm();
+        assert!(error < 1e-11, "{omega_rad_s} rad/s: {found} {expected}");
+    }
+}
+
+#[test]
+fn held_force_without_a_lag_has_the_closed_form_of_each_output() {
+    for output in OutputKind::ALL {
+        let at = |delay_periods: f64| plant(output, f64::INFINITY, delay_periods * PERIOD_S);
+        assert_responses(&at(0.0), |z| closed_form(output, z, 0, 0.0));
+        assert_responses(&at(2.0), |z| closed_form(output, z, 2, 0.0));
+        assert_responses(&at(1.3), |z| closed_form(output, z, 2, 0.7));
+    }
+}
+
+#[test]
+fn acceleration_with_an_advance_is_that_after_the_step_of_the_force() {
+    let output = OutputKind::Acceleration;
+    assert_responses(&plant(output, f64::INFINITY, -0.25 * PERIOD_S), |z| {
+        closed_form(output, z, 0, 0.25)
+    });
+    let [before, after] = [0.0, -1e-6].map(|d| plant(output, f64::INFINITY, d * PERIOD_S));
+    for omega_rad_s in FREQUENCIES_RAD_S {
+        let step = after.response(omega_rad_s) - before.response(omega_rad_s);
+        let force = (Complex::new(1.0, 0.0) - z_at(omega_rad_s).inv()) * 4.62;
+        // An advance of 1e-9 s changes the acceleration of the modes by w/(2 zeta) 1e-9 s, 1e-5, of the force.
+        assert!((step - force).norm() < 1e-4, "{step} {force}");
+    }
+}
+
+/// Reading of tick k = C x(k T - d) with the states [q, q', i] and scipy.linalg.expm of [[A, B], [0, 0]] t (scipy 1.17.1); amplifier of
+/// 200 Hz.
+#[test]
+fn lagging_force_has_the_response_of_a_dense_matrix_exponential() {
+    let cases = [
+        (
+            OutputKind::Position,
+            0.0,
+            290.0,
+            (0.0004046671555839217, -0.000514906536659188),
+        ),
+        (
+            OutputKind::Position,
+            0.0,
+            900.0 * std::f64::consts::PI,
+            (2.16844897749909e-07, 7.666697723946246e-08),
+        ),
+        (
+            OutputKind::Position,
+            1.3e-3,
+            290.0,
+            (0.00018669296135049955, -0.0006277196050244576),
+        ),
+        (
+            OutputKind::Position,
+            1.3e-3,
+            900.0 * std::f64::consts::PI,
+            (-1.9427829546244026e-07, -7.571359914888495e-08),
+        ),
+        (
+            OutputKind::Velocity,
+            0.0,
+            290.0,
+            (0.1493250334489232, 0.11735019257482845),
+        ),
+        (
+            OutputKind::Velocity,
+            0.0,
+            900.0 * std::f64::consts::PI,
+            (-0.0003126630063877746, 0.00013665528323498469),
+        ),
+        (
+            OutputKind::Velocity,
+            1.3e-3,
+            290.0,
+            (0.18204467338725996, 0.05415191443465192),
+        ),
+        (
+            OutputKind::Velocity,
+            1.3e-3,
+            900.0 * std::f64::consts::PI,
+            (-0.00022659415667286556, -0.0003640402775545399),
+        ),
+        (
+            OutputKind::Acceleration,
+            0.0,
+            290.0,
+            (-34.0546787631495, 43.16866096841001),
+        ),
+        (
+            OutputKind::Acceleration,
+            0.0,
+            900.0 * std::f64::consts::PI,
+            (-2.5330841640658974, -0.6380746096796082),
+        ),
+        (
+            OutputKind::Acceleration,
+            1.3e-3,
+            290.0,
+            (-15.684331287128666, 52.80580383938625),
+        ),
+        (
+            OutputKind::Acceleration,
+            1.3e-3,
+            900.0 * std::f64::consts::PI,
+            (1.5155065576003428, 0.7747068116297148),
+        ),
+    ];
+    for (output, delay_s, omega_rad_s, (re, im)) in cases {
+        let found = plant(output, 200.0, delay_s).response(omega_rad_s);
+        let expected = Complex::new(re, im);
+        // As above; of the expected numbers too.
+        let error = (found - expected).norm() / expected.norm();
+        assert!(error < 1e-10, "{output:?} {delay_s} {omega_rad_s}: {found}");
+    }
+}
+
+#[test]
+fn state_space_has_the_response_of_each_output() {
+    for output in OutputKind::ALL {
+        for delay_s in [0.0, 1.3e-3] {
+            let plant = plant(output, 200.0, delay_s);
+            let (a, b, c) = plant.state_space();
+            let complex = |m: DMatrix<f64>| m.map(|x| Complex::new(x, 0.0));
+            let (b, c) = (complex(b), complex(c));
+            for omega_rad_s in FREQUENCIES_RAD_S {
+                let n = a.nrows();
+                let matrix = DMatrix::identity(n, n) * z_at(omega_rad_s) - complex(a.clone());
+                let direct = (&c * matrix.lu().solve(&b).expect("no pole"))[(0, 0)];
+                let error = (plant.response(omega_rad_s) - direct).norm() / direct.norm();
+                assert!(error < 1e-10, "{output:?} {delay_s} {omega_rad_s}: {error}");
+            }
+        }
+    }
+}
