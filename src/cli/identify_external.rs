@@ -16,7 +16,7 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::Resolution;
-use bench_identify::{Distortion, DistortionSource};
+use bench_identify::{Distortion, DistortionSource, OutputKind};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -40,6 +40,8 @@ struct Report {
     /// Whether the times are taken as seconds only because the file does not state their unit.
     time_unit_assumed: bool,
     band_hz: (f64, f64),
+    /// What the output measures, as stated, or `position`.
+    output_kind: OutputKind,
     /// Hold and lag of the input that were assumed; 0 without them.
     hold_s: f64,
     input_lag_s: f64,
@@ -135,6 +137,7 @@ impl Report {
             times: record.times,
             time_unit_assumed: false,
             band_hz: analysis.band_hz,
+            output_kind: analysis.output_kind,
             hold_s: analysis.input_path.hold_s,
             input_lag_s: analysis.input_path.lag_s,
             input_resolution: analysis.resolution.input,
@@ -155,31 +158,50 @@ impl Report {
     }
 
     fn text(&self) -> String {
-        let (input, output) = (&self.input, &self.output);
         let coherence = self.coherence_median.unwrap_or(0.0);
         let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "{}{}\n{}  residues   in `{output}`/(`{input}` s^2)\n  fit        reduced chi-square {chi2:.3}\n{}",
+            "{}{}\n{}  residues   in {}\n  fit        reduced chi-square {chi2:.3}\n{}",
             self.record_text(),
             response_text(&self.frf_csv, self.frequencies, coherence),
             pages_text(&self.pages),
-            modal_output::text(&self.summary, "output/input/s^2")
+            self.residue_unit(),
+            modal_output::text(&self.summary, table_unit(self.output_kind))
         )
     }
 
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
             self.output,
             self.times_text(),
+            self.output_kind_text(),
             self.resolution_text(),
             self.input_path_text()
         )
+    }
+
+    /// What the output measures, if it is no position.
+    fn output_kind_text(&self) -> String {
+        match self.output_kind {
+            OutputKind::Position => String::new(),
+            kind => labelled("output", kind.name()),
+        }
+    }
+
+    /// The unit of the residues, in which a position is the output divided by s or s^2.
+    fn residue_unit(&self) -> String {
+        let (input, output) = (&self.input, &self.output);
+        match self.output_kind {
+            OutputKind::Position => format!("`{output}`/(`{input}` s^2)"),
+            OutputKind::Velocity => format!("`{output}`/(`{input}` s)"),
+            OutputKind::Acceleration => format!("`{output}`/`{input}`"),
+        }
     }
 
     /// The unit of the times if it is assumed, and irregular times.
@@ -219,6 +241,15 @@ impl Report {
         }
         let (hold_ms, lag_ms) = (1e3 * self.hold_s, 1e3 * self.input_lag_s);
         format!("             input held for {hold_ms:.4} ms, lag {lag_ms:.4} ms\n")
+    }
+}
+
+/// The unit of the residues in the table.
+fn table_unit(kind: OutputKind) -> &'static str {
+    match kind {
+        OutputKind::Position => "output/input/s^2",
+        OutputKind::Velocity => "output/input/s",
+        OutputKind::Acceleration => "output/input",
     }
 }
 

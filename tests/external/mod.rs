@@ -5,6 +5,7 @@ mod distortion;
 mod existing_results;
 mod forms;
 mod motor_bench;
+mod output_kinds;
 mod periodic;
 mod random_stages;
 mod refused;

@@ -1,8 +1,9 @@
 //! Whether another kind of output, or swapped columns, describe what modes do not.
 //!
-//! The dual of an accelerance s^2 G is a mobility in the wrong direction: 1/(s^2 G) is a sum of modes as well, one of them a free body,
-//! and a constant. So modes describe the inverse of an acceleration, and swapped columns as an acceleration. An explanation with a free
-//! body and a constant that exceeds all modes at the end of the band is therefore not counted.
+//! The inverse of an acceleration over a force, 1/(s^2 G), is a sum of modes too: the zeros of G are its modes, with a free body and a
+//! constant. So modes describe the columns of an acceleration when they are exchanged, and exchanged columns of a position as an
+//! acceleration. An explanation with a free body, and a constant that is nearly all of the response at the end of the band, is therefore
+//! not counted.
 
 use bench_plant::OutputKind;
 use nalgebra::Complex;
@@ -11,7 +12,7 @@ use crate::modal::{self, MeasurementChain, ModalFit};
 use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
 use crate::{Estimate, FrfDatum};
 
-/// A constant below this ratio of the response at the end of the band does not dominate it.
+/// A constant above this ratio of the response at the end of the band is nearly all of it.
 const CONSTANT_RATIO: f64 = 0.7;
 /// A static compliance that is known to be below this ratio of the sum of its parts is zero ...
 const STATIC_RATIO: f64 = 0.05;
@@ -68,7 +69,7 @@ fn other_kind(
 fn modes_as(source: &Source, data: &[FrfDatum], kind: OutputKind) -> Option<ModalFit> {
     let fit = fit_part(&part(data), &source.chain(kind, data)).ok()?;
     let is_acceleration = kind == OutputKind::Position && vanishes(&fit);
-    (describes(&fit) && !is_dual(&fit) && !is_acceleration).then_some(fit)
+    (describes(&fit) && !is_of_inverse(&fit) && !is_acceleration).then_some(fit)
 }
 
 /// Whether modes describe the inverse of the response.
@@ -76,7 +77,7 @@ fn inverse_fits(seen: &Observation<'_>) -> bool {
     let mut inverse: Vec<FrfDatum> = seen.frf.data.iter().map(inverse_datum).collect();
     inverse.retain(|datum| datum.variance.is_normal());
     let is_sum_of_modes = |data: &[FrfDatum]| {
-        modal::fit(data, seen.chain).is_ok_and(|fit| describes(&fit) && !is_dual(&fit))
+        modal::fit(data, seen.chain).is_ok_and(|fit| describes(&fit) && !is_of_inverse(&fit))
     };
     is_sum_of_modes(&part(&inverse)) && is_sum_of_modes(&inverse)
 }
@@ -89,8 +90,9 @@ fn inverse_datum(datum: &FrfDatum) -> FrfDatum {
     }
 }
 
-/// Whether modes are those of the inverse of another response: a free body, below the band, and a constant that dominates its end.
-fn is_dual(fit: &ModalFit) -> bool {
+/// Whether modes are those of the inverse of another response: a free body, below the band, and a constant that is nearly all of the
+/// response at its end.
+fn is_of_inverse(fit: &ModalFit) -> bool {
     let (low_hz, high_hz) = fit.band_hz;
     let [low_rad_s, high_rad_s] = [low_hz, high_hz].map(|hz| std::f64::consts::TAU * hz);
     let parameters = &fit.parameters;

@@ -15,6 +15,7 @@ use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
 use bench_identify::{Identification, IdentificationError, IdentifyError, Signals};
+use bench_plant::OutputKind;
 
 /// The recording or the file, and what it contains.
 #[derive(Clone, Debug, PartialEq, clap::Args, Serialize, JsonSchema)]
@@ -63,9 +64,13 @@ pub struct ExternalOptions {
     /// Input column: the force or a signal proportional to it, in any unit; the file is read as CSV
     #[arg(long, value_name = "COLUMN", requires = "output")]
     pub input: Option<String>,
-    /// Output column: the displacement or a signal proportional to it, in any unit
+    /// Output column: the displacement, its velocity or acceleration (--output-kind), or a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     pub output: Option<String>,
+    /// What the output measures: `position`, `velocity` as of a laser vibrometer, or `acceleration`. The modes are those of the position
+    /// [default: position, and no verdict if the output looks like another kind]
+    #[arg(long, value_name = "KIND", requires = "input", value_enum)]
+    pub output_kind: Option<OutputKind>,
     /// Time column: numbers, or dates such as 2026-11-26T12:40:48.002Z. Times that are not equally spaced are taken as true
     #[arg(
         long,
@@ -189,6 +194,9 @@ impl ExternalOptions {
         }
         if let Some(repetition) = self.repetition(signals)? {
             identification = identification.periods(repetition);
+        }
+        if let Some(kind) = self.output_kind {
+            identification = identification.output_kind(kind);
         }
         let InputPath { hold_s, lag_s } = self.input_path(signals.rate_hz)?;
         Ok(identification.held_s(hold_s).lag_s(lag_s))

@@ -6,8 +6,7 @@ use super::page::{delay_ms, named};
 use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
-use bench_identify::ExternalAnalysis;
-use bench_identify::Unit;
+use bench_identify::{ExternalAnalysis, OutputKind, Unit};
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +52,7 @@ impl<'a> ExternalRecord<'a> {
             subtitle,
             record: format!("{} samples at {} Hz", self.samples, self.rate_hz),
             unit: Unit::Bare,
-            residue_unit: format!("{output} per {input} and s^2"),
+            residue_unit: self.residue_unit(),
             frf: &analysis.frf,
             model: None,
             magnitude_axis: self.magnitude_axis,
@@ -69,11 +68,25 @@ impl<'a> ExternalRecord<'a> {
         })
     }
 
+    /// The unit of the residues, in which a position is the output divided by s or s^2.
+    fn residue_unit(&self) -> String {
+        let (input, output) = (self.input, self.output);
+        match self.analysis.output_kind {
+            OutputKind::Position => format!("{output} per {input} and s^2"),
+            OutputKind::Velocity => format!("{output} per {input} and s"),
+            OutputKind::Acceleration => format!("{output} per {input}"),
+        }
+    }
+
     fn description(&self) -> String {
         let periodic = self.analysis.periodic.as_ref();
         let pairs = named([
             ("Input", Some(self.input.to_string())),
             ("Output", Some(self.output.to_string())),
+            (
+                "Kind of the output",
+                Some(self.analysis.output_kind.name().to_string()),
+            ),
             ("Samples", Some(self.samples.to_string())),
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
             ("Times", Some(self.times.to_string())),
