@@ -1,12 +1,14 @@
 //! What the columns of a table are, by their names.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::error::FrfTableError;
 use super::table::FrfTable;
+use super::unit::{ResponseUnit, UnitRule};
 
 /// Unit of phases.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 #[serde(rename_all = "lowercase")]
 pub enum PhaseUnit {
@@ -29,10 +31,10 @@ pub(super) enum Role {
     Resolution,
 }
 
-/// Unit of a magnitude.
+/// Scale of a magnitude.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Scale {
-    /// Metres per ampere.
+    /// In its unit.
     Linear,
     /// 20 log10 of it.
     Decibels,
@@ -65,6 +67,8 @@ pub(super) struct Columns {
     pub coherence: Option<String>,
     pub magnitude_sigma: Option<String>,
     pub resolution: Option<String>,
+    /// The unit that the columns of the response state.
+    pub unit: Option<ResponseUnit>,
 }
 
 /// The words of a name and its unit, in lower case.
@@ -163,6 +167,23 @@ impl Words {
         }
     }
 
+    /// Whether the name or the unit is that of a velocity or an acceleration.
+    fn is_derivative(&self) -> bool {
+        const NAMES: [&str; 9] = [
+            "velocity",
+            "acceleration",
+            "accelerance",
+            "inertance",
+            "mobility",
+            "s2",
+            "ms2",
+            "s²",
+            "ms²",
+        ];
+        let is_per_second = self.0.len() > 1 && self.0[1..].iter().any(|word| word == "s");
+        self.has(&NAMES) || is_per_second
+    }
+
     /// Whether the unit is another one than metres per ampere.
     fn has_other_unit(&self) -> bool {
         const OTHERS: [&str; 30] = [
@@ -180,7 +201,7 @@ impl Words {
 
 impl Columns {
     /// The columns of a table by their names; three columns without names are a frequency and two of the response.
-    pub fn of(table: &FrfTable<'_>) -> Result<Columns, FrfTableError> {
+    pub fn of(table: &FrfTable<'_>, rule: UnitRule) -> Result<Columns, FrfTableError> {
         if let ([frequency, first, second], false) = (table.names(), table.has_names()) {
             return Ok(Columns {
                 frequency: frequency.clone(),
@@ -189,30 +210,40 @@ impl Columns {
                 coherence: None,
                 magnitude_sigma: None,
                 resolution: None,
+                unit: None,
             });
         }
-        Named::of(table)?.columns()
+        Named::of(table, rule)?.columns()
     }
 }
 
 /// A column with its words and its role.
 struct NamedColumn<'a> {
     name: &'a String,
+    /// By the line of units; empty without one.
+    unit: &'a str,
     words: Words,
     role: Option<Role>,
 }
 
 struct Named<'a> {
     table: &'a FrfTable<'a>,
+    rule: UnitRule,
     columns: Vec<NamedColumn<'a>>,
 }
 
 impl<'a> Named<'a> {
-    fn of(table: &'a FrfTable<'_>) -> Result<Named<'a>, FrfTableError> {
+    fn of(table: &'a FrfTable<'_>, rule: UnitRule) -> Result<Named<'a>, FrfTableError> {
         let columns = table.names().iter().enumerate().map(|(index, name)| {
-            let words = Words::of(name, table.unit(index));
+            let unit = table.unit(index);
+            let words = Words::of(name, unit);
             let role = words.role();
-            NamedColumn { name, words, role }
+            NamedColumn {
+                name,
+                unit,
+                words,
+                role,
+            }
         });
         let columns: Vec<NamedColumn<'_>> = columns.collect();
         for (index, column) in columns.iter().enumerate() {
@@ -226,7 +257,11 @@ impl<'a> Named<'a> {
                 });
             }
         }
-        Ok(Named { table, columns })
+        Ok(Named {
+            table,
+            rule,
+            columns,
+        })
     }
 
     fn get(&self, role: Role) -> Option<&NamedColumn<'a>> {
@@ -247,13 +282,16 @@ impl<'a> Named<'a> {
 
     fn columns(&self) -> Result<Columns, FrfTableError> {
         let frequency = self.require(Role::Frequency, "frequency")?;
+        let pair = self.pair()?;
+        let unit = self.unit()?;
         if let Some(sigma) = self.get(Role::MagnitudeSigma) {
-            self.check_sigma_unit(sigma)?;
+            self.check_sigma_unit(sigma, unit.as_ref())?;
         }
         Ok(Columns {
             frequency: frequency.name.clone(),
             hz_per_unit: frequency.words.hz_per_unit(),
-            pair: self.pair()?,
+            pair,
+            unit,
             coherence: self.name(Role::Coherence),
             magnitude_sigma: self.name(Role::MagnitudeSigma),
             resolution: self.name(Role::Resolution),
@@ -281,11 +319,44 @@ impl<'a> Named<'a> {
         })
     }
 
+    /// The unit that the columns of the response state. Real and imaginary part have the same one.
+    fn unit(&self) -> Result<Option<ResponseUnit>, FrfTableError> {
+        let parts = [self.get(Role::Real), self.get(Role::Imaginary)];
+        let [Some(real), Some(imaginary)] = parts else {
+            return Ok(self.get(Role::Magnitude).and_then(NamedColumn::stated_unit));
+        };
+        let units = [real, imaginary].map(NamedColumn::stated_unit);
+        match units {
+            [Some(of_real), Some(of_imaginary)] if of_real != of_imaginary => {
+                Err(FrfTableError::TwoUnits {
+                    path: self.table.path().to_owned(),
+                    column: imaginary.name.clone(),
+                    unit: of_imaginary,
+                    other: of_real,
+                })
+            }
+            [first, second] => Ok(first.or(second)),
+        }
+    }
+
     /// A standard deviation in dB or per cent is that of a ratio.
-    fn check_sigma_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
-        match column.words.scale() {
-            Scale::Decibels => Err(self.other_unit(column)),
-            Scale::Linear => self.check_unit(column),
+    fn check_sigma_unit(
+        &self,
+        column: &NamedColumn<'_>,
+        unit: Option<&ResponseUnit>,
+    ) -> Result<(), FrfTableError> {
+        let is_ratio = column.words.scale() == Scale::Decibels || column.words.has(&["percent"]);
+        let stated = column.stated_unit();
+        match self.rule {
+            UnitRule::MetresPerAmpere if is_ratio => Err(self.other_unit(column)),
+            UnitRule::MetresPerAmpere => self.check_unit(column),
+            UnitRule::Any if is_ratio || (stated.is_some() && stated.as_ref() != unit) => {
+                Err(FrfTableError::SigmaUnit {
+                    path: self.table.path().to_owned(),
+                    column: column.name.clone(),
+                })
+            }
+            UnitRule::Any => Ok(()),
         }
     }
 
@@ -297,9 +368,21 @@ impl<'a> Named<'a> {
     }
 
     fn check_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
-        if column.words.has_other_unit() {
-            return Err(self.other_unit(column));
+        match self.rule {
+            UnitRule::MetresPerAmpere if column.words.has_other_unit() => {
+                Err(self.other_unit(column))
+            }
+            UnitRule::Any if column.words.is_derivative() => Err(FrfTableError::Derivative {
+                path: self.table.path().to_owned(),
+                column: column.name.clone(),
+            }),
+            UnitRule::MetresPerAmpere | UnitRule::Any => Ok(()),
         }
-        Ok(())
+    }
+}
+
+impl NamedColumn<'_> {
+    fn stated_unit(&self) -> Option<ResponseUnit> {
+        ResponseUnit::stated(self.name, self.unit)
     }
 }

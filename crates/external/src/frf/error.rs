@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use bench_identify::frf_value::ValueDefect;
 use thiserror::Error;
 
+use super::unit::ResponseUnit;
 use crate::error::{ExternalCsvError, Place};
 
 /// A valid line of names, for messages.
@@ -44,6 +45,34 @@ pub enum FrfTableError {
     /// The unit of the response is not metres per ampere.
     #[error("{path}: column `{column}` is not in m/A by its name; give a response from current (A) to displacement (m), converted to m/A", path = .path.display())]
     Unit {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+    },
+    /// Real and imaginary part in different units.
+    #[error("{path}: column `{column}` is in {unit}, but the other part of the response in {other}; give both in one unit", path = .path.display())]
+    TwoUnits {
+        /// The file.
+        path: PathBuf,
+        /// The column of the imaginary part.
+        column: String,
+        /// Its unit.
+        unit: ResponseUnit,
+        /// That of the real part.
+        other: ResponseUnit,
+    },
+    /// A standard deviation in another unit than the response.
+    #[error("{path}: column `{column}` is not in the unit of the response by its name; give the standard deviation of the magnitude in its linear unit, or leave out the column: it is then estimated from the scatter of the response", path = .path.display())]
+    SigmaUnit {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+    },
+    /// A velocity or an acceleration as output.
+    #[error("{path}: column `{column}` is the response of a velocity or an acceleration by its name, and modes are fitted to that of a displacement; divide the response by j omega (velocity) or by -omega^2 (acceleration), omega in rad/s, and rename the column", path = .path.display())]
+    Derivative {
         /// The file.
         path: PathBuf,
         /// The column.

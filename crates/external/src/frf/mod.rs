@@ -1,4 +1,4 @@
-//! Frequency responses of other programs, from current (A) to displacement (m).
+//! Frequency responses of other programs, from current (A) to displacement (m), or from any input to any displacement.
 //!
 //! ```text
 //! table or arrays -> columns (role and unit by name, or by the numbers) -> points -> sigma, as in the file or by the scatter -> Frf
@@ -19,9 +19,11 @@ mod error;
 mod numbers;
 mod points;
 mod table;
+mod unit;
 
 pub use columns::PhaseUnit;
 pub use error::FrfTableError;
+pub use unit::ResponseUnit;
 
 use std::path::Path;
 
@@ -31,6 +33,7 @@ use bench_identify::scatter::SigmaSource;
 use columns::Columns;
 use numbers::Numbers;
 use table::FrfTable;
+use unit::UnitRule;
 
 /// A response of another program.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,17 +44,37 @@ pub struct ImportedFrf {
     pub sigma: SigmaSource,
     /// What the file does not state and was assumed.
     pub assumptions: Vec<String>,
+    /// The unit of the response, if the file states it.
+    pub unit: Option<ResponseUnit>,
+    /// Whether the file has a coherence; otherwise it is that of one average with these standard deviations.
+    pub has_coherence: bool,
 }
 
-/// Reads a response; `phase` is the unit of its phases, whatever the file states.
+/// Reads a response in m/A; `phase` is the unit of its phases, whatever the file states.
 ///
 /// # Errors
 /// When the file has no response, or does not determine what its columns are: see [`FrfTableError`].
 pub fn read(path: &Path, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
+    read_by(path, phase, UnitRule::MetresPerAmpere)
+}
+
+/// Reads a response in any unit.
+///
+/// # Errors
+/// Those of [`read`], and when the output is a velocity or an acceleration.
+pub fn read_any_unit(path: &Path, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
+    read_by(path, phase, UnitRule::Any)
+}
+
+fn read_by(
+    path: &Path,
+    phase: Option<PhaseUnit>,
+    rule: UnitRule,
+) -> Result<ImportedFrf, FrfTableError> {
     let table = FrfTable::open(path)?;
-    let columns = Columns::of(&table)?;
+    let columns = Columns::of(&table, rule)?;
     let numbers = Numbers::read(&table, &columns)?;
-    points::response(&numbers, columns, phase)
+    points::response(&numbers, columns, phase, rule)
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@ use super::ImportedFrf;
 use super::columns::{Columns, Pair, PhaseUnit, Scale};
 use super::error::FrfTableError;
 use super::numbers::{Numbers, Row};
+use super::unit::UnitRule;
 
 /// Phases with a larger one are degrees: in radians it would be ten turns.
 const DEGREES: f64 = 60.0;
@@ -19,6 +20,9 @@ const RADIANS: f64 = 1.5;
 const ROUNDING: f64 = 1.001;
 /// A magnitude of less decibels (re 1 m/A), and no larger one, is in decibels; real and imaginary parts of such a size are of no stage.
 const DECIBELS: f64 = -20.0;
+/// Magnitudes of any unit with a larger range are linear: decibels that are all positive would need one of less than 0.1 dB beside one
+/// of more than 100 dB, or the like.
+const LINEAR_RANGE: f64 = 1e3;
 /// Largest real or imaginary part in m/A by which two columns without names are such parts.
 const LARGEST_PART: f64 = 0.1;
 
@@ -27,6 +31,7 @@ pub(super) fn response(
     numbers: &Numbers,
     columns: Columns,
     given: Option<PhaseUnit>,
+    rule: UnitRule,
 ) -> Result<ImportedFrf, FrfTableError> {
     let mut assumptions = Vec::new();
     if numbers.without_zero {
@@ -37,7 +42,7 @@ pub(super) fn response(
         assumptions.push(format!("column `{column}` states no unit: its frequencies are taken as Hz (name it omega or rad/s for rad/s)"));
         1.0
     });
-    let pair = determined(numbers, &columns.pair, &mut assumptions)?;
+    let pair = determined(numbers, &columns.pair, rule, &mut assumptions)?;
     let values = values(numbers, &pair, given, &mut assumptions)?;
     let frequency_hz: Vec<f64> = numbers
         .rows
@@ -49,6 +54,8 @@ pub(super) fn response(
         frf,
         sigma,
         assumptions,
+        unit: columns.unit,
+        has_coherence: columns.coherence.is_some(),
     })
 }
 
@@ -56,37 +63,93 @@ pub(super) fn response(
 fn determined(
     numbers: &Numbers,
     pair: &Pair,
+    rule: UnitRule,
     assumptions: &mut Vec<String>,
 ) -> Result<Pair, FrfTableError> {
     let Pair::Unknown([first, second]) = pair else {
         return Ok(pair.clone());
     };
-    let polar = |scale| Pair::Polar {
-        magnitude: first.clone(),
-        scale,
-        phase: second.clone(),
-        phase_unit: None,
-    };
-    let all = |is: fn(&[f64; 2]) -> bool| numbers.rows.iter().all(|row| is(&row.pair));
-    let (pair, what) = if all(|[first, _]| *first > 0.0) {
-        (polar(Scale::Linear), "magnitude (m/A) and phase")
-    } else if all(|[first, _]| *first < DECIBELS) {
-        (polar(Scale::Decibels), "magnitude (dB re 1 m/A) and phase")
-    } else if all(|pair| pair.iter().all(|part| part.abs() < LARGEST_PART)) {
-        let (real, imaginary) = (first.clone(), second.clone());
-        (
-            Pair::Cartesian { real, imaginary },
-            "real and imaginary part (m/A)",
-        )
-    } else {
+    let Some(kind) = PairKind::of(numbers, rule) else {
         return Err(FrfTableError::Unnamed {
             path: numbers.path.clone(),
         });
     };
     assumptions.push(format!(
-        "the columns have no names: by their numbers they are frequency, {what}"
+        "the columns have no names: by {} they are frequency, {}",
+        kind.evidence(numbers),
+        kind.description(rule)
     ));
-    Ok(pair)
+    let polar = |scale| Pair::Polar {
+        magnitude: first.clone(),
+        scale,
+        phase: second.clone(),
+        phase_unit: (kind == PairKind::FrdFile).then_some(PhaseUnit::Deg),
+    };
+    Ok(match kind {
+        PairKind::Linear => polar(Scale::Linear),
+        PairKind::Decibels | PairKind::FrdFile => polar(Scale::Decibels),
+        PairKind::Parts => Pair::Cartesian {
+            real: first.clone(),
+            imaginary: second.clone(),
+        },
+    })
+}
+
+/// What two columns may be.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum PairKind {
+    Linear,
+    Decibels,
+    Parts,
+    /// Decibels and degrees, by the definition of this kind of file.
+    FrdFile,
+}
+
+impl PairKind {
+    fn of(numbers: &Numbers, rule: UnitRule) -> Option<PairKind> {
+        let all = |is: fn(&[f64; 2]) -> bool| numbers.rows.iter().all(|row| is(&row.pair));
+        if rule == UnitRule::Any && is_frd(numbers) {
+            Some(PairKind::FrdFile)
+        } else if all(|[first, _]| *first > 0.0) {
+            let is_linear = rule == UnitRule::MetresPerAmpere || has_linear_range(numbers);
+            is_linear.then_some(PairKind::Linear)
+        } else if all(|[first, _]| *first < DECIBELS) {
+            Some(PairKind::Decibels)
+        } else {
+            all(|pair| pair.iter().all(|part| part.abs() < LARGEST_PART)).then_some(PairKind::Parts)
+        }
+    }
+
+    fn description(self, rule: UnitRule) -> &'static str {
+        match (self, rule) {
+            (PairKind::Linear, UnitRule::MetresPerAmpere) => "magnitude (m/A) and phase",
+            (PairKind::Linear, UnitRule::Any) => "magnitude and phase",
+            (PairKind::Decibels, UnitRule::MetresPerAmpere) => "magnitude (dB re 1 m/A) and phase",
+            (PairKind::Decibels, UnitRule::Any) => "magnitude (dB) and phase",
+            (PairKind::Parts, UnitRule::MetresPerAmpere) => "real and imaginary part (m/A)",
+            (PairKind::Parts, UnitRule::Any) => "real and imaginary part",
+            (PairKind::FrdFile, _) => "magnitude (dB) and phase (degrees)",
+        }
+    }
+
+    fn evidence(self, numbers: &Numbers) -> String {
+        match self {
+            PairKind::FrdFile => format!("the name {}", numbers.path.display()),
+            PairKind::Linear | PairKind::Decibels | PairKind::Parts => "their numbers".into(),
+        }
+    }
+}
+
+fn is_frd(numbers: &Numbers) -> bool {
+    let extension = numbers.path.extension();
+    extension.is_some_and(|extension| extension.eq_ignore_ascii_case("frd"))
+}
+
+/// Whether positive magnitudes cannot be decibels of a response in any unit.
+fn has_linear_range(numbers: &Numbers) -> bool {
+    let magnitudes = || numbers.rows.iter().map(|row| row.pair[0]);
+    let least = magnitudes().fold(f64::INFINITY, f64::min);
+    magnitudes().fold(0.0, f64::max) > LINEAR_RANGE * least
 }
 
 /// The complex response of each line.

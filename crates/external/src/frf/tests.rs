@@ -22,9 +22,18 @@ fn grid() -> impl Iterator<Item = f64> {
 }
 
 fn of(text: String, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
-    let table = FrfTable::Text(Table::of(Path::new("frf.csv"), text)?);
-    let columns = Columns::of(&table)?;
-    points::response(&Numbers::read(&table, &columns)?, columns, phase)
+    named("frf.csv", text, phase, UnitRule::MetresPerAmpere)
+}
+
+fn named(
+    name: &str,
+    text: String,
+    phase: Option<PhaseUnit>,
+    rule: UnitRule,
+) -> Result<ImportedFrf, FrfTableError> {
+    let table = FrfTable::Text(Table::of(Path::new(name), text)?);
+    let columns = Columns::of(&table, rule)?;
+    points::response(&Numbers::read(&table, &columns)?, columns, phase, rule)
 }
 
 /// A table with these lines before it and three numbers in each line.
@@ -266,5 +275,78 @@ fn line_at_zero_hertz_is_left_out() {
         let text = table(&heading, ",", |hz, h| [hz, h.re, h.im]);
         let found = is_stage(of(text, None));
         assert_eq!(found.assumptions, ["the line at 0 Hz is left out"]);
+    }
+}
+
+#[test]
+fn any_unit_is_read_and_stated() {
+    let row: RowOf = |hz, h| [hz, 1e6 * h.norm(), h.arg().to_degrees()];
+    for (names, unit) in [
+        ("frequency_hz,magnitude_um_per_n,phase_deg", Some("um/N")),
+        ("Freq (Hz),|G| [um/N],phase (deg)", Some("um/N")),
+        ("f,gain,phase\nHz,um/V,deg", Some("um/V")),
+        ("f_hz,mag,phase_deg", None),
+    ] {
+        let text = table(&format!("{names}\n"), ",", row);
+        let found = named("frf.csv", text, None, UnitRule::Any).expect(names);
+        let stated = found.unit.as_ref().map(ToString::to_string);
+        assert_eq!(stated.as_deref(), unit, "{names}");
+        assert!(!found.has_coherence);
+        let ratio = found.frf.response[9] / (1e6 * stage(5.0));
+        assert!((ratio - 1.0).norm() < 1e-13, "{names}: {ratio}");
+    }
+}
+
+#[test]
+fn three_columns_of_a_frd_file_are_decibels_and_degrees() {
+    // 140 dB above that of m/A: positive and negative ones.
+    let row: RowOf = |hz, h| [hz, db(h) + 90.0, h.arg().to_degrees()];
+    let text = table("", "\t", row);
+    let found = named("door.FRD", text.clone(), None, UnitRule::Any).expect("a FRD file");
+    let ratio = found.frf.response[59] / stage(30.0) / libm::pow(10.0, 4.5);
+    assert!((ratio - 1.0).norm() < 1e-12, "{ratio}");
+    assert!(
+        found
+            .assumptions
+            .iter()
+            .any(|text| text.contains("degrees"))
+    );
+    let error = named("door.txt", text, None, UnitRule::Any).expect_err("unknown");
+    assert!(error.to_string().contains("frequency_hz,real,imag"));
+}
+
+#[test]
+fn positive_numbers_without_names_are_a_magnitude_only_with_the_range_of_one() {
+    // Over 1 to 100 Hz the magnitudes have a range of 25/0.1 = 250; with 100 times that of the first line they exceed 1000.
+    let rows: RowOf = |hz, h| [hz, 1e6 * h.norm(), h.arg().to_degrees()];
+    let narrow = table("", ",", rows);
+    assert!(named("a.csv", narrow.clone(), None, UnitRule::MetresPerAmpere).is_ok());
+    assert!(matches!(
+        named("a.csv", narrow.clone(), None, UnitRule::Any),
+        Err(FrfTableError::Unnamed { .. })
+    ));
+    let wide = format!("{narrow}101,1e-3,-180\n");
+    assert!(named("a.csv", wide, None, UnitRule::Any).is_ok());
+}
+
+#[test]
+fn units_that_contradict_each_other_and_derivatives_are_refused() {
+    for (names, words) in [
+        ("f_hz,Re (um/N),Im (mm/N)", "both in one unit"),
+        ("f_hz,mag_m_per_s_per_n,phase_deg", "velocity"),
+        ("f_hz,Mag accelerance (g/N),phase_deg", "acceleration"),
+        ("f_hz,Mag (m/s^2/N),phase_deg", "acceleration"),
+        ("f_hz,Mag [m/s\u{b2}/N],phase_deg", "acceleration"),
+    ] {
+        let columns = names.matches(',').count();
+        let row = "1".to_string() + &",1".repeat(columns);
+        let error = named("a.csv", format!("{names}\n{row}\n"), None, UnitRule::Any);
+        let error = error.expect_err(names).to_string();
+        assert!(error.contains(words) && error.contains("; "), "{error}");
+    }
+    for sigma in ["sigma (%)", "Mag std (dB)", "magnitude_sigma (m/A)"] {
+        let text = format!("f_hz,Mag (um/A),phase_deg,{sigma}\n1,2,3,1\n");
+        let error = named("a.csv", text, None, UnitRule::Any).expect_err(sigma);
+        assert!(matches!(error, FrfTableError::SigmaUnit { .. }), "{error}");
     }
 }

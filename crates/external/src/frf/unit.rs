@@ -1,0 +1,133 @@
+//! The unit of a response, as its file states it.
+
+use std::fmt;
+
+/// Which units a reader accepts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum UnitRule {
+    /// Metres per ampere, stated or not.
+    MetresPerAmpere,
+    /// Any, of a displacement.
+    Any,
+}
+
+/// Unit of a response: that of its output over that of its input, as written in the file.
+///
+/// | heading | unit |
+/// |---|---|
+/// | `magnitude_um_per_n` | `um/N` |
+/// | `Magnitude (dB re 1 m/A)` | `m/A` |
+/// | `real`, with `V/V` in the line of units | `V/V` |
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ResponseUnit {
+    /// Unit of the output.
+    pub output: String,
+    /// Unit of the input.
+    pub input: String,
+}
+
+/// Symbols that names of columns write in lower case.
+const SYMBOLS: [(&str, &str); 8] = [
+    ("a", "A"),
+    ("ma", "mA"),
+    ("n", "N"),
+    ("mn", "mN"),
+    ("kn", "kN"),
+    ("v", "V"),
+    ("mv", "mV"),
+    ("kv", "kV"),
+];
+
+impl ResponseUnit {
+    /// The unit that a name states, or a line of units.
+    pub(super) fn stated(name: &str, line_of_units: &str) -> Option<ResponseUnit> {
+        let in_name = bracketed(name).map(ResponseUnit::of_text);
+        let by_line = ResponseUnit::of_text(line_of_units);
+        by_line
+            .or_else(|| in_name.flatten())
+            .or_else(|| of_words(name))
+    }
+
+    /// `um/N`, also after `dB re 1`. A text without a slash is no unit of a ratio.
+    fn of_text(text: &str) -> Option<ResponseUnit> {
+        let (output, input) = text.trim().split_once(['/', '\u{2044}'])?;
+        let output = output.split_whitespace().next_back()?;
+        let input = input.trim();
+        (!input.is_empty()).then(|| ResponseUnit {
+            output: output.into(),
+            input: input.into(),
+        })
+    }
+
+    /// The unit of a residue, r in r/(s^2 + 2 zeta w s + w^2): that of the response over s^2.
+    pub fn of_residue(&self) -> String {
+        let ResponseUnit { output, input } = self;
+        format!("{output}/({input} s^2)")
+    }
+}
+
+impl fmt::Display for ResponseUnit {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(formatter, "{}/{}", self.output, self.input)
+    }
+}
+
+/// What stands in the last pair of brackets.
+fn bracketed(name: &str) -> Option<&str> {
+    let end = name.rfind([')', ']'])?;
+    let begin = name[..end].rfind(['(', '['])?;
+    Some(&name[begin + 1..end])
+}
+
+/// `um` and `n` of `magnitude_um_per_n`; the first word is that of the quantity.
+fn of_words(name: &str) -> Option<ResponseUnit> {
+    let name = name.split(['(', '[']).next().unwrap_or(name).trim();
+    let name = name.strip_suffix("_db").unwrap_or(name);
+    let (output, input) = name.split_once("_per_")?;
+    let (_, output) = output.split_once('_')?;
+    Some(ResponseUnit {
+        output: symbol(output),
+        input: symbol(input),
+    })
+}
+
+fn symbol(word: &str) -> String {
+    let known = SYMBOLS.iter().find(|(name, _)| *name == word);
+    known.map_or(word, |(_, symbol)| symbol).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unit_is_that_of_brackets_words_or_line_of_units() {
+        for (name, line, unit) in [
+            ("magnitude_um_per_n", "", Some("um/N")),
+            (
+                "magnitude_angle_rad_per_current_a",
+                "",
+                Some("angle_rad/current_a"),
+            ),
+            ("Magnitude (dB re 1 m/A)", "", Some("m/A")),
+            ("|G(f)| [\u{b5}m/N]", "", Some("\u{b5}m/N")),
+            ("real", "V/V", Some("V/V")),
+            ("mag_um_per_n_db", "", Some("um/N")),
+            ("mag_um_per_n (dB)", "dB", Some("um/N")),
+            ("mag_db", "dB", None),
+            ("magnitude", "", None),
+            ("gain ()", "", None),
+            ("gain )(", "/", None),
+        ] {
+            let found = ResponseUnit::stated(name, line);
+            let found = found.map(|unit| unit.to_string());
+            assert_eq!(found.as_deref(), unit, "{name} {line}");
+        }
+    }
+
+    #[test]
+    fn residue_has_the_unit_of_the_response_over_the_square_of_a_time() {
+        let unit = ResponseUnit::stated("h_um_per_n", "").expect("a unit");
+        assert_eq!(unit.of_residue(), "um/(N s^2)");
+    }
+}
