@@ -55,7 +55,8 @@ enum Command {
     Controller(controller::Args),
     /// Design a controller for several operating points with tolerances; writes the controller file, a certificate and plots
     Tune(tune::Args),
-    /// Analyse a recording or an external CSV file with the same method as `bench chirp`
+    /// Analyse a recording, an external CSV file, or a frequency response of another program (--frf) with the same method as
+    /// `bench chirp`
     Identify(identify::Args),
     /// Write the page of a recording of any run, or one page with the frequency responses and steps of several recordings
     Report(report::Args),

@@ -9,6 +9,7 @@ use super::error::CliError;
 use super::exit::Exit;
 use super::figure_options::magnitude_axis;
 use super::identify_external;
+use super::identify_response;
 use super::output::print_result;
 use super::progress::ProgressLine;
 use super::run_options::{description_text, trip_text};
@@ -51,21 +52,26 @@ struct Report {
 }
 
 pub(super) fn run(args: &Args) -> Result<Exit, CliError> {
-    if args.order.table.selects_csv(&args.order.recording) {
+    if let Some(frf) = &args.order.response.frf {
+        return identify_response::run(frf, args.out.as_deref(), &args.order);
+    }
+    // The parser requires one of the two.
+    let path = args.order.file().unwrap_or(Path::new(""));
+    if args.order.table.selects_csv(path) {
         return identify_external::run(
-            &args.order.recording,
+            path,
             args.out.as_deref(),
             &args.order.table,
             magnitude_axis(args.order.figures),
             args.order.json,
         );
     }
-    let (recording, signals) = open_with_signals(&args.order.recording)?;
+    let (recording, signals) = open_with_signals(path)?;
     warn_of_unchecked(&recording);
     let plan = Plan::of(&recording)?;
-    check_kind(plan.kind, &args.order.recording)?;
+    check_kind(plan.kind, path)?;
     let made = analysed(&recording, signals, &plan.config, args)?;
-    let report = Report::new(&recording, &args.order.recording, made);
+    let report = Report::new(&recording, path, made);
     print_result(args.order.json, &report, |report| report.text(&plan.config))?;
     Ok(if report.is_whole() {
         Exit::Done
@@ -110,10 +116,11 @@ fn analysed(
     config: &Config,
     args: &Args,
 ) -> Result<AnalysisOutputs, CliError> {
-    let beside = in_folder(args.out.as_deref(), &args.order.recording)?;
+    let path = recording.path();
+    let beside = in_folder(args.out.as_deref(), path)?;
     let results = ResultFiles {
         beside: &beside,
-        existing: existing_file(&beside, &args.order.recording),
+        existing: existing_file(&beside, path),
     };
     let progress = Progress::new("analysing");
     let _line = ProgressLine::show(&progress);

@@ -25,6 +25,7 @@ mod export;
 mod figure_options;
 mod identify;
 mod identify_external;
+mod identify_response;
 mod linearity;
 mod linearity_output;
 mod loop_output;

@@ -9,6 +9,7 @@ mod output_kinds;
 mod periodic;
 mod random_stages;
 mod refused;
+mod responses;
 mod signals;
 mod single_record;
 

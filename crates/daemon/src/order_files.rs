@@ -91,7 +91,7 @@ mod tests {
                 for value in [json!("/etc/passwd"), json!(["/etc/passwd"])] {
                     let mut order = Map::new();
                     order.insert("command".into(), command.into());
-                    if command == "identify" {
+                    if command == "identify" && name != "frf" {
                         order.insert("recording".into(), "a.mcap".into());
                     }
                     order.insert(name.clone(), value.clone());

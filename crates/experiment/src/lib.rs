@@ -54,8 +54,8 @@ pub mod tuning;
 
 pub use analysis::{
     AnalysedRun, Analysis, AnalysisError, AnalysisPhase, AnalysisProgress, ClosedLoopError,
-    ClosedResponses, EndKind, Ending, FrfError, MeasuredFrf, ModelResponse, ReadSignals, analyse,
-    never_cancels, open_with_signals, recorded_frf,
+    ClosedResponses, EndKind, Ending, ExternalResponse, FrfError, MeasuredFrf, ModelResponse,
+    NegativeResponse, ReadSignals, analyse, never_cancels, open_with_signals, recorded_frf,
 };
 pub use errors::{
     ErrorKind, ErrorObject, ExperimentError, MotorError, RemoteError, RunError, option_in,

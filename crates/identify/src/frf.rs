@@ -150,6 +150,17 @@ impl Frf {
         sorted.get(sorted.len() / 2).copied()
     }
 
+    /// The points of a band, limits included, without data for a fit.
+    pub fn between_hz(&self, low_hz: f64, high_hz: f64) -> Frf {
+        let mut within = Frf::default();
+        for (k, hz) in self.frequency_hz.iter().enumerate() {
+            if (low_hz..=high_hz).contains(hz) {
+                within.take_from(self, k);
+            }
+        }
+        within
+    }
+
     /// The response with a delay removed from its phases: H exp(j w delay).
     pub fn without_delay(&self, delay_s: f64) -> Frf {
         let advanced =

@@ -10,6 +10,7 @@ use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{hint, implausible, unless_undetermined};
 use crate::record_check::Resolution;
+use crate::remedies::OF_SIGNALS;
 use crate::verdict::{Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
@@ -294,17 +295,12 @@ fn analyse(
         chain: &chain,
         stated,
         clear_kind,
+        remedies: &OF_SIGNALS,
     };
     let why = listed(&defects).or_else(|| implausible(&observation));
-    let verdict = match why {
-        Some(why) => Verdict::undecided(why),
-        None => {
-            let scope = VerdictScope::up_to(judged_up_to_rad_s);
-            let verdict = judge(&fit, &frf.data, &chain, scope)?;
-            let hint = hint(&verdict, signals, repetition.is_some(), &fit);
-            unless_undetermined(verdict.with(hint), &fit)
-        }
-    };
+    let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
+        hint(verdict, signals, repetition.is_some(), &fit)
+    })?;
     let verdict = verdict.with(listed(&stray_lines));
     Ok(ExternalAnalysis {
         frf,
@@ -318,6 +314,23 @@ fn analyse(
         periodic,
         resolution,
     })
+}
+
+/// The verdict of a fit, with what else may be the cause of an undecided one; undecided for a reason that is already known.
+pub(super) fn judged(
+    why: Option<String>,
+    frf: &Frf,
+    fit: &Result<ModalFit, FitError>,
+    chain: &MeasurementChain,
+    up_to_rad_s: f64,
+    hint: impl Fn(&Verdict) -> Option<String>,
+) -> Result<Verdict, PlantError> {
+    if let Some(why) = why {
+        return Ok(Verdict::undecided(why));
+    }
+    let verdict = judge(fit, &frf.data, chain, VerdictScope::up_to(up_to_rad_s))?;
+    let hint = hint(&verdict);
+    Ok(unless_undetermined(verdict.with(hint), fit))
 }
 
 /// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.

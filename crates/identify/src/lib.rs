@@ -8,6 +8,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | two signals, all steps with the default settings | [`Identification`] |
+//! | a response of another program, in any unit | [`ResponseIdentification`] |
 //! | the default estimator, for records that begin and end at rest | [`local`] |
 //! | the same without smoothing, for a fit | [`Frf::data`] |
 //! | plant, loop gain and sensitivities of a stage in closed loop | [`joint`] |
@@ -40,6 +41,8 @@ pub mod frf_csv;
 pub mod frf_value;
 mod growing;
 mod identification;
+mod identify_response;
+mod independent;
 mod local_model;
 mod mean;
 pub mod modal;
@@ -49,6 +52,7 @@ mod observation;
 mod other_kind;
 mod plausibility;
 pub mod record_check;
+mod remedies;
 pub mod repeated;
 pub mod scatter;
 mod settings;
@@ -67,6 +71,7 @@ pub use identification::{
     Distortion, DistortionSource, ExternalAnalysis, Identification, IdentificationError,
     PeriodicPart,
 };
+pub use identify_response::{ResponseAnalysis, ResponseError, ResponseIdentification};
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};

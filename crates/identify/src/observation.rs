@@ -3,6 +3,7 @@
 use bench_plant::OutputKind;
 
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::remedies::Remedies;
 use crate::verdict::MAX_CHI2_PER_FREEDOM;
 use crate::{Frf, FrfDatum};
 
@@ -71,6 +72,8 @@ pub(super) struct Observation<'a> {
     pub(super) stated: Option<OutputKind>,
     /// The kind of an output that is clearly another one.
     pub(super) clear_kind: Option<OutputKind>,
+    /// What to do about implausible data.
+    pub(super) remedies: &'a Remedies,
 }
 
 /// Whether the fit describes the data.

@@ -18,7 +18,8 @@ const CONSTANT_RATIO: f64 = 0.7;
 const STATIC_RATIO: f64 = 0.05;
 /// ... unless it exceeds this multiple of its standard deviation.
 const STATIC_SIGMAS: f64 = 5.0;
-const SWAPPED: &str = "modes describe the response from output to input, but not that from input to output; exchange --input and --output, which are swapped";
+const SWAPPED: &str =
+    "modes describe the response from output to input, but not that from input to output";
 
 /// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do.
 /// With these few modes of the assumed kind; many more would be fitted in vain.
@@ -44,7 +45,7 @@ pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
     let found = || Some(other_kind(&seen.source, &seen.frf.data, assumed)?.0);
     match seen.clear_kind.or_else(found) {
         Some(kind) => Some(give_kind(assumed, kind)),
-        None => inverse_fits(seen).then(|| SWAPPED.into()),
+        None => inverse_fits(seen).then(|| format!("{SWAPPED}; {}", seen.remedies.swapped)),
     }
 }
 

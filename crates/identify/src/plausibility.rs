@@ -24,14 +24,29 @@ const MANY_MODES: usize = 8;
 /// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
 const ACTIVE_RATIO: f64 = 0.3;
 
-/// The reason, if the signals cannot be input and output of a mechanical system.
+/// The reason, if the data cannot be those of input and output of a mechanical system.
 pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
     let Observation { frf, fit, .. } = seen;
-    incoherent(frf, fit)
+    let of = seen.remedies;
+    let reason = |(what, remedy): (String, &str)| format!("{what}; {remedy}");
+    let incoherent = || Some(reason((incoherent(frf, fit)?, of.incoherent)));
+    let growing = || {
+        Some(reason((
+            growing(frf, fit, seen.chain.output())?,
+            of.growing,
+        )))
+    };
+    let early = || {
+        Some(reason((
+            early(seen.source.rate_hz, fit.as_ref().ok()?)?,
+            of.early,
+        )))
+    };
+    incoherent()
         .or_else(|| explained_otherwise(seen))
         .or_else(|| vanishes_at_rest(seen))
-        .or_else(|| growing(frf, fit, seen.chain.output()))
-        .or_else(|| early(seen.source.rate_hz, fit.as_ref().ok()?))
+        .or_else(growing)
+        .or_else(early)
 }
 
 /// Modes that describe the response may lie in less than half of the band.
@@ -42,7 +57,7 @@ fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
     let median = frf.median_coherence()?;
     (median < MIN_COHERENCE).then(|| {
         format!(
-            "the input explains {:.0} % of the output's power, or less, at half of the frequencies: the columns are not input and output of one system, or most of the band was not excited; select columns that belong together, or the band that was excited (--band)",
+            "the input explains {:.0} % of the output's power, or less, at half of the frequencies",
             100.0 * median
         )
     })
@@ -64,7 +79,7 @@ fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>, kind: OutputKind) -> Opt
     let max_slope = MAX_SLOPE + f64::from(kind.derivatives());
     (slope > max_slope).then(|| {
         format!(
-            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}; exchange --input and --output if they are swapped, or extend --band if a mode lies right above it"
+            "from {from_hz:.1} to {last_hz:.1} Hz the response grows with frequency to the power of {slope:.1}"
         )
     })
 }
@@ -95,10 +110,16 @@ fn early(rate_hz: f64, fit: &ModalFit) -> Option<String> {
     let limit_s = (EARLY_SAMPLES / rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
         format!(
-            "the output precedes the input by {:.3} ms; exchange --input and --output if they are swapped, or check that they were sampled at the same times",
+            "the output precedes the input by {:.3} ms",
             -delay.value * 1e3
         )
     })
+}
+
+/// What else may be the cause of an undecided verdict of a response.
+pub(super) fn response_hint(verdict: &Verdict, fit: &Result<ModalFit, FitError>) -> Option<String> {
+    let is_undecided = verdict.cnmp == Cnmp::Undecided;
+    is_undecided.then(|| not_a_sum_of_modes(fit)).flatten()
 }
 
 /// What else may be the cause of an undecided verdict.
@@ -149,7 +170,7 @@ fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
 
 fn no_sum_of_modes(found: &str) -> String {
     format!(
-        "{found}: the response may be no sum of modes with real residues, as with damping that is not proportional, a filter or an additional lag between the columns; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
+        "{found}: the response may be no sum of modes with real residues, as with damping that is not proportional, a filter or an additional lag between input and output; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)"
     )
 }
 

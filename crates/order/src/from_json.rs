@@ -297,26 +297,27 @@ pub fn order_schema(generator: &mut SchemaGenerator, more: &Map<String, Value>) 
 
 /// The object of one command.
 fn variant(command: Command, generator: &mut SchemaGenerator, more: &Map<String, Value>) -> Value {
-    let mut schema = command.options_schema(generator);
+    let mut options = command.options_schema(generator);
     let mut properties = Map::new();
     properties.insert(
         "command".into(),
         serde_json::json!({ "const": command.name() }),
     );
-    if let Some(Value::Object(options)) = schema.remove("properties") {
+    if let Some(Value::Object(options)) = options.remove("properties") {
         properties.extend(options);
     }
     properties.extend(more.clone());
-    let required: &[&str] = match command {
-        Command::Identify => &["command", POSITIONAL],
-        _ => &["command"],
-    };
-    serde_json::json!({
+    let mut schema = serde_json::json!({
         "type": "object",
         "title": command.name(),
         "description": command.description(),
         "properties": properties,
-        "required": required,
+        "required": ["command"],
         "additionalProperties": false,
-    })
+    });
+    if command == Command::Identify {
+        let files = [POSITIONAL, "frf"].map(|file| serde_json::json!({ "required": [file] }));
+        schema["oneOf"] = Value::from(files.to_vec());
+    }
+    schema
 }

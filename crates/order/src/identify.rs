@@ -1,4 +1,4 @@
-//! The order of an analysis: of a recording, or of an external CSV.
+//! The order of an analysis: of a recording, of an external CSV, or of the frequency response of another program.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -7,7 +7,8 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::figure_options::ResponseFigureOptions;
-use super::path_text::path_text;
+use super::path_text::optional_path_text;
+use super::response_options::ResponseOptions;
 use bench_base::quantity::{Dimension, Frequency, Time};
 use bench_experiment::{AnalysisError, ExperimentError};
 use bench_external::{Columns, ExternalCsvError, Sampling, TimeUnit};
@@ -21,8 +22,13 @@ use bench_plant::OutputKind;
 #[derive(Clone, Debug, PartialEq, clap::Args, Serialize, JsonSchema)]
 pub struct IdentifyOrder {
     /// The recording (MCAP) of a chirp, or an external CSV with --input and --output
-    #[serde(serialize_with = "path_text")]
-    pub recording: PathBuf,
+    #[arg(required_unless_present = "frf")]
+    #[serde(serialize_with = "optional_path_text")]
+    pub recording: Option<PathBuf>,
+    /// The frequency response of another program.
+    #[command(flatten)]
+    #[serde(flatten)]
+    pub response: ResponseOptions,
     /// The columns of a CSV.
     #[command(flatten)]
     #[serde(flatten)]
@@ -34,6 +40,13 @@ pub struct IdentifyOrder {
     /// Print one JSON object on standard output and nothing else
     #[arg(long)]
     pub json: bool,
+}
+
+impl IdentifyOrder {
+    /// The file to analyse.
+    pub fn file(&self) -> Option<&Path> {
+        self.recording.as_deref().or(self.response.frf.as_deref())
+    }
 }
 
 /// A CSV whose columns are not selected, or that cannot be read.
@@ -62,14 +75,14 @@ const LAG_S: RangeInclusive<f64> = 0.0..=10.0;
 #[group(id = "table")]
 pub struct ExternalOptions {
     /// Input column: the force or a signal proportional to it, in any unit; the file is read as CSV
-    #[arg(long, value_name = "COLUMN", requires = "output")]
+    #[arg(long, value_name = "COLUMN", requires = "output", group = "data")]
     pub input: Option<String>,
     /// Output column: the displacement, its velocity or acceleration (--output-kind), or a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     pub output: Option<String>,
     /// What the output measures: `position`, `velocity` as of a laser vibrometer, or `acceleration`. The modes are those of the position
     /// [default: position, and no verdict if the output looks like another kind]
-    #[arg(long, value_name = "KIND", requires = "input", value_enum)]
+    #[arg(long, value_name = "KIND", requires = "data", value_enum)]
     pub output_kind: Option<OutputKind>,
     /// Time column: numbers, or dates such as 2026-11-26T12:40:48.002Z. Times that are not equally spaced are taken as true
     #[arg(
@@ -82,13 +95,9 @@ pub struct ExternalOptions {
     /// Unit of the times, if they are numbers [default: that in the name of the column (time_ms, t_us) or in a line of units, otherwise s]
     #[arg(long, value_name = "UNIT", requires = "time", value_enum)]
     pub time_unit: Option<TimeUnit>,
-    /// Sampling rate, for a CSV file without a time column, or with inaccurate times of regular samples
-    #[arg(
-        long,
-        value_name = "HZ",
-        requires = "input",
-        allow_hyphen_values = true
-    )]
+    /// Sampling rate, for a CSV file without a time column, or with inaccurate times of regular samples; with --frf and --hold zoh,
+    /// that of the held command
+    #[arg(long, value_name = "HZ", requires = "data", allow_hyphen_values = true)]
     pub rate: Option<Frequency>,
     /// Period of a periodic record: number of samples (2500) or time with unit (1s). Without it, the record must begin and
     /// end at rest
@@ -98,16 +107,16 @@ pub struct ExternalOptions {
     #[arg(long, value_name = "N", requires = "period")]
     pub skip_periods: Option<usize>,
     /// How the input is held between its samples: `zoh` if a command is constant over each sampling period, `none` for a measured input
-    #[arg(long, value_name = "HOLD", requires = "input", value_enum, default_value_t = Hold::None)]
+    #[arg(long, value_name = "HOLD", requires = "data", value_enum, default_value_t = Hold::None)]
     pub hold: Hold,
     /// Time constant of a first-order lag between the recorded input and the force, as of a current loop (0.16ms)
-    #[arg(long, value_name = "S", requires = "input", allow_hyphen_values = true)]
+    #[arg(long, value_name = "S", requires = "data", allow_hyphen_values = true)]
     pub input_lag: Option<Time>,
-    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: the band that the input excites]
+    /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: the band that the input excites; with --frf, all its frequencies]
     #[arg(
         long,
         value_name = "LOW:HIGH",
-        requires = "input",
+        requires = "data",
         allow_hyphen_values = true
     )]
     pub band: Option<String>,
@@ -168,7 +177,7 @@ impl ExternalOptions {
         }
     }
 
-    fn band_hz(&self) -> Result<Option<(f64, f64)>, ExperimentError> {
+    pub(crate) fn band_hz(&self) -> Result<Option<(f64, f64)>, ExperimentError> {
         let Some(text) = &self.band else {
             return Ok(None);
         };
@@ -221,7 +230,7 @@ impl ExternalOptions {
         }
     }
 
-    fn input_path(&self, rate_hz: f64) -> Result<InputPath, ExperimentError> {
+    pub(crate) fn lag_s(&self) -> Result<f64, ExperimentError> {
         let lag_s = self.input_lag.as_ref().map_or(0.0, Time::si);
         if !LAG_S.contains(&lag_s) {
             let lag = Dimension::Time.display(lag_s);
@@ -230,6 +239,11 @@ impl ExternalOptions {
                 "--input-lag is {lag}; give a time from {min} to {max} s"
             )));
         }
+        Ok(lag_s)
+    }
+
+    fn input_path(&self, rate_hz: f64) -> Result<InputPath, ExperimentError> {
+        let lag_s = self.lag_s()?;
         let hold_s = match self.hold {
             Hold::Zoh => 1.0 / rate_hz,
             Hold::None => 0.0,
@@ -257,7 +271,7 @@ impl ExternalOptions {
 }
 
 /// Refuses a rate at which no signal is sampled.
-fn checked_rate_hz(rate_hz: f64) -> Result<f64, ExperimentError> {
+pub(crate) fn checked_rate_hz(rate_hz: f64) -> Result<f64, ExperimentError> {
     if RATE_HZ.contains(&rate_hz) {
         return Ok(rate_hz);
     }

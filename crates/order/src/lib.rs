@@ -10,6 +10,7 @@
 //! | `words` | the words of a command line for options in JSON |
 //! | `chirp`, `control`, `calibrate`, `linearity`, `campaign`, `identify` | the options of each command, and the configuration that they select |
 //! | `bench_options`, `rig_options`, `excitation_options`, `figure_options`, `controller_choice` | options that several commands share |
+//! | `response_options` | a frequency response in place of signals |
 //! | `reference` | the value of `--reference` |
 //! | `value_range` | a grid as typed |
 //! | `help` | texts of options with the value of the default profile |
@@ -31,6 +32,7 @@ mod linearity;
 mod order;
 mod path_text;
 mod reference;
+mod response_options;
 mod rig_options;
 #[cfg(test)]
 mod tests;
@@ -51,5 +53,6 @@ pub use identify::{ColumnsError, ExternalOptions, Hold, IdentifyOrder};
 pub use linearity::LinearityOrder;
 pub use order::{Command, Order};
 pub use reference::{Reference, ReferenceKind};
+pub use response_options::ResponseOptions;
 pub use rig_options::RigOptions;
 pub use value_range::{ValueRange, asymmetries, operating_points};

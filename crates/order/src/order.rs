@@ -182,7 +182,10 @@ impl Order {
                 let file = order.write.iter();
                 files.extend(file.map(|file| file.to_string_lossy().into_owned()));
             }
-            Order::Identify(order) => files.push(order.recording.to_string_lossy().into_owned()),
+            Order::Identify(order) => {
+                let file = order.file();
+                files.extend(file.map(|file| file.to_string_lossy().into_owned()));
+            }
             Order::Campaign(_) => {}
         }
         files

@@ -2,14 +2,9 @@
 //!
 //! What is not UTF-8 is replaced by U+FFFD: an order as text is shown and sent, and the process that opens the file has the path itself.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use serde::{Serialize, Serializer};
-
-/// A path as text.
-pub(crate) fn path_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(&path.to_string_lossy())
-}
 
 /// A path as text, if it is given.
 pub(crate) fn optional_path_text<S: Serializer>(

@@ -36,6 +36,8 @@ fn orders() -> Vec<Value> {
             "output_kind": "velocity", "period": "2500", "skip_periods": 1, "hold": "zoh", "input_lag": "0.16ms",
             "band": "11Hz:250Hz" }),
         json!({ "command": "identify", "recording": "a.csv", "input": "u", "output": "y", "rate": "1000" }),
+        json!({ "command": "identify", "frf": "a.frd", "frf_phase": "deg", "hold": "zoh", "rate": "5kHz",
+            "input_lag": "0.16ms", "band": "11:250" }),
     ]
 }
 
@@ -88,6 +90,18 @@ fn options_that_exclude_each_other_are_refused_as_on_the_command_line() {
         (
             json!({ "command": "identify", "recording": "a.csv", "input": "u" }),
             "--output",
+        ),
+        (
+            json!({ "command": "identify", "recording": "a.mcap", "frf": "a.csv" }),
+            "--frf",
+        ),
+        (
+            json!({ "command": "identify", "frf": "a.csv", "time": "t" }),
+            "--time",
+        ),
+        (
+            json!({ "command": "identify", "recording": "a.csv", "band": "1:2" }),
+            "--frf",
         ),
         (
             json!({ "command": "chirp", "duration": "2m" }),

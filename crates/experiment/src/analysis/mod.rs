@@ -3,13 +3,14 @@
 //! A recording is read into signals (`read_run`, `signal_builder`), cut into parts (`segments`), and its responses are estimated
 //! (`response_estimate`, `closed_responses`); `recorded_excitation` does all of this and fits the modes. `measured_frf` reads a
 //! response from a file, for a loop around a measured plant (`response_points`); `frf_checks` and `conventions` refuse one that does not
-//! belong to the bench.
+//! belong to the bench. `external_response` reads that of any stage.
 
 mod analysed_run;
 mod analysis_error;
 mod closed_responses;
 mod conventions;
 mod ending;
+mod external_response;
 mod frf_checks;
 mod measured_frf;
 mod model_response;
@@ -24,6 +25,7 @@ pub use analysed_run::AnalysedRun;
 pub use analysis_error::{AnalysisError, ClosedLoopError};
 pub(crate) use conventions::check_static_conventions;
 pub use ending::{EndKind, Ending};
+pub use external_response::{ExternalResponse, NegativeResponse};
 pub(crate) use frf_checks::{check_frf, check_rate, judge_excess};
 pub use measured_frf::{FrfError, MeasuredFrf, recorded_frf};
 pub use model_response::ModelResponse;

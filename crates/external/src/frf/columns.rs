@@ -350,13 +350,13 @@ impl<'a> Named<'a> {
         match self.rule {
             UnitRule::MetresPerAmpere if is_ratio => Err(self.other_unit(column)),
             UnitRule::MetresPerAmpere => self.check_unit(column),
-            UnitRule::Any if is_ratio || (stated.is_some() && stated.as_ref() != unit) => {
+            _ if is_ratio || (stated.is_some() && stated.as_ref() != unit) => {
                 Err(FrfTableError::SigmaUnit {
                     path: self.table.path().to_owned(),
                     column: column.name.clone(),
                 })
             }
-            UnitRule::Any => Ok(()),
+            UnitRule::Any | UnitRule::AnyOutput => Ok(()),
         }
     }
 
@@ -376,7 +376,7 @@ impl<'a> Named<'a> {
                 path: self.table.path().to_owned(),
                 column: column.name.clone(),
             }),
-            UnitRule::MetresPerAmpere | UnitRule::Any => Ok(()),
+            _ => Ok(()),
         }
     }
 }

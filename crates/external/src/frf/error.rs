@@ -71,7 +71,7 @@ pub enum FrfTableError {
         column: String,
     },
     /// A velocity or an acceleration as output.
-    #[error("{path}: column `{column}` is the response of a velocity or an acceleration by its name, and modes are fitted to that of a displacement; divide the response by j omega (velocity) or by -omega^2 (acceleration), omega in rad/s, and rename the column", path = .path.display())]
+    #[error("{path}: column `{column}` is the response of a velocity or an acceleration by its name; give --output-kind velocity or --output-kind acceleration", path = .path.display())]
     Derivative {
         /// The file.
         path: PathBuf,

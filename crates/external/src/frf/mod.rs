@@ -58,12 +58,29 @@ pub fn read(path: &Path, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTab
     read_by(path, phase, UnitRule::MetresPerAmpere)
 }
 
+/// Whether the user states the kind of the output: displacement, velocity or acceleration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputStated {
+    /// It is taken as a displacement.
+    No,
+    /// As any of them.
+    Yes,
+}
+
 /// Reads a response in any unit.
 ///
 /// # Errors
-/// Those of [`read`], and when the output is a velocity or an acceleration.
-pub fn read_any_unit(path: &Path, phase: Option<PhaseUnit>) -> Result<ImportedFrf, FrfTableError> {
-    read_by(path, phase, UnitRule::Any)
+/// Those of [`read`], and when the output is a velocity or an acceleration by its name, but its kind is not stated.
+pub fn read_any_unit(
+    path: &Path,
+    phase: Option<PhaseUnit>,
+    output: OutputStated,
+) -> Result<ImportedFrf, FrfTableError> {
+    let rule = match output {
+        OutputStated::No => UnitRule::Any,
+        OutputStated::Yes => UnitRule::AnyOutput,
+    };
+    read_by(path, phase, rule)
 }
 
 fn read_by(

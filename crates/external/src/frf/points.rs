@@ -108,7 +108,7 @@ enum PairKind {
 impl PairKind {
     fn of(numbers: &Numbers, rule: UnitRule) -> Option<PairKind> {
         let all = |is: fn(&[f64; 2]) -> bool| numbers.rows.iter().all(|row| is(&row.pair));
-        if rule == UnitRule::Any && is_frd(numbers) {
+        if rule != UnitRule::MetresPerAmpere && is_frd(numbers) {
             Some(PairKind::FrdFile)
         } else if all(|[first, _]| *first > 0.0) {
             let is_linear = rule == UnitRule::MetresPerAmpere || has_linear_range(numbers);
@@ -123,11 +123,11 @@ impl PairKind {
     fn description(self, rule: UnitRule) -> &'static str {
         match (self, rule) {
             (PairKind::Linear, UnitRule::MetresPerAmpere) => "magnitude (m/A) and phase",
-            (PairKind::Linear, UnitRule::Any) => "magnitude and phase",
+            (PairKind::Linear, _) => "magnitude and phase",
             (PairKind::Decibels, UnitRule::MetresPerAmpere) => "magnitude (dB re 1 m/A) and phase",
-            (PairKind::Decibels, UnitRule::Any) => "magnitude (dB) and phase",
+            (PairKind::Decibels, _) => "magnitude (dB) and phase",
             (PairKind::Parts, UnitRule::MetresPerAmpere) => "real and imaginary part (m/A)",
-            (PairKind::Parts, UnitRule::Any) => "real and imaginary part",
+            (PairKind::Parts, _) => "real and imaginary part",
             (PairKind::FrdFile, _) => "magnitude (dB) and phase (degrees)",
         }
     }

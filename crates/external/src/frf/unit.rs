@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use bench_identify::OutputKind;
+
 /// Which units a reader accepts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum UnitRule {
@@ -9,6 +11,8 @@ pub(super) enum UnitRule {
     MetresPerAmpere,
     /// Any, of a displacement.
     Any,
+    /// Any, of an output whose kind is stated.
+    AnyOutput,
 }
 
 /// Unit of a response: that of its output over that of its input, as written in the file.
@@ -59,10 +63,14 @@ impl ResponseUnit {
         })
     }
 
-    /// The unit of a residue, r in r/(s^2 + 2 zeta w s + w^2): that of the response over s^2.
-    pub fn of_residue(&self) -> String {
+    /// The unit of a residue, r in s^k r/(s^2 + 2 zeta w s + w^2): that of the response over s^2 for a position, over s for a velocity.
+    pub fn of_residue(&self, kind: OutputKind) -> String {
         let ResponseUnit { output, input } = self;
-        format!("{output}/({input} s^2)")
+        match kind {
+            OutputKind::Position => format!("{output}/({input} s^2)"),
+            OutputKind::Velocity => format!("{output}/({input} s)"),
+            OutputKind::Acceleration => self.to_string(),
+        }
     }
 }
 
@@ -126,8 +134,10 @@ mod tests {
     }
 
     #[test]
-    fn residue_has_the_unit_of_the_response_over_the_square_of_a_time() {
+    fn residue_has_the_unit_of_the_response_over_powers_of_a_time() {
         let unit = ResponseUnit::stated("h_um_per_n", "").expect("a unit");
-        assert_eq!(unit.of_residue(), "um/(N s^2)");
+        assert_eq!(unit.of_residue(OutputKind::Position), "um/(N s^2)");
+        assert_eq!(unit.of_residue(OutputKind::Velocity), "um/(N s)");
+        assert_eq!(unit.of_residue(OutputKind::Acceleration), "um/N");
     }
 }

@@ -119,6 +119,6 @@ impl<'a> ExternalRecord<'a> {
 }
 
 /// A time in milliseconds; `None` if it is 0.
-fn milliseconds(time_s: f64) -> Option<String> {
+pub(super) fn milliseconds(time_s: f64) -> Option<String> {
     (time_s > 0.0).then(|| format!("{:.4} ms", 1e3 * time_s))
 }

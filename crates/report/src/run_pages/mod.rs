@@ -3,7 +3,8 @@
 //! ```text
 //! BenchRun (a run of the bench) -------.
 //!                                       > RecordReport -> plots (SVG) -> page (HTML)
-//! ExternalRecord (a CSV) --------------'
+//! ExternalRecord (a CSV) --------------|
+//! ResponseReport (a response) ---------'
 //! ControlReport (a closed-loop run) -> plots (SVG), control_page (HTML)
 //! BasicReport (a run without a frequency response) -> basic_page (HTML)
 //! RunResult (several runs) -> comparison (HTML)
@@ -16,6 +17,7 @@ mod comparison;
 mod control_page;
 mod distortion_plot;
 mod external;
+mod external_response;
 mod loop_pictures;
 mod measured_loop;
 mod page;
@@ -38,6 +40,7 @@ pub use bench_run::BenchRun;
 pub use comparison::{MAX_COMPARED, comparison_page};
 pub use control_page::ControlReport;
 pub use external::ExternalRecord;
+pub use external_response::ResponseReport;
 pub use measured_loop::{MeasuredLoopFiles, MeasuredLoopReport};
 pub use page::page;
 pub use page_error::PageError;
