@@ -16,7 +16,7 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::Resolution;
-use bench_identify::{Distortion, DistortionSource, OutputKind};
+use bench_identify::{ClockSkew, Distortion, DistortionSource, OutputKind};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -50,6 +50,11 @@ struct Report {
     output_resolution: Option<f64>,
     #[serde(skip)]
     resolution: Resolution,
+    /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
+    clock_skew_ppm: Option<f64>,
+    clock_skew_ppm_sigma: Option<f64>,
+    #[serde(skip)]
+    clock_skew: Option<ClockSkew>,
     /// Number of averaged periods; `null` if the record is not periodic.
     periods: Option<usize>,
     /// Number of omitted periods before them.
@@ -143,6 +148,9 @@ impl Report {
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
+            clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
+            clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),
+            clock_skew: analysis.clock_skew,
             periods: periodic.map(|part| part.periods),
             skipped_periods: periodic.map(|part| part.skipped),
             distortion_ratio: distortion.map(|distortion| distortion.ratio),
@@ -173,13 +181,14 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
             self.output,
             self.times_text(),
+            self.clocks_text(),
             self.output_kind_text(),
             self.resolution_text(),
             self.input_path_text()
@@ -213,6 +222,12 @@ impl Report {
             TimeBase::Given | TimeBase::Regular => String::new(),
         };
         unit.unwrap_or_default() + &base
+    }
+
+    /// The difference of the clocks, if there is one.
+    fn clocks_text(&self) -> String {
+        let text = self.clock_skew.map(|skew| skew.description());
+        text.map_or_else(String::new, |text| labelled("clocks", &text))
     }
 
     /// The resolution of the channels, if it exceeds their noise.

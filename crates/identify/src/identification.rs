@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::ClockSkew;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
@@ -11,7 +12,7 @@ use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{hint, implausible, unless_undetermined};
 use crate::record_check::Resolution;
 use crate::remedies::OF_SIGNALS;
-use crate::verdict::{Verdict, VerdictScope, judge};
+use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{
     EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
     excited_band_hz, record_check, with_distortion,
@@ -20,6 +21,8 @@ use bench_plant::{OutputKind, PlantError};
 
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
 const RELATIVE_ERROR: f64 = 0.01;
+/// Largest reduced chi-square of a residual that is noise: the noise is estimated with an error of some per cent.
+const NOISE_CHI2: f64 = 1.5;
 /// A fit is far better if its chi-square is smaller by this factor.
 const FAR_BETTER: f64 = 10.0;
 
@@ -46,6 +49,10 @@ pub struct ExternalAnalysis {
     pub periodic: Option<PeriodicPart>,
     /// Steps of the values of input and output that exceed their noise.
     pub resolution: Resolution,
+    /// By how much the clocks of input and output differ, if the output was resampled for that.
+    pub clock_skew: Option<ClockSkew>,
+    /// Whether defects of the record, or its kind of output, explain an undecided verdict.
+    has_known_cause: bool,
 }
 
 /// What only a periodic record shows.
@@ -239,15 +246,38 @@ impl Identification {
             input: input.to_vec(),
             output: output.to_vec(),
         };
-        analyse(&signals, *self)
+        let analysis = analyse(&signals, *self, None)?;
+        self.with_one_clock(&signals, analysis)
+    }
+
+    /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
+    /// then.
+    fn with_one_clock(
+        &self,
+        signals: &Signals,
+        analysis: ExternalAnalysis,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        let is_right =
+            analysis.verdict.cnmp != Cnmp::Undecided && is_sum_of_few_modes(&analysis.fit);
+        if self.repetition.is_some() || analysis.has_known_cause || is_right {
+            return Ok(analysis);
+        }
+        let Some(skew) = ClockSkew::find(signals, analysis.band_hz, &analysis.chain) else {
+            return Ok(analysis);
+        };
+        let corrected = analyse(&skew.corrected(signals), *self, Some(skew))?;
+        let is_better = is_sum_of_few_modes(&corrected.fit)
+            && number_of_modes(&corrected) <= number_of_modes(&analysis);
+        Ok(if is_better { corrected } else { analysis })
     }
 }
 
 /// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
-/// without one, the record must begin and end at rest.
+/// without one, the record must begin and end at rest. `clock_skew` is that for which the output was corrected.
 fn analyse(
     signals: &Signals,
     identification: Identification,
+    clock_skew: Option<ClockSkew>,
 ) -> Result<ExternalAnalysis, IdentificationError> {
     let Identification {
         band_hz,
@@ -287,6 +317,10 @@ fn analyse(
         (None, Some(part)) => fit_of_periods(&frf.data, part.linearity.as_ref(), &chain),
         (None, None) => modal::fit(&frf.data, &chain),
     };
+    let fit = match &clock_skew {
+        Some(skew) => fit.map(|fit| skew.widened(fit, signals, &frf.data, &chain)),
+        None => fit,
+    };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let observation = Observation {
         source,
@@ -302,6 +336,7 @@ fn analyse(
         hint(verdict, signals, repetition.is_some(), &fit)
     })?;
     let verdict = verdict.with(listed(&stray_lines));
+    let verdict = verdict.with(clock_skew.map(|skew| skew.description()));
     Ok(ExternalAnalysis {
         frf,
         fit,
@@ -313,6 +348,8 @@ fn analyse(
         judged_up_to_rad_s,
         periodic,
         resolution,
+        clock_skew,
+        has_known_cause: !defects.is_empty() || clear_kind.is_some(),
     })
 }
 
@@ -331,6 +368,19 @@ pub(super) fn judged(
     let verdict = judge(fit, &frf.data, chain, VerdictScope::up_to(up_to_rad_s))?;
     let hint = hint(&verdict);
     Ok(unless_undetermined(verdict.with(hint), fit))
+}
+
+/// Whether the residual of a fit is noise, and no residues nearly cancel, as those of modes in the place of something else.
+fn is_sum_of_few_modes(fit: &Result<ModalFit, FitError>) -> bool {
+    fit.as_ref()
+        .is_ok_and(|fit| fit.chi2_per_freedom <= NOISE_CHI2 && fit.cancelling_modes().is_none())
+}
+
+fn number_of_modes(analysis: &ExternalAnalysis) -> usize {
+    match &analysis.fit {
+        Ok(fit) => fit.parameters.modes.len(),
+        Err(_) => usize::MAX,
+    }
 }
 
 /// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.

@@ -31,6 +31,7 @@
 #![deny(unsafe_code)]
 
 mod band;
+mod clock_skew;
 pub mod delay;
 mod error;
 mod estimator;
@@ -63,6 +64,7 @@ pub mod welch;
 
 pub use bench_base::estimate::{Estimate, SIGMAS_95};
 pub use bench_plant::OutputKind;
+pub use clock_skew::ClockSkew;
 pub use error::{BandError, IdentifyError, Signal, SignalsError};
 pub use excited_band::excited_band_hz;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};

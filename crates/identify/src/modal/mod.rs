@@ -116,6 +116,30 @@ fn fit_up_to(
     Ok(ModalFit { orders, ..fit })
 }
 
+/// How well at most `max_modes` modes describe the data, for a comparison of similar data: chi^2 with a relative error of some per cent
+/// beside the noise, and a penalty for each mode.
+pub(crate) fn coarse_cost(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    max_modes: usize,
+) -> Result<f64, FitError> {
+    let nodes = &chain.nodes(data, 0.0);
+    search::coarse_cost(Problem { chain, data, nodes }, max_modes)
+}
+
+/// The parameters of least chi^2 near given ones, with as many modes, and that chi^2. The data are merged as `start` allows.
+pub(crate) fn nearest(
+    start: &ModalParameters,
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+) -> (ModalParameters, f64) {
+    let data = &merged(data, start);
+    let nodes = &chain.nodes(data, start.delay_s);
+    let problem = Problem { chain, data, nodes };
+    let solution = refine(problem, start.clone(), 0.0);
+    (solution.parameters, solution.chi2)
+}
+
 fn too_few(data: &[FrfDatum]) -> FitError {
     FitError::TooFew {
         frequencies: data.len(),

@@ -110,6 +110,19 @@ impl ModalParameters {
         free
     }
 
+    /// The values of the free parameters, in their order: w (rad/s), zeta and r of each mode, R and tau.
+    pub(crate) fn free_values(&self) -> DVector<f64> {
+        let free = self.free();
+        let values = free.iter().map(|parameter| match *parameter {
+            Parameter::Frequency(k) => self.modes[k].omega_rad_s,
+            Parameter::Damping(k) => self.modes[k].damping_ratio,
+            Parameter::Residue(k) => self.modes[k].residue_per_kg,
+            Parameter::Remainder => self.remainder_m_per_n,
+            Parameter::Delay => self.delay_s,
+        });
+        DVector::from_iterator(free.len(), values)
+    }
+
     /// The parameters with other residues, followed by another R.
     pub(super) fn with_linear(mut self, linear: &DVector<f64>) -> ModalParameters {
         self.remainder_m_per_n = linear[self.modes.len()];

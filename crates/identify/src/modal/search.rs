@@ -4,6 +4,8 @@
 //! The first pass is made from two starts: from no mode, and from one mode at each peak of the response. With the first, a delay of
 //! the wrong half turn can take the place of a mode, and modes added later do not lead back. The better result is used.
 
+use core::ops::ControlFlow;
+
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
@@ -109,8 +111,22 @@ pub(super) fn orders(
     Ok(search.orders)
 }
 
+/// chi^2 of at most `max_modes` modes with the errors of the coarse pass, and the smallest significant decrease for each of them: how
+/// well a few modes describe the data, at little cost.
+pub(super) fn coarse_cost(problem: Problem<'_>, max_modes: usize) -> Result<f64, FitError> {
+    let mut search = Search {
+        max_modes,
+        orders: Vec::new(),
+        parameters: ModalParameters::default(),
+        done: 0.0,
+        progress: &mut |_| ControlFlow::Continue(()),
+    };
+    search.run_from_best_start(&PASSES[0], problem)
+}
+
 /// The state of the search between two passes.
 struct Search<'a, 'p> {
+    /// Largest number of modes.
     max_modes: usize,
     /// The orders found so far.
     orders: Vec<ModelOrder>,
@@ -122,8 +138,8 @@ struct Search<'a, 'p> {
 }
 
 impl Search<'_, '_> {
-    /// A pass from each start: the result with the fewest and most significant modes.
-    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<(), FitError> {
+    /// A pass from each start: the result with the fewest and most significant modes, and its cost.
+    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
@@ -140,8 +156,9 @@ impl Search<'_, '_> {
                 best = (cost, self.parameters.clone(), self.orders.clone());
             }
         }
-        (_, self.parameters, self.orders) = best;
-        Ok(())
+        let cost;
+        (cost, self.parameters, self.orders) = best;
+        Ok(cost)
     }
 
     /// Runs a pass: chi^2 of its result, and the smallest significant decrease for each mode.

@@ -92,6 +92,10 @@ impl<'a> ExternalRecord<'a> {
             ("Times", Some(self.times.to_string())),
             ("Resolution", self.analysis.resolution.description()),
             (
+                "Clocks",
+                self.analysis.clock_skew.map(|skew| skew.description()),
+            ),
+            (
                 "Hold of the input",
                 milliseconds(self.analysis.input_path.hold_s),
             ),

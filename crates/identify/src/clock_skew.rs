@@ -1,0 +1,380 @@
+//! Input and output sampled by two clocks: the delay of the output grows with time.
+//!
+//! Sample k of the output, recorded with the time k T, was measured at k T (1 + e). A sweep excites each frequency at a time of its
+//! own, t(f), so that the recorded response turns away from the true one:
+//!
+//! ```text
+//! H_recorded(f) = H(f) exp(j w e t(f)),         t(f) = Re sum U_t conj(U) / sum |U|^2,   U_t the spectrum of t u(t)
+//! ```
+//!
+//! Modes and a constant delay do not describe that. e is found as the ratio with which they do: by a scan, in a band so low that the
+//! scan has few steps, and then in wider bands with smaller steps. The output is then resampled at the times of its own clock.
+//!
+//! An excitation without an order in time, as noise or a multisine, has no t(f), and nothing is found.
+
+use nalgebra::Complex;
+
+use crate::fft::RealFft;
+use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters};
+use crate::observation::describes;
+use crate::resampling::Readings;
+use crate::{Estimate, EstimatorSettings, FrfDatum, IdentifySettings, Signals};
+
+/// Two clocks differ by at most this ratio: quartz has 1e-4, the timers of computers less than 1e-3.
+const MAX_RATIO: f64 = 2e-3;
+/// Steps of the first scan to either side.
+const FIRST_STEPS: i32 = 10;
+/// Steps of the next scans to either side. The best one of a scan is right to about a step, each of which is four of the next.
+const NEXT_STEPS: i32 = 5;
+/// The angle in radians by which the response turns in a step, from the lowest to the highest frequency.
+const STEP_RAD: f64 = 1.5;
+/// By how much the angle of a scan exceeds that of the one before.
+const WIDER: f64 = 4.0;
+/// Largest number of data and of modes in a scan.
+const SCANNED_DATA: usize = 160;
+const SCANNED_MODES: usize = 4;
+/// Largest number of data, and of modes, with which a ratio is found before all data are used.
+const FITTED_DATA: usize = 400;
+const FITTED_MODES: usize = 8;
+/// A scan of fewer data has too few to tell modes from an angle.
+const MIN_DATA: usize = 40;
+/// Bins to either side of a frequency over which its time is a mean.
+const HALF_WIDTH_BINS: usize = 8;
+/// In a sweep the spread of the times at a frequency is at most this ratio of their whole range, for half of the frequencies.
+const SWEEP_SPREAD: f64 = 0.1;
+/// Angle in radians of the first step of the parabolas, and largest shift in steps.
+const FIRST_STEP_RAD: f64 = 0.1;
+const MAX_SHIFT: f64 = 4.0;
+/// Largest number of fits with the ratio of the one before.
+const MAX_REFITS: usize = 3;
+/// Largest number of steps to the best ratio.
+const MAX_REFINEMENTS: usize = 10;
+/// A ratio of fewer standard deviations is noise.
+const CERTAIN_SIGMAS: f64 = 5.0;
+/// A change of the ratio by fewer standard deviations is negligible.
+const NEGLIGIBLE_SIGMAS: f64 = 0.1;
+/// Largest number of corrections of a record.
+const MAX_CORRECTIONS: usize = 4;
+
+/// The difference between the clocks of input and output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClockSkew {
+    /// e: the true time between two samples of the output over the recorded one, less 1.
+    pub ratio: Estimate,
+    /// Duration of the record in seconds.
+    pub duration_s: f64,
+}
+
+impl ClockSkew {
+    /// The ratio with which modes describe a response between two frequencies; `None` without a sweep, or if none is significant.
+    pub(super) fn find(
+        signals: &Signals,
+        band_hz: (f64, f64),
+        chain: &MeasurementChain,
+    ) -> Option<ClockSkew> {
+        let data = data_of(signals, band_hz)?;
+        let turned = TurnedData::new(signals, &data, chain)?;
+        let (near, modes) = turned.thinned(FITTED_DATA).described()?;
+        let mut skew = ClockSkew {
+            ratio: turned.refined(&modes, near)?,
+            duration_s: signals.len() as f64 / signals.rate_hz,
+        };
+        // The turn of a datum is an approximation: the plant responds for a while after t(f). Of a small rest the error is small.
+        for _ in 0..MAX_CORRECTIONS {
+            let data = data_of(&skew.corrected(signals), band_hz)?;
+            let rest = TurnedData::new(signals, &data, chain)?.refined(&modes, 0.0)?;
+            skew.ratio = Estimate {
+                value: (1.0 + skew.ratio.value) * (1.0 + rest.value) - 1.0,
+                sigma: rest.sigma,
+            };
+            if rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma {
+                break;
+            }
+        }
+        let is_certain = skew.ratio.value.abs() > CERTAIN_SIGMAS * skew.ratio.sigma;
+        is_certain.then_some(skew)
+    }
+
+    /// The record with the output at the times of the input.
+    pub(super) fn corrected(&self, signals: &Signals) -> Signals {
+        let period_s = 1.0 / signals.rate_hz;
+        let mut readings = Readings::default();
+        for (k, output) in signals.output.iter().enumerate() {
+            readings.push(k as f64 * period_s * (1.0 + self.ratio.value), *output);
+        }
+        Signals {
+            output: readings.at_regular_times(0.0, period_s, signals.len()),
+            ..signals.clone()
+        }
+    }
+
+    /// The fit of a corrected record with the error of the ratio in its covariance: that of the parameters if the ratio changes by a
+    /// standard deviation, d, adds d d'.
+    pub(super) fn widened(
+        &self,
+        fit: ModalFit,
+        signals: &Signals,
+        data: &[FrfDatum],
+        chain: &MeasurementChain,
+    ) -> ModalFit {
+        let Some(turned) = TurnedData::new(signals, data, chain) else {
+            return fit;
+        };
+        let at = |ratio| {
+            let data = turned.turned_back(ratio);
+            modal::nearest(&fit.parameters, &data, chain)
+                .0
+                .free_values()
+        };
+        let change = (at(self.ratio.sigma) - at(-self.ratio.sigma)) * 0.5;
+        ModalFit {
+            covariance: &fit.covariance + &change * change.transpose(),
+            ..fit
+        }
+    }
+
+    /// The change of the delay of the output from begin to end of the record, in seconds.
+    pub fn growth_s(&self) -> f64 {
+        -self.ratio.value * self.duration_s
+    }
+
+    /// e in parts per million: positive if the clock of the output is slower, so that its samples come early.
+    pub fn ppm(&self) -> Estimate {
+        Estimate {
+            value: 1e6 * self.ratio.value,
+            sigma: 1e6 * self.ratio.sigma,
+        }
+    }
+
+    /// What was found, and what was done.
+    pub fn description(&self) -> String {
+        let ppm = self.ppm();
+        format!(
+            "the delay of the output changes by {:.3} ms over {:.1} s, as with two clocks that differ by {:.1} ± {:.1} ppm; the output is resampled with that correction (better: sample input and output with one clock)",
+            1e3 * self.growth_s(),
+            self.duration_s,
+            ppm.value.abs(),
+            ppm.half_width_95()
+        )
+    }
+}
+
+/// The response of a sweep with the time of each datum.
+struct TurnedData<'a> {
+    data: Vec<FrfDatum>,
+    /// t(f) of each datum in seconds.
+    time_s: Vec<f64>,
+    chain: &'a MeasurementChain,
+}
+
+impl<'a> TurnedData<'a> {
+    fn new(
+        signals: &Signals,
+        data: &[FrfDatum],
+        chain: &'a MeasurementChain,
+    ) -> Option<TurnedData<'a>> {
+        let arrivals = arrivals(signals, data);
+        is_sweep(&arrivals).then(|| TurnedData {
+            data: data.to_vec(),
+            time_s: arrivals.iter().map(|arrival| arrival.time_s).collect(),
+            chain,
+        })
+    }
+
+    /// w (t - t of the first datum) in radians: the angle of each datum per ratio.
+    fn angle_rad(&self, index: usize) -> f64 {
+        self.data[index].omega_rad_s() * (self.time_s[index] - self.time_s[0])
+    }
+
+    /// The largest angle per ratio.
+    fn span_rad(&self) -> f64 {
+        let angles = (0..self.data.len()).map(|index| self.angle_rad(index).abs());
+        angles.fold(0.0, f64::max)
+    }
+
+    /// The data up to the first one whose angle per ratio exceeds a limit.
+    fn up_to(&self, limit_rad: f64) -> TurnedData<'a> {
+        let is_below = |index: &usize| self.angle_rad(*index).abs() <= limit_rad;
+        let count = (0..self.data.len()).take_while(is_below).count();
+        TurnedData {
+            data: self.data[..count].to_vec(),
+            time_s: self.time_s[..count].to_vec(),
+            chain: self.chain,
+        }
+    }
+
+    /// At most this number of the data, evenly.
+    fn thinned(&self, count: usize) -> TurnedData<'a> {
+        let every = self.data.len().div_ceil(count).max(1);
+        TurnedData {
+            data: self.data.iter().step_by(every).copied().collect(),
+            time_s: self.time_s.iter().step_by(every).copied().collect(),
+            chain: self.chain,
+        }
+    }
+
+    /// The data turned back by a ratio.
+    fn turned_back(&self, ratio: f64) -> Vec<FrfDatum> {
+        let turned = self.data.iter().zip(&self.time_s).map(|(datum, time_s)| {
+            let angle_rad = -datum.omega_rad_s() * ratio * time_s;
+            FrfDatum {
+                response: datum.response * Complex::from_polar(1.0, angle_rad),
+                ..*datum
+            }
+        });
+        turned.collect()
+    }
+
+    /// The ratio with which modes describe the data best, to about a step of the widest band.
+    fn scan(&self) -> Option<f64> {
+        let first_step = MAX_RATIO / f64::from(FIRST_STEPS);
+        let mut limit_rad = STEP_RAD / first_step;
+        let part = self.up_to(limit_rad).thinned(SCANNED_DATA);
+        let mut best = part.best_of(0.0, first_step, FIRST_STEPS)?;
+        while limit_rad < WIDER * self.span_rad() {
+            limit_rad *= WIDER;
+            let part = self.up_to(limit_rad).thinned(SCANNED_DATA);
+            best = part.best_of(best, STEP_RAD / limit_rad, NEXT_STEPS)?;
+        }
+        Some(best)
+    }
+
+    /// The best ratio of those a number of steps to either side.
+    fn best_of(&self, middle: f64, step: f64, steps: i32) -> Option<f64> {
+        if self.data.len() < MIN_DATA {
+            return None;
+        }
+        let ratios = (-steps..=steps).map(|k| middle + f64::from(k) * step);
+        let costs = ratios.filter_map(|ratio| Some((self.cost(ratio)?, ratio)));
+        let best = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(best.1)
+    }
+
+    /// How well a few modes describe the data turned back.
+    fn cost(&self, ratio: f64) -> Option<f64> {
+        let data = self.turned_back(ratio);
+        modal::coarse_cost(&data, self.chain, SCANNED_MODES).ok()
+    }
+
+    /// The ratio with which a few modes describe the data, and these modes; `None` if they do not.
+    fn described(&self) -> Option<(f64, ModalParameters)> {
+        let mut ratio = self.scan()?;
+        let mut fit = self.few_modes(ratio)?;
+        // The modes of a ratio that is not exact are too many: the next ones are fewer.
+        for _ in 0..MAX_REFITS {
+            if describes(&fit) {
+                return Some((ratio, fit.parameters));
+            }
+            ratio = self.refined(&fit.parameters, ratio)?.value;
+            fit = self.few_modes(ratio)?;
+        }
+        describes(&fit).then_some((ratio, fit.parameters))
+    }
+
+    fn few_modes(&self, ratio: f64) -> Option<ModalFit> {
+        modal::fit_few(&self.turned_back(ratio), self.chain, FITTED_MODES).ok()
+    }
+
+    /// The ratio of least chi^2 near one, by parabolas through three fits of the same number of modes.
+    fn refined(&self, start: &ModalParameters, near: f64) -> Option<Estimate> {
+        let (mut modes, mut ratio) = (start.clone(), near);
+        let mut step = FIRST_STEP_RAD / self.span_rad();
+        for _ in 0..MAX_REFINEMENTS {
+            let (parameters, [low, middle, high]) = self.profile(&modes, ratio, step);
+            let curvature = (low + high - 2.0 * middle) / (step * step);
+            let slope = (high - low) / (2.0 * step);
+            modes = parameters;
+            if !curvature.is_finite() {
+                return None;
+            }
+            if curvature <= 0.0 {
+                ratio -= step.copysign(slope);
+                continue;
+            }
+            let misfit = (middle / (2.0 * self.data.len() as f64)).max(1.0);
+            let sigma = (2.0 * misfit / curvature).sqrt();
+            let shift = (-slope / curvature).clamp(-MAX_SHIFT * step, MAX_SHIFT * step);
+            ratio += shift;
+            if shift.abs() < NEGLIGIBLE_SIGMAS * sigma {
+                return Some(Estimate {
+                    value: ratio,
+                    sigma,
+                });
+            }
+            step = step.min(shift.abs()).max(sigma);
+        }
+        None
+    }
+
+    /// The modes at a ratio, and the least chi^2 of as many modes a step below it, at it and a step above it.
+    fn profile(
+        &self,
+        start: &ModalParameters,
+        ratio: f64,
+        step: f64,
+    ) -> (ModalParameters, [f64; 3]) {
+        let near = |ratio| modal::nearest(start, &self.turned_back(ratio), self.chain);
+        let (middle, chi2) = near(ratio);
+        (middle, [near(ratio - step).1, chi2, near(ratio + step).1])
+    }
+}
+
+/// The data of the response of a record.
+fn data_of(signals: &Signals, band_hz: (f64, f64)) -> Option<Vec<FrfDatum>> {
+    let settings = IdentifySettings::Local(EstimatorSettings::default());
+    Some(crate::response(signals, band_hz, &settings).ok()?.data)
+}
+
+/// When a frequency is excited.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    time_s: f64,
+    /// Standard deviation of the times.
+    spread_s: f64,
+}
+
+/// The times at which the frequencies of the data are excited.
+fn arrivals(signals: &Signals, data: &[FrfDatum]) -> Vec<Arrival> {
+    let fft = RealFft::new(signals.len());
+    let input = fft.below_nyquist(signals.input.clone());
+    let timed = signals.input.iter().enumerate();
+    let timed = timed.map(|(k, u)| k as f64 / signals.rate_hz * u);
+    let timed = fft.below_nyquist(timed.collect());
+    let bin_hz = signals.rate_hz / signals.len() as f64;
+    let arrival = |datum: &FrfDatum| {
+        let bin = (datum.frequency_hz / bin_hz).round() as usize;
+        let low = bin.saturating_sub(HALF_WIDTH_BINS).max(1);
+        let bins = low..(bin + HALF_WIDTH_BINS + 1).min(input.len()).max(low);
+        Arrival::of(&input[bins.clone()], &timed[bins])
+    };
+    data.iter().map(arrival).collect()
+}
+
+impl Arrival {
+    fn of(input: &[Complex<f64>], timed: &[Complex<f64>]) -> Arrival {
+        let (mut power, mut first, mut second) = (0.0, 0.0, 0.0);
+        for (u, timed) in input.iter().zip(timed) {
+            power += u.norm_sqr();
+            first += (timed * u.conj()).re;
+            second += timed.norm_sqr();
+        }
+        let time_s = first / power;
+        Arrival {
+            time_s,
+            spread_s: (second / power - time_s * time_s).max(0.0).sqrt(),
+        }
+    }
+}
+
+/// Whether each frequency is excited at a time of its own.
+fn is_sweep(arrivals: &[Arrival]) -> bool {
+    let times = arrivals.iter().map(|arrival| arrival.time_s);
+    let latest_s = times.clone().fold(f64::NEG_INFINITY, f64::max);
+    let earliest_s = times.fold(f64::INFINITY, f64::min);
+    let limit_s = SWEEP_SPREAD * (latest_s - earliest_s);
+    let narrow = arrivals.iter().filter(|arrival| arrival.spread_s < limit_s);
+    2 * narrow.count() > arrivals.len()
+}
+
+#[cfg(test)]
+mod tests;
