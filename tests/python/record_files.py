@@ -67,7 +67,8 @@ def universal_files(columns, folder):
         ("uneven.uff", 1, 0),
     ]:
         sets = [dataset(columns, NAMES[node], node, binary, even) for node in (1, 2)]
-        pyuff.UFF(str(folder / file)).write_sets(sets, "overwrite")
+        # "overwrite" loses the header of a binary dataset.
+        pyuff.UFF(str(folder / file)).write_sets(sets, "add")
 
 
 def main():

@@ -37,13 +37,22 @@ pub(crate) fn datasets(bytes: &[u8], budget: &mut Budget) -> Result<Vec<Dataset>
         if !is_delimiter(line) {
             continue;
         }
-        let Some(kind) = file.line() else { break };
-        match header::form(kind) {
+        match first_line(&mut file).and_then(header::form) {
             Some(form) => datasets.push(dataset(&mut file, form, budget)?),
             None => skip(&mut file),
         }
     }
     Ok(datasets)
+}
+
+/// The line behind the line -1 that begins a dataset. A second one is a dataset without content, as pyuff leaves behind.
+fn first_line<'a>(file: &mut Bytes<'a>) -> Option<&'a [u8]> {
+    loop {
+        let line = file.line()?;
+        if !is_delimiter(line) {
+            return Some(line);
+        }
+    }
 }
 
 /// Skips to the end of another dataset.

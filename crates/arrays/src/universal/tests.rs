@@ -209,7 +209,8 @@ fn responses_have_the_name_that_tells_them_apart() {
 fn other_datasets_are_skipped() {
     let other = b"    -1\n   151\nname\n    -1\n".to_vec();
     let ours = dataset_of("    58", "u", 1, (1, 3), &form(4, 2, true), b" 1.0 2.0\n");
-    assert_eq!(names(&[other.clone(), ours, other]), ["time", "u"]);
+    assert_eq!(names(&[other.clone(), ours.clone(), other]), ["time", "u"]);
+    assert_eq!(names(&[b"    -1\n".to_vec(), ours]), ["time", "u"]);
 }
 
 #[test]
