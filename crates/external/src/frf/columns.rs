@@ -331,8 +331,7 @@ impl<'a> Named<'a> {
                 Err(FrfTableError::TwoUnits {
                     path: self.table.path().to_owned(),
                     column: imaginary.name.clone(),
-                    unit: of_imaginary,
-                    other: of_real,
+                    units: Box::new([of_real, of_imaginary]),
                 })
             }
             [first, second] => Ok(first.or(second)),

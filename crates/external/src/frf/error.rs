@@ -51,16 +51,14 @@ pub enum FrfTableError {
         column: String,
     },
     /// Real and imaginary part in different units.
-    #[error("{path}: column `{column}` is in {unit}, but the other part of the response in {other}; give both in one unit", path = .path.display())]
+    #[error("{path}: column `{column}` is in {unit}, but the other part of the response in {other}; give both in one unit", path = .path.display(), unit = .units[1], other = .units[0])]
     TwoUnits {
         /// The file.
         path: PathBuf,
         /// The column of the imaginary part.
         column: String,
-        /// Its unit.
-        unit: ResponseUnit,
-        /// That of the real part.
-        other: ResponseUnit,
+        /// The units of real and imaginary part.
+        units: Box<[ResponseUnit; 2]>,
     },
     /// A standard deviation in another unit than the response.
     #[error("{path}: column `{column}` is not in the unit of the response by its name; give the standard deviation of the magnitude in its linear unit, or leave out the column: it is then estimated from the scatter of the response", path = .path.display())]
