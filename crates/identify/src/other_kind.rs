@@ -54,6 +54,15 @@ fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {
     format!("modes describe the output as {kind}, but not as {assumed}; give --output-kind {kind}")
 }
 
+/// The kind of an output that modes describe as the assumed kind only implausibly: the only other kind of which they describe it.
+pub(super) fn better_kind(seen: &Observation<'_>) -> Option<String> {
+    let (kind, _) = other_kind(&seen.source, &seen.frf.data, seen.chain.output())?;
+    let (assumed, kind) = (seen.chain.output().name(), kind.name());
+    Some(format!(
+        "the response grows with frequency as that of no {assumed}, and modes describe the output as {kind}; give --output-kind {kind}"
+    ))
+}
+
 /// The only other kind of output of which modes describe the data, with these modes.
 fn other_kind(
     source: &Source,
@@ -110,14 +119,15 @@ fn is_of_inverse(fit: &ModalFit) -> bool {
     has_free_body && constant.abs() > CONSTANT_RATIO * (sum + constant).norm()
 }
 
-/// Whether the response of a fit vanishes at rest, which that of a position of a supported stage does not, but an acceleration does:
-/// near its modes s^2 is about -w^2, so that modes with residues of the opposite signs, and a constant, describe it.
+/// Whether the response of a fit vanishes at rest, as that of a velocity or an acceleration, but not that of a position of a supported
+/// stage. Near the modes of an acceleration s^2 is about -w^2, so that a constant, and modes with residues of the opposite signs, describe
+/// it as a position.
 pub(super) fn vanishes_at_rest(seen: &Observation<'_>) -> Option<String> {
     let fit = seen.fit.as_ref().ok().filter(|fit| describes(fit))?;
     if seen.stated.is_some() || !vanishes(fit) {
         return None;
     }
-    Some("the static response of the modes is zero within its error, so that the output may be an acceleration, of which the signs would be the opposite ones; give --output-kind acceleration, or --output-kind position if it is a displacement".into())
+    Some("the static response of the modes is zero within its error, as that of a velocity or an acceleration, of which the modes would be others; give --output-kind velocity or --output-kind acceleration, or --output-kind position if it is a displacement".into())
 }
 
 fn vanishes(fit: &ModalFit) -> bool {

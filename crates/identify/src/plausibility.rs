@@ -4,7 +4,7 @@ use bench_plant::OutputKind;
 
 use crate::modal::{FitError, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
-use crate::other_kind::{explained_otherwise, vanishes_at_rest};
+use crate::other_kind::{better_kind, explained_otherwise, vanishes_at_rest};
 use crate::verdict::{Cnmp, Verdict};
 use crate::{Frf, Signals, record_check};
 
@@ -45,7 +45,10 @@ pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
     incoherent()
         .or_else(|| explained_otherwise(seen))
         .or_else(|| vanishes_at_rest(seen))
-        .or_else(growing)
+        .or_else(|| {
+            let why = growing()?;
+            Some(better_kind(seen).unwrap_or(why))
+        })
         .or_else(early)
 }
 

@@ -12,7 +12,7 @@ const FAR_RAD_S: f64 = 1e6;
 /// The signal path between set-point and reading, without the mechanics.
 ///
 /// A velocity or an acceleration is s or s^2 times the response of the mechanics: modes, R and delay of a fit are those of the position
-/// whatever the chain measures, and so is what [`MeasurementChain::mechanics`] returns.
+/// whatever the chain measures, and so is the response that is freed of the chain.
 #[derive(Clone, Debug, PartialEq)]
 pub enum MeasurementChain {
     /// A command held over each period, amplifier, motor and delays; input in amperes for a bench. Exact, aliasing included.
