@@ -141,7 +141,7 @@ fn other_conventions_and_wrong_options_are_refused_with_the_remedy() {
     assert_eq!(modes(&radians).len(), 2);
     bench
         .run("identify db.csv --frf-phase rad")
-        .is_refused(&["--frf"]);
+        .is_refused(&["--frf-phase", "RECORDING"]);
 }
 
 #[test]

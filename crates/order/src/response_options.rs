@@ -26,7 +26,13 @@ pub struct ResponseOptions {
     #[serde(serialize_with = "optional_path_text")]
     pub frf: Option<PathBuf>,
     /// With --frf: unit of the phases [default: that in the name of the column, otherwise by the numbers]
-    #[arg(long, value_name = "UNIT", requires = "frf", value_enum)]
+    #[arg(
+        long,
+        value_name = "UNIT",
+        requires = "frf",
+        conflicts_with = "recording",
+        value_enum
+    )]
     pub frf_phase: Option<PhaseUnit>,
 }
 
