@@ -118,7 +118,7 @@ pub(super) fn text(outputs: &AnalysisOutputs) -> String {
     };
     let filled = match outputs.filled_ticks {
         0 => String::new(),
-        ticks => format!(", {ticks} missing ticks interpolated"),
+        ticks => format!(", positions of {ticks} missing ticks estimated"),
     };
     let response = response_text(frf_csv, outputs.frequencies, coherence);
     let closed = outputs.closed.as_ref().map(loop_output::text);

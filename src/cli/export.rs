@@ -154,7 +154,7 @@ fn defects(recording: &Recording, is_response: bool) -> Vec<String> {
 
 fn missing_text(overruns: u64, lost: u64, is_response: bool) -> String {
     let consequence = if is_response {
-        "missing ticks are interpolated in the response; repeat the run if that is not acceptable"
+        "the positions of missing ticks are estimated in the response; repeat the run if that is not acceptable"
     } else {
         "the file lacks these ticks; the column `tick` shows where"
     };

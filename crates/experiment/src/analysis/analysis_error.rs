@@ -52,17 +52,39 @@ pub enum AnalysisError {
     },
     /// Too many ticks are missing.
     #[error(
-        "at least {missing} ticks are missing between the {ticks} recorded ones, the last of them after tick {after}, but at most {allowed} can be interpolated; repeat the run, with a lower loop.rate_hz or with real-time scheduling if the loop missed them"
+        "{missing} ticks are missing between the {ticks} recorded ones, but at most {allowed} can be replaced; repeat the run with real-time priority (docs/real-time.md) or a lower loop.rate_hz"
     )]
     Gaps {
-        /// Missing ticks, counted until there were too many.
+        /// Missing ticks.
         missing: u64,
-        /// The last tick before the gap at which there were too many.
-        after: u64,
         /// Recorded ticks.
         ticks: u64,
-        /// Number of ticks that can be interpolated.
+        /// Number of ticks that can be replaced.
         allowed: u64,
+    },
+    /// Too many records are lost.
+    #[error(
+        "{lost} records are lost between the {ticks} recorded ticks, but at most {allowed} can be replaced, because the current in their ticks is not known; repeat the run"
+    )]
+    LostRecords {
+        /// Lost records.
+        lost: u64,
+        /// Recorded ticks.
+        ticks: u64,
+        /// Number of records that can be replaced.
+        allowed: u64,
+    },
+    /// Too many ticks are missing in the time in which the sweep determines a mode.
+    #[error(
+        "{missing} of {window} successive ticks are missing ({all} in the whole run), more than half, so that a mode there is not determined; repeat the run with real-time priority (docs/real-time.md), a lower loop.rate_hz or a larger chirp.duration_s"
+    )]
+    DenseGaps {
+        /// Missing ticks among them.
+        missing: u64,
+        /// Number of successive ticks.
+        window: u64,
+        /// Missing ticks of the run.
+        all: u64,
     },
 }
 

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::analysis_error::AnalysisError;
-use super::signal_builder::{RunSignals, SignalBuilder};
+use super::run_signals::RunSignals;
+use super::signal_builder::SignalBuilder;
 use crate::plan::{KIND, RunKind};
 use bench_config::whole;
 use bench_recording::{Preceding, Recording, RecordingError};
@@ -34,7 +35,7 @@ pub fn open_with_signals(path: &Path) -> Result<(Recording, ReadSignals), Record
         }
     })?;
     let collected: Option<Collected> = collected.flatten();
-    let signals = collected.map(|signals| signals.finish(recording.tick_count()));
+    let signals = collected.map(Collected::finish);
     Ok((recording, ReadSignals(signals)))
 }
 
@@ -69,8 +70,8 @@ impl Collected {
         }
     }
 
-    fn finish(self, ticks: u64) -> Result<RunSignals, AnalysisError> {
-        self.signals?.finish(ticks)
+    fn finish(self) -> Result<RunSignals, AnalysisError> {
+        self.signals?.finish()
     }
 }
 

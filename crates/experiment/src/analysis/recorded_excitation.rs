@@ -6,21 +6,22 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::analysis_error::AnalysisError;
-use super::closed_responses;
 use super::ending::Ending;
+use super::excited_run::ExcitedRun;
+use super::missing_ticks;
 use super::model_response::ModelResponse;
 use super::read_run::{ReadSignals, is_closed_loop, is_of_run};
 use super::response_estimate::{ClosedResponses, ResponseEstimate};
-use super::segments::{Segments, segments};
-use super::signal_builder::{RunSignals, SignalBuilder};
+use super::run_signals::RunSignals;
+use super::signal_builder::SignalBuilder;
 use crate::certificate::SignCheck;
 use bench_config::Config;
 use bench_identify::delay::excess_delay;
 use bench_identify::linearity::Linearity;
 use bench_identify::modal::{self, FitError, MeasurementChain, ModalFit};
 use bench_identify::verdict::{Certainty, Verdict, VerdictScope, judge};
-use bench_identify::{Estimate, Frf, Signals, response};
-use bench_plant::{ModalModel, Mode, Sign};
+use bench_identify::{Estimate, Frf, Signals};
+use bench_plant::{ModalModel, Mode, Sign, SignalPath};
 use bench_recording::Recording;
 
 /// The phase of the model is used, and a verdict is given, up to this multiple of its highest mode.
@@ -42,7 +43,7 @@ pub struct Analysis {
     pub delay_s: f64,
     /// Excess delay over the model in seconds, from the phases up to the last mode of the model.
     pub excess_delay: Option<Estimate>,
-    /// Number of missing ticks that were interpolated: current by zero-order hold, position linearly.
+    /// Number of missing ticks. The amplifier held its current in them, and their positions are those of the fitted modes.
     pub filled_ticks: u64,
     /// The fitted modes, or why none can be fitted.
     pub fit: Result<ModalFit, FitError>,
@@ -102,7 +103,7 @@ pub fn analyse(
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Analysis, AnalysisError> {
     let signals = run_signals_of(recording, signals, config, progress)?;
-    let filled_ticks = signals.filled_ticks;
+    let filled_ticks = signals.filled_ticks();
     let estimate = estimated(recording, signals, config, progress)?;
     let with_modes = ModalStep {
         config,
@@ -149,21 +150,41 @@ pub(crate) fn cautions(recording: &Recording) -> Vec<String> {
     cautions.into_iter().flatten().collect()
 }
 
-/// The responses of a recording.
+/// The responses of a recording. Positions in missing ticks are those of the modes that fit the response, in turn with it.
 pub(crate) fn estimated(
     recording: &Recording,
-    signals: RunSignals,
+    mut signals: RunSignals,
     config: &Config,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<ResponseEstimate, AnalysisError> {
-    let loop_signals = signals.loop_signals;
     report(progress, AnalysisPhase::Response, 0.0)?;
-    let band_hz = config.chirp.band_hz();
-    if is_closed_loop(recording.metadata()) {
-        closed_responses::estimate_loop(&loop_signals, band_hz, recording, config)
-    } else {
-        open_loop(loop_signals.signals, band_hz, config)
+    let run = ExcitedRun::new(recording, config, signals.missing())?;
+    let variance_factor = run.variance_factor()?;
+    for round in 0..run.predictions() {
+        let frf = run.estimate(&signals)?.frf;
+        let Some(fit) = fit_for_prediction(&frf, config, round, progress)? else {
+            break;
+        };
+        signals.predict_missing(&fit, &SignalPath::from(config));
     }
+    Ok(run
+        .estimate(&signals)?
+        .with_variance_factor(variance_factor))
+}
+
+/// The modes by which missing ticks are predicted; `None` if none can be fitted.
+fn fit_for_prediction(
+    frf: &Frf,
+    config: &Config,
+    round: usize,
+    progress: &mut AnalysisProgress<'_>,
+) -> Result<Option<ModalFit>, AnalysisError> {
+    let mut as_part = |_: AnalysisPhase, fraction: f64| {
+        let done = (round as f64 + fraction) / missing_ticks::ROUNDS as f64;
+        progress(AnalysisPhase::Response, done)
+    };
+    let fit = fit_modes(frf, &MeasurementChain::bench(config), &mut as_part)?;
+    Ok(fit.ok())
 }
 
 /// A warning that records are lost: their ticks were interpolated, or the results lack them.
@@ -182,23 +203,6 @@ fn report(
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(AnalysisError::Cancelled),
     }
-}
-
-fn open_loop(
-    signals: Signals,
-    band_hz: (f64, f64),
-    config: &Config,
-) -> Result<ResponseEstimate, AnalysisError> {
-    let pattern = config.chosen_excitation()?.pattern();
-    let (frf, linearity) = match segments(signals, &pattern, band_hz)? {
-        Segments::Lines(frf, linearity) => (frf, linearity.map(|boxed| *boxed)),
-        Segments::Record(signals) => (response(&signals, band_hz, &config.identify)?, None),
-    };
-    Ok(ResponseEstimate {
-        frf,
-        closed: None,
-        linearity,
-    })
 }
 
 /// The step of an analysis after the response: modes, comparison with the model, verdict.
@@ -294,6 +298,8 @@ fn visible_modes(modal: &ModalModel, up_to_rad_s: f64) -> usize {
 /// When the recording cannot be read, or lacks too many ticks.
 pub(crate) fn run_signals(recording: &Recording, rate_hz: f64) -> Result<Signals, AnalysisError> {
     let read = read_signals(recording, rate_hz, false, &mut never_cancels)?;
+    read.missing()
+        .check_ratio(missing_ticks::MAX_RATIO_ON_LINES)?;
     Ok(read.loop_signals.signals)
 }
 
@@ -315,5 +321,5 @@ fn read_signals(
             report(progress, AnalysisPhase::Reading, index as f64 / total)?;
         }
     }
-    signals.finish(recording.tick_count())
+    signals.finish()
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::Complex;
 
+use super::missing_ticks::with_variance_factor;
 use bench_control::Margins;
 use bench_control::measured::MeasuredMargins;
 use bench_identify::Frf;
@@ -29,4 +30,21 @@ pub(crate) struct ResponseEstimate {
     pub(crate) frf: Frf,
     pub(crate) closed: Option<ClosedResponses>,
     pub(crate) linearity: Option<Linearity>,
+}
+
+impl ResponseEstimate {
+    /// With the variances of all responses multiplied by a factor of 1 or more.
+    pub(super) fn with_variance_factor(self, factor: f64) -> ResponseEstimate {
+        let closed = self.closed.map(|closed| ClosedResponses {
+            complementary: with_variance_factor(closed.complementary, factor),
+            sensitivity: with_variance_factor(closed.sensitivity, factor),
+            loop_gain: with_variance_factor(closed.loop_gain, factor),
+            ..closed
+        });
+        ResponseEstimate {
+            frf: with_variance_factor(self.frf, factor),
+            closed,
+            linearity: self.linearity,
+        }
+    }
 }

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use super::aligned_readings::AlignedReadings;
 use super::analysis_error::AnalysisError;
+use super::missing_ticks::{MAX_RATIO, MissingTicks, check_lost, check_ratio};
+use super::run_signals::RunSignals;
 use bench_base::running_stats::RunningStats;
 use bench_identify::joint::LoopSignals;
 use bench_identify::resampling::Readings;
 use bench_identify::{Signals, setpoint_timing};
 use bench_rt::record::TickRecord;
-
-/// Largest ratio of interpolated ticks: each of them adds an error.
-const FILLED_RATIO: f64 = 1e-3;
 
 /// Times that differ by less than this ratio of a period are treated as equal.
 const SAME_TIME_RATIO: f64 = 1e-3;
@@ -18,21 +18,13 @@ const SAME_TIME_RATIO: f64 = 1e-3;
 /// Largest age of a reading: the upper bound of `interlock.probe_stale_s`, at which a loop trips.
 const MAX_AGE_S: f64 = 10.0;
 
-/// The signals of a run at regular times.
-pub(crate) struct RunSignals {
-    /// Reference, command and position.
-    pub(super) loop_signals: LoopSignals,
-    /// Number of interpolated ticks.
-    pub(crate) filled_ticks: u64,
-}
-
 /// Ticks that are missing between two records.
 struct Missing {
     /// Number of ticks before them in the signals without them.
     index: usize,
-    /// The last tick before them.
-    after_tick: u64,
     ticks: u64,
+    /// How many of them the loop served, although their records are lost.
+    lost: u64,
 }
 
 /// Collects reference, command and position of every tick of a run, and interpolates missing ticks.
@@ -82,7 +74,7 @@ impl SignalBuilder {
         check_age(record)?;
         match self.last_tick {
             None => self.first_s = seconds(record.scheduled_ns),
-            Some(last) => self.note_missing(last, record.tick),
+            Some(last) => self.note_missing(last, record),
         }
         self.push_times(record);
         self.input_a.push(record.command_a);
@@ -119,22 +111,22 @@ impl SignalBuilder {
         self.offset_range_s = (low_s.min(offset_s), high_s.max(offset_s));
     }
 
-    fn note_missing(&mut self, last_tick: u64, next_tick: u64) {
-        let ticks = next_tick.saturating_sub(last_tick).saturating_sub(1);
+    fn note_missing(&mut self, last_tick: u64, next: &TickRecord) {
+        let ticks = next.tick.saturating_sub(last_tick).saturating_sub(1);
         if ticks > 0 {
             self.missing.push(Missing {
                 index: self.input_a.len(),
-                after_tick: last_tick,
                 ticks,
+                lost: ticks.saturating_sub(u64::from(next.missed_ticks)),
             });
         }
     }
 
-    /// Interpolates the missing ticks: current by zero-order hold, position and reference linearly. Returns their number; fails
-    /// if there are too many.
-    fn fill(&mut self, ticks: u64) -> Result<u64, AnalysisError> {
-        let filled = missing_ticks(&self.missing, ticks)?;
-        if filled > 0 {
+    /// Interpolates the missing ticks: current by zero-order hold, position and reference linearly. Returns them; fails if there are
+    /// too many.
+    fn fill(&mut self) -> Result<MissingTicks, AnalysisError> {
+        let filled = missing_ticks(&self.missing, self.input_a.len())?;
+        if !filled.is_empty() {
             let missing = &self.missing;
             self.input_a = with_missing(&self.input_a, missing, |before, _, _| before);
             self.late = with_missing(&self.late, missing, |_, _, _| f64::NAN);
@@ -144,57 +136,51 @@ impl SignalBuilder {
         Ok(filled)
     }
 
-    /// The signals of a recording with this number of ticks. If the times differ from tick to tick, currents are shifted to the median time and positions to the mean
-    /// age.
-    pub(super) fn finish(mut self, ticks: u64) -> Result<RunSignals, AnalysisError> {
+    /// The signals. If the times differ from tick to tick, currents are shifted to the median time and positions to the mean age.
+    pub(super) fn finish(mut self) -> Result<RunSignals, AnalysisError> {
         if self.input_a.is_empty() {
             return Err(AnalysisError::NothingRan);
         }
-        let filled_ticks = self.fill(ticks)?;
-        let aligned_m = self.aligned_positions();
+        let missing = self.fill()?;
+        let aligned = self.aligned_readings(&missing);
         let signals = Signals {
             rate_hz: self.rate_hz,
             input: aligned_currents(self.input_a, self.late),
-            output: aligned_m.unwrap_or(self.output_m),
+            output: self.output_m,
         };
-        Ok(RunSignals {
-            loop_signals: LoopSignals {
-                signals,
-                reference_m: self.reference_m,
-            },
-            filled_ticks,
-        })
+        let loop_signals = LoopSignals {
+            signals,
+            reference_m: self.reference_m,
+        };
+        Ok(RunSignals::new(loop_signals, missing, aligned))
     }
 
-    /// The positions at the mean age; `None` if all ages are equal.
-    fn aligned_positions(&self) -> Option<Vec<f64>> {
+    /// The readings, to be shifted to the mean age; `None` if all ages are equal.
+    fn aligned_readings(&mut self, missing: &MissingTicks) -> Option<AlignedReadings> {
         let (low_s, high_s) = self.offset_range_s;
         if (high_s - low_s) * self.rate_hz <= SAME_TIME_RATIO {
             return None;
         }
         let start_s = self.first_s + self.offset_s.mean;
-        let (period_s, count) = (1.0 / self.rate_hz, self.output_m.len());
-        let aligned = self.readings.at_regular_times(start_s, period_s, count);
-        Some(aligned).filter(|aligned| aligned.len() == count)
+        let readings = std::mem::take(&mut self.readings);
+        let aligned = AlignedReadings::new(readings, start_s, 1.0 / self.rate_hz);
+        Some(aligned.with_missing(&missing.indices))
     }
 }
 
-/// Number of missing ticks beside `ticks` recorded ones; fails if there are too many.
-fn missing_ticks(missing: &[Missing], ticks: u64) -> Result<u64, AnalysisError> {
-    let allowed = (ticks as f64 * FILLED_RATIO) as u64;
-    let mut all = 0u64;
+/// The missing ticks beside `recorded` ones; fails if there are too many.
+fn missing_ticks(missing: &[Missing], recorded: usize) -> Result<MissingTicks, AnalysisError> {
+    let sum = |of: fn(&Missing) -> u64| missing.iter().map(of).fold(0, u64::saturating_add);
+    check_lost(sum(|gap| gap.lost), recorded as u64)?;
+    let count = sum(|gap| gap.ticks);
+    check_ratio(count, recorded as u64, MAX_RATIO)?;
+    let mut indices = Vec::with_capacity(count as usize);
     for gap in missing {
-        all = all.saturating_add(gap.ticks);
-        if all > allowed {
-            return Err(AnalysisError::Gaps {
-                missing: all,
-                after: gap.after_tick,
-                ticks,
-                allowed,
-            });
-        }
+        let first = gap.index + indices.len();
+        indices.extend(first..first + gap.ticks as usize);
     }
-    Ok(all)
+    let ticks = recorded + indices.len();
+    Ok(MissingTicks { indices, ticks })
 }
 
 /// A signal with values at the missing ticks. `value` is given the values before and after them, and the share of the time between
@@ -260,10 +246,10 @@ fn seconds(ns: u64) -> f64 {
 mod tests {
     use super::*;
 
-    /// The ticks from 0 to `count`, without those that are `lost`.
-    fn gathered(count: u64, lost: impl Fn(u64) -> bool) -> Result<RunSignals, AnalysisError> {
-        let kept: Vec<u64> = (0..count).filter(|tick| !lost(*tick)).collect();
-        let ticks = kept.len() as u64;
+    /// The ticks from 0 to `count`, without those that the loop missed.
+    fn gathered(count: u64, is_missed: impl Fn(u64) -> bool) -> Result<RunSignals, AnalysisError> {
+        let kept: Vec<u64> = (0..count).filter(|tick| !is_missed(*tick)).collect();
+        let mut next = 0;
         let mut gathered = SignalBuilder::of(1000.0, false);
         for tick in kept {
             let (ns, position_m) = (tick * 1_000_000, tick as f64 * 1e-9);
@@ -271,8 +257,10 @@ mod tests {
                 scheduled_ns: ns,
                 woke_ns: ns,
                 done_ns: ns,
+                missed_ticks: (tick - next) as u32,
                 ..TickRecord::default()
             };
+            next = tick + 1;
             gathered.push(&TickRecord {
                 tick,
                 position_m,
@@ -280,7 +268,7 @@ mod tests {
                 ..times
             })?;
         }
-        gathered.finish(ticks)
+        gathered.finish()
     }
 
     #[test]
@@ -308,43 +296,84 @@ mod tests {
     }
 
     #[test]
-    fn interpolates_at_most_a_thousandth_of_all_ticks() {
-        // 9990 recorded ticks allow 9 missing ones: here one per thousand, the last at tick 8500; then one gap of
-        // nine.
-        let nine =
-            gathered(10_000, |tick| tick % 1000 == 500 && tick < 9000).expect("nine are few");
-        assert_eq!(nine.filled_ticks, 9);
-        let Signals { input, output, .. } = nine.loop_signals.signals;
+    fn missing_ticks_are_on_a_line_and_hold_the_current() {
+        // Single ticks, and a gap of nine.
+        let is_missed = |tick: u64| tick % 1000 == 500 || (2500..2509).contains(&tick);
+        let gathered = gathered(10_000, is_missed).expect("18 are few");
+        assert_eq!(gathered.filled_ticks(), 18);
+        let expected: Vec<usize> = (0..10_000).filter(|tick| is_missed(*tick as u64)).collect();
+        assert_eq!(gathered.missing().indices, expected);
+        let Signals { input, output, .. } = gathered.loop_signals.signals;
         assert!(input.len() == 10_000 && input.iter().all(|u| *u == 0.5));
         let straight = |(tick, y): (usize, &f64)| (y - tick as f64 * 1e-9).abs() < 1e-18;
         assert!(
             output.iter().enumerate().all(straight),
             "on a straight line"
         );
-        assert_eq!(
-            gathered(10_000, |tick| (500..509).contains(&tick))
-                .expect("nine")
-                .filled_ticks,
-            9
+    }
+
+    #[test]
+    fn accepts_at_most_a_twentieth_of_missing_ticks() {
+        // A twentieth of 10,000 ticks; 9,499 recorded ones allow 499.9 missing ones.
+        let accepted = gathered(10_000, |tick| tick % 20 == 10).expect("500 are few enough");
+        assert_eq!(accepted.filled_ticks(), 500);
+        let Err(error) = gathered(10_000, |tick| tick % 20 == 10 || tick == 5000) else {
+            panic!("501 are too many")
+        };
+        assert!(
+            matches!(
+                error,
+                AnalysisError::Gaps {
+                    missing: 501,
+                    ticks: 9499,
+                    allowed: 499,
+                }
+            ),
+            "{error}"
         );
-        for lost in [
-            |tick: u64| tick % 1000 == 500,
-            |tick: u64| (500..510).contains(&tick),
-        ] {
-            let Err(error) = gathered(10_000, lost) else {
-                panic!("ten of 9990 are too many")
+        assert!(error.to_string().contains("501 ticks are missing"));
+    }
+
+    #[test]
+    fn rejects_more_than_a_thousandth_of_lost_records() {
+        // Records without a count of missed ticks before them: the loop served these ticks with currents that are not known.
+        let with_lost = |lost: u64| {
+            let mut gathered = SignalBuilder::of(1000.0, false);
+            for tick in (0..10_000).filter(|tick| !(5000..5000 + lost).contains(tick)) {
+                gathered.push(&TickRecord {
+                    tick,
+                    ..TickRecord::default()
+                })?;
+            }
+            gathered.finish()
+        };
+        assert_eq!(with_lost(10).expect("a thousandth").filled_ticks(), 10);
+        let error = with_lost(11).err().expect("too many");
+        assert!(
+            matches!(error, AnalysisError::LostRecords { lost: 11, .. }),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn rejects_gap_of_any_size_without_filling_it() {
+        for missed_ticks in [0, u32::MAX] {
+            let mut gathered = SignalBuilder::of(1000.0, false);
+            for tick in [0, u64::from(u32::MAX) + 1] {
+                let record = TickRecord {
+                    tick,
+                    missed_ticks,
+                    ..TickRecord::default()
+                };
+                gathered.push(&record).expect("a tick");
+            }
+            let error = gathered.finish().err().expect("too many");
+            let is_refused = match error {
+                AnalysisError::LostRecords { .. } => missed_ticks == 0,
+                AnalysisError::Gaps { .. } => missed_ticks > 0,
+                _ => false,
             };
-            assert!(
-                matches!(
-                    error,
-                    AnalysisError::Gaps {
-                        missing: 10,
-                        allowed: 9,
-                        ..
-                    }
-                ),
-                "{error}"
-            );
+            assert!(is_refused, "{missed_ticks}: {error}");
         }
     }
 }

@@ -144,7 +144,7 @@ pub struct AnalysisOutputs {
     pub frequencies: usize,
     /// Median coherence over the band.
     pub coherence_median: Option<f64>,
-    /// Missing ticks that were interpolated.
+    /// Number of missing ticks, whose positions were estimated.
     pub filled_ticks: u64,
     /// Mean time from a command to the position that its reading shows, by the model.
     pub delay_s: Option<f64>,

@@ -29,7 +29,7 @@ impl Evidence {
     pub(super) fn add(&mut self, recording: &Path, config: &Config) -> Result<(), AnalysisError> {
         let (recording, signals) = open_with_signals(recording)?;
         let signals = run_signals_of(&recording, signals, config, &mut never_cancels)?;
-        self.filled_ticks += signals.filled_ticks;
+        self.filled_ticks += signals.filled_ticks();
         let estimate = estimated(&recording, signals, config, &mut never_cancels)?;
         self.frfs.push(estimate.frf);
         self.cautions.extend(cautions(&recording));

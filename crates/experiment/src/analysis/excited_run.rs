@@ -1,0 +1,113 @@
+//! The excitation of a recorded run, and the estimate of its response.
+
+use super::analysis_error::AnalysisError;
+use super::closed_responses::estimate_loop;
+use super::missing_ticks::{self, MAX_RATIO_ON_LINES, MissingTicks, shortest_window};
+use super::read_run::is_closed_loop;
+use super::response_estimate::ResponseEstimate;
+use super::run_signals::RunSignals;
+use super::segments::{Segments, segments};
+use bench_config::Config;
+use bench_excitation::Pattern;
+use bench_identify::{Signals, response};
+use bench_recording::Recording;
+
+/// A recorded run with its excitation.
+pub(super) struct ExcitedRun<'a> {
+    recording: &'a Recording,
+    config: &'a Config,
+    missing: MissingTicks,
+    excitation: RunExcitation,
+    /// The band of the excitation.
+    band_hz: (f64, f64),
+}
+
+/// How a run was excited.
+enum RunExcitation {
+    /// By the reference of a closed loop.
+    Reference,
+    /// By a current.
+    Current(Pattern),
+}
+
+impl<'a> ExcitedRun<'a> {
+    pub(super) fn new(
+        recording: &'a Recording,
+        config: &'a Config,
+        missing: &MissingTicks,
+    ) -> Result<ExcitedRun<'a>, AnalysisError> {
+        let excitation = if is_closed_loop(recording.metadata()) {
+            RunExcitation::Reference
+        } else {
+            RunExcitation::Current(config.chosen_excitation()?.pattern())
+        };
+        Ok(ExcitedRun {
+            recording,
+            config,
+            missing: missing.clone(),
+            excitation,
+            band_hz: config.chirp.band_hz(),
+        })
+    }
+
+    /// How often the positions in missing ticks are to be predicted. The lines of a periodic excitation are estimated from its periods,
+    /// which missing ticks lengthen.
+    pub(super) fn predictions(&self) -> usize {
+        if self.missing.is_empty() || self.has_lines() {
+            0
+        } else {
+            missing_ticks::ROUNDS
+        }
+    }
+
+    /// The factor by which missing ticks increase the variances; fails if there are too many.
+    pub(super) fn variance_factor(&self) -> Result<f64, AnalysisError> {
+        if self.has_lines() {
+            self.missing.check_ratio(MAX_RATIO_ON_LINES)?;
+            return Ok(1.0);
+        }
+        let duration_s = self.missing.ticks as f64 * self.config.servo.period_s();
+        let window = shortest_window(self.config, self.band_hz, duration_s);
+        self.missing.variance_factor(window)
+    }
+
+    /// Whether the response is estimated at single frequencies from periods.
+    fn has_lines(&self) -> bool {
+        matches!(
+            self.excitation,
+            RunExcitation::Current(Pattern::Periodic { .. } | Pattern::Stepped(_))
+        )
+    }
+
+    /// The responses by the signals of the run.
+    pub(super) fn estimate(&self, signals: &RunSignals) -> Result<ResponseEstimate, AnalysisError> {
+        let signals = &signals.loop_signals;
+        match &self.excitation {
+            RunExcitation::Reference => {
+                estimate_loop(signals, self.band_hz, self.recording, self.config)
+            }
+            // Repetitions with missing ticks are not equal: they are estimated as one record.
+            RunExcitation::Current(Pattern::Repeated { .. }) if !self.missing.is_empty() => {
+                self.open_loop(signals.signals.clone(), &Pattern::Once)
+            }
+            RunExcitation::Current(pattern) => self.open_loop(signals.signals.clone(), pattern),
+        }
+    }
+
+    fn open_loop(
+        &self,
+        signals: Signals,
+        pattern: &Pattern,
+    ) -> Result<ResponseEstimate, AnalysisError> {
+        let settings = &self.config.identify;
+        let (frf, linearity) = match segments(signals, pattern, self.band_hz)? {
+            Segments::Lines(frf, linearity) => (frf, linearity.map(|boxed| *boxed)),
+            Segments::Record(signals) => (response(&signals, self.band_hz, settings)?, None),
+        };
+        Ok(ResponseEstimate {
+            frf,
+            closed: None,
+            linearity,
+        })
+    }
+}
