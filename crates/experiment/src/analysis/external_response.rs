@@ -129,7 +129,8 @@ mod tests {
 
     #[test]
     fn conjugated_response_of_either_sign_is_refused() {
-        for change in [|h: Complex<f64>| h.conj(), |h| -h.conj()] {
+        let changes: [fn(Complex<f64>) -> Complex<f64>; 2] = [|h| h.conj(), |h| -h.conj()];
+        for change in changes {
             let found = negative(&frf(change));
             assert!(matches!(found, Err(FrfError::Conjugated)), "{found:?}");
         }
