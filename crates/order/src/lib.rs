@@ -10,7 +10,7 @@
 //! | `words` | the words of a command line for options in JSON |
 //! | `chirp`, `control`, `calibrate`, `linearity`, `campaign`, `identify` | the options of each command, and the configuration that they select |
 //! | `bench_options`, `rig_options`, `excitation_options`, `figure_options`, `controller_choice` | options that several commands share |
-//! | `response_options` | a frequency response in place of signals |
+//! | `response_options`, `response_identification` | a frequency response in place of signals |
 //! | `reference` | the value of `--reference` |
 //! | `value_range` | a grid as typed |
 //! | `help` | texts of options with the value of the default profile |
@@ -32,6 +32,7 @@ mod linearity;
 mod order;
 mod path_text;
 mod reference;
+mod response_identification;
 mod response_options;
 mod rig_options;
 #[cfg(test)]
