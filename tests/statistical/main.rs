@@ -13,6 +13,7 @@ mod held_out_designs;
 mod joint_estimate;
 mod measured_designs;
 mod measured_margins;
+mod missed_ticks;
 mod modes;
 mod residual_monitor;
 mod sequential;

@@ -270,6 +270,7 @@ mod tests {
             amplifier_bandwidth_hz: 1e9,
             force_constant_n_per_a: 1.0,
             delays_s: vec![1.0 / RATE_HZ],
+            output: bench_plant::OutputKind::Position,
         }
     }
 
