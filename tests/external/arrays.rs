@@ -93,9 +93,7 @@ fn a_missing_time_is_answered_with_the_columns_and_the_single_numbers() {
             "fs = 1000",
             "--rate",
         ]);
-    let answer = bench.run(&format!("identify matrix.mat {options} --time fs"));
-    assert_eq!(answer.code, 1, "{answer:?}");
-    for word in ["`fs`", "the single number 1000", "--rate 1000"] {
-        assert!(answer.err.contains(word), "{answer:?}");
-    }
+    bench
+        .run(&format!("identify matrix.mat {options} --time fs"))
+        .is_refused(&["`fs`", "the single number 1000", "--rate 1000"]);
 }

@@ -153,7 +153,7 @@ fn response_from_output_to_input_has_no_verdict() {
     let answer = identify(&bench, "inverse.csv");
     assert_eq!(answer["cnmp"], "undecided");
     let why = answer["why"].as_str().expect("a reason");
-    assert!(why.contains("give the inverse"), "{why}");
+    assert!(why.contains("give its inverse"), "{why}");
 }
 
 #[test]
