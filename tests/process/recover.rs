@@ -271,7 +271,7 @@ fn a_recovered_gap_is_neither_identified_nor_replayed() {
     let missing = &report["missing_ticks"][0];
     assert_eq!(missing["ticks"], 100, "a tenth of a second: {report}");
     for (command, words) in [
-        ("identify", "100 ticks are missing"),
+        ("identify", "100 records are lost"),
         ("replay", "100 records are missing"),
     ] {
         let output = bench(&[command]).arg(&to).output().expect("it runs");
