@@ -11,7 +11,7 @@ use crate::budget::Budget;
 use crate::bytes::{ByteOrder, Bytes};
 use crate::error::ArraysError;
 use crate::number::{Class, Numbers, Precision, Stored};
-use crate::value::{NumericArray, Value, Variables, entry_count, printable};
+use crate::value::{MAX_NAME_BYTES, NumericArray, Value, Variables, entry_count, printable};
 
 const HEADER_BYTES: usize = 128;
 /// Deepest structure in a structure.
@@ -124,6 +124,9 @@ fn array(
     }
     let shape = shape(bytes)?;
     let name = Element::text(bytes)?;
+    if name.len() > MAX_NAME_BYTES {
+        return Err(bytes.damaged("a name of at most 1024 bytes"));
+    }
     let value = match class {
         1 => Ok(Value::Other("a cell array".into())),
         2 => structures(bytes, &shape, depth, budget),
@@ -256,13 +259,13 @@ fn structures(
     let length_bytes = length.rest().len().min(4);
     let length = length.unsigned(length_bytes, "the length of names")? as usize;
     let names = Element::read(bytes)?.data;
-    if length == 0 {
+    if !(1..=MAX_NAME_BYTES).contains(&length) {
         return Err(names.damaged("the length of the names of fields"));
     }
-    let names: Vec<&[u8]> = names.rest().chunks_exact(length).collect();
+    let names = names.rest().chunks_exact(length);
     let mut all = Vec::new();
     for number in 1..=count {
-        for name in &names {
+        for name in names.clone() {
             let mut element = Element::read(bytes)?.data;
             let (_, value) = array(&mut element, depth - 1, budget)?;
             let name = text(name);

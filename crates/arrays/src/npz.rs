@@ -8,7 +8,7 @@ use crate::budget::Budget;
 use crate::bytes::{ByteOrder, Bytes};
 use crate::error::ArraysError;
 use crate::npy;
-use crate::value::{Value, Variables, printable};
+use crate::value::{MAX_NAME_BYTES, Value, Variables, printable};
 
 /// End of the name of an array.
 const ENDING: &str = ".npy";
@@ -48,6 +48,9 @@ fn variable(
     let Some(name) = name.strip_suffix(ENDING).map(String::from) else {
         return Ok(None);
     };
+    if name.len() > MAX_NAME_BYTES {
+        return Err(file.damaged("a name of at most 1024 bytes"));
+    }
     let content = budget.unpack(entry, file, "a packed array, or its checksum");
     let array = content.and_then(|content| npy::array(&content, budget));
     let array = array.map_err(|error| error.in_variable(&name))?;

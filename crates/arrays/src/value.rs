@@ -39,6 +39,9 @@ pub(crate) fn entry_count(shape: &[usize]) -> Option<usize> {
     sizes.try_fold(1usize, |count, size| count.checked_mul(*size))
 }
 
+/// Longest name of a variable or a field, all levels included, in bytes: a name is repeated for each of its fields.
+pub(crate) const MAX_NAME_BYTES: usize = 1024;
+
 /// A name that can be printed: control characters could change the terminal.
 pub(crate) fn printable(name: &[u8]) -> String {
     let name = String::from_utf8_lossy(name);

@@ -203,8 +203,15 @@ impl<'a> ArrayTable<'a> {
     }
 }
 
-/// The unit of times, by the file or by the name.
+/// The unit of times, by the file or by the name. In `d.t` and `d:1` the `d` is a structure and a matrix, not a time in days.
 fn unit_of(series: &Series) -> Option<TimeUnit> {
     let stated = series.unit.as_deref().and_then(TimeUnit::stated_in);
-    stated.or_else(|| TimeUnit::stated_in(&series.name))
+    stated.or_else(|| {
+        let field = series.name.rsplit('.').next()?;
+        match field.split_once(':') {
+            None => TimeUnit::stated_in(field),
+            Some((matrix, _)) if TimeUnit::is_one(matrix) => None,
+            Some((matrix, _)) => TimeUnit::stated_in(matrix),
+        }
+    })
 }

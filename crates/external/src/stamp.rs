@@ -141,7 +141,7 @@ impl Stamp {
 
     /// The time from another one, in the unit of both.
     pub fn since(&self, start: &Stamp) -> f64 {
-        (self.whole - start.whole) as f64 + (self.fraction - start.fraction)
+        self.whole.saturating_sub(start.whole) as f64 + (self.fraction - start.fraction)
     }
 }
 

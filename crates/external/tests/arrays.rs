@@ -175,6 +175,45 @@ fn what_is_no_column_is_refused_with_what_it_is() {
 }
 
 #[test]
+fn name_of_a_matrix_or_a_structure_is_no_unit_of_time() {
+    let row = |k: usize| {
+        [k as f64 * 1e-3, (k % 7) as f64, (k % 11) as f64]
+            .map(f64::to_le_bytes)
+            .concat()
+    };
+    let data: Vec<u8> = (0..1000).flat_map(row).collect();
+    for (descr, [time, input, output], is_assumed) in [
+        ("[('d', '<f8', (3,))]", ["d:1", "d:2", "d:3"], true),
+        (
+            "[('time_s', '<f8', (3,))]",
+            ["time_s:1", "time_s:2", "time_s:3"],
+            false,
+        ),
+        (
+            "[('h', [('t', '<f8'), ('u', '<f8'), ('y', '<f8')])]",
+            ["h.t", "h.u", "h.y"],
+            true,
+        ),
+        (
+            "[('h', [('t_s', '<f8'), ('u', '<f8'), ('y', '<f8')])]",
+            ["h.t_s", "h.u", "h.y"],
+            false,
+        ),
+    ] {
+        let file = File::new(npy(descr, 1000, &data));
+        let columns = Columns {
+            input: input.into(),
+            output: output.into(),
+            ..columns(time, None)
+        };
+        let record = read(&file.path, &columns).unwrap_or_else(|error| panic!("{error}"));
+        let error = (record.signals.rate_hz / 1000.0 - 1.0).abs();
+        assert!(error < 1e-9, "{time}: {}", record.signals.rate_hz);
+        assert_eq!(record.seconds_assumed, is_assumed, "{time}");
+    }
+}
+
+#[test]
 fn a_matrix_without_a_name_has_numbered_columns() {
     let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 2), }\n";
     let length = (header.len() as u16).to_le_bytes();

@@ -134,6 +134,8 @@ fn other_units_and_several_responses_are_refused() {
         (&["H"][..], ["rpm", "m", "A"], "`rpm`, not Hz or rad/s"),
         (&["H"], ["Hz", "m", "N"], "not in m/A"),
         (&["H"], ["Hz", "mm", "A"], "not in m/A"),
+        (&["H"], ["Hz", "mm", "NONE"], "not in m/A"),
+        (&["H"], ["Hz", "mm/A", "NONE"], "not in m/A"),
         (
             &["H", "G"],
             ["Hz", "m", "A"],

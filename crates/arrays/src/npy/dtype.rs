@@ -3,9 +3,12 @@
 use super::literal::Literal;
 use crate::bytes::ByteOrder;
 use crate::number::{Class, Stored};
+use crate::value::MAX_NAME_BYTES;
 
 /// Most numbers of a field of several numbers that become fields of their own.
 const MAX_PARTS: usize = 256;
+/// Most fields of an entry.
+const MAX_FIELDS: usize = 4096;
 
 /// What an entry is.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +88,9 @@ impl Fields {
             name => name.text()?,
         };
         let name = format!("{outer}{name}");
+        if name.len() > MAX_NAME_BYTES {
+            return None;
+        }
         let sizes = shape.unwrap_or_default().iter();
         let count = sizes
             .map(Literal::number)
@@ -126,6 +132,9 @@ impl Fields {
     }
 
     fn append(&mut self, name: String, scalar: Scalar) -> Option<()> {
+        if self.all.len() == MAX_FIELDS {
+            return None;
+        }
         let start = self.end;
         self.end = start.checked_add(scalar.size())?;
         self.all.push(Field {

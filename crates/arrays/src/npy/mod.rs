@@ -38,6 +38,14 @@ pub(crate) fn array(bytes: &[u8], budget: &mut Budget) -> Result<Value, ArraysEr
     header.read(&mut file, budget)
 }
 
+/// The text of a header: UTF-8, or Latin-1 in versions 1 and 2 of the format.
+fn decoded(text: &[u8]) -> String {
+    match std::str::from_utf8(text) {
+        Ok(text) => text.into(),
+        Err(_) => text.iter().map(|byte| char::from(*byte)).collect(),
+    }
+}
+
 struct Header {
     entry: Entry,
     is_fortran: bool,
@@ -46,7 +54,7 @@ struct Header {
 
 impl Header {
     fn of(text: &[u8]) -> Option<Header> {
-        let literal = Literal::parse(std::str::from_utf8(text).ok()?)?;
+        let literal = Literal::parse(&decoded(text))?;
         let sizes = literal.get("shape")?.items()?;
         let shape = sizes.iter().map(Literal::number);
         Some(Header {
@@ -147,7 +155,7 @@ struct Places {
 fn places(shape: &[usize], is_fortran: bool, count: usize) -> Places {
     let mut long = shape.iter().copied().filter(|size| *size != 1);
     let by_row = match (is_fortran, long.next(), long.next(), long.next()) {
-        (false, Some(rows), Some(columns), None) => Some([rows, columns]),
+        (false, Some(rows), Some(columns), None) if count > 0 => Some([rows, columns]),
         _ => None,
     };
     Places { count, by_row }

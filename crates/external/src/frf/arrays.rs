@@ -80,8 +80,7 @@ impl<'a> ArrayColumns<'a> {
         let unit = self.frequency_unit(unit, "the axis of its frequencies")?;
         self.push_numbers("frequency", unit, &dataset.abscissas);
         let unit = ratio(dataset.unit.as_deref(), dataset.denominator_unit.as_deref());
-        let response = Numbers::Complex(dataset.ordinates.to_complex());
-        self.push_numbers("response", &unit, &response);
+        self.push_numbers("response", &unit, &dataset.ordinates);
         Ok(())
     }
 
@@ -134,8 +133,7 @@ impl<'a> ArrayColumns<'a> {
             self.push_numbers("Frequency", unit, frequency);
         }
         if let Some(response) = model.numbers("ResponseData") {
-            let response = Numbers::Complex(response.to_complex());
-            self.push_numbers("ResponseData", &response_unit, &response);
+            self.push_numbers("ResponseData", &response_unit, response);
         }
         if let Some(coherence) = model.numbers("Coherence") {
             self.push_numbers("Coherence", "", coherence);
@@ -195,11 +193,18 @@ impl<'a> ArrayColumns<'a> {
     }
 }
 
-/// The unit of a response; empty unless both units are stated.
+/// The unit of a response; empty if none is stated. The label of an ordinate may have both units.
 fn ratio(numerator: Option<&str>, denominator: Option<&str>) -> String {
     match (numerator, denominator) {
-        (Some(numerator), Some(denominator)) => format!("{numerator}/{denominator}"),
-        _ => String::new(),
+        (None, None) => String::new(),
+        (Some(both), None) if both.contains('/') => both.into(),
+        (numerator, denominator) => {
+            let (output, input) = (
+                numerator.unwrap_or("output"),
+                denominator.unwrap_or("input"),
+            );
+            format!("{output}/{input}")
+        }
     }
 }
 

@@ -246,9 +246,9 @@ impl<'a> Named<'a> {
             }
         });
         let columns: Vec<NamedColumn<'_>> = columns.collect();
-        for (index, column) in columns.iter().enumerate() {
-            let same =
-                |other: &&NamedColumn<'_>| column.role.is_some() && other.role == column.role;
+        let known = columns.iter().enumerate();
+        for (index, column) in known.filter(|(_, column)| column.role.is_some()) {
+            let same = |other: &&NamedColumn<'_>| other.role == column.role;
             if let Some(first) = columns[..index].iter().find(same) {
                 return Err(FrfTableError::Twice {
                     path: table.path().to_owned(),

@@ -52,9 +52,14 @@ impl ResponseUnit {
             .or_else(|| of_words(name))
     }
 
-    /// `um/N`, also after `dB re 1`. A text without a slash is no unit of a ratio.
+    /// `um/N`, also after `dB re 1`, `m/s/N` and `V/(m/s)`. A text without a slash is no unit of a ratio.
     fn of_text(text: &str) -> Option<ResponseUnit> {
-        let (output, input) = text.trim().split_once(['/', '\u{2044}'])?;
+        const SLASHES: [char; 2] = ['/', '\u{2044}'];
+        let text = text.trim();
+        let (output, input) = match text.rsplit_once(SLASHES)? {
+            (_, input) if input.contains(')') => text.split_once(SLASHES)?,
+            parts => parts,
+        };
         let output = output.split_whitespace().next_back()?;
         let input = input.trim();
         (!input.is_empty()).then(|| ResponseUnit {
@@ -93,6 +98,8 @@ fn of_words(name: &str) -> Option<ResponseUnit> {
     let name = name.strip_suffix("_db").unwrap_or(name);
     let (output, input) = name.split_once("_per_")?;
     let (_, output) = output.split_once('_')?;
+    // Without ` real` of the parts of a complex array.
+    let input = input.split_whitespace().next()?;
     Some(ResponseUnit {
         output: symbol(output),
         input: symbol(input),
@@ -120,6 +127,9 @@ mod tests {
             ("Magnitude (dB re 1 m/A)", "", Some("m/A")),
             ("|G(f)| [\u{b5}m/N]", "", Some("\u{b5}m/N")),
             ("real", "V/V", Some("V/V")),
+            ("response", "m/s/N", Some("m/s/N")),
+            ("response", "V/(m/s)", Some("V/(m/s)")),
+            ("response_m_per_a real", "", Some("m/A")),
             ("mag_um_per_n_db", "", Some("um/N")),
             ("mag_um_per_n (dB)", "dB", Some("um/N")),
             ("mag_db", "dB", None),
