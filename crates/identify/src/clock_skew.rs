@@ -122,9 +122,8 @@ impl ClockSkew {
         };
         let at = |ratio| {
             let data = turned.turned_back(ratio);
-            modal::nearest(&fit.parameters, &data, chain)
-                .0
-                .free_values()
+            let nearest = modal::nearest(&fit.parameters, &data, chain);
+            nearest.parameters.free_values()
         };
         let change = (at(self.ratio.sigma) - at(-self.ratio.sigma)) * 0.5;
         ModalFit {
@@ -280,18 +279,19 @@ impl<'a> TurnedData<'a> {
         let (mut modes, mut ratio) = (start.clone(), near);
         let mut step = FIRST_STEP_RAD / self.span_rad();
         for _ in 0..MAX_REFINEMENTS {
-            let (parameters, [low, middle, high]) = self.profile(&modes, ratio, step);
-            let curvature = (low + high - 2.0 * middle) / (step * step);
-            let slope = (high - low) / (2.0 * step);
-            modes = parameters;
-            if !curvature.is_finite() {
+            let near = |ratio| modal::nearest(&modes, &self.turned_back(ratio), self.chain);
+            let [low, middle, high] = [ratio - step, ratio, ratio + step].map(near);
+            let curvature = (low.chi2 + high.chi2 - 2.0 * middle.chi2) / (step * step);
+            let slope = (high.chi2 - low.chi2) / (2.0 * step);
+            modes = middle.parameters;
+            if !curvature.is_finite() || ratio.abs() > MAX_RATIO {
                 return None;
             }
             if curvature <= 0.0 {
                 ratio -= step.copysign(slope);
                 continue;
             }
-            let misfit = (middle / (2.0 * self.data.len() as f64)).max(1.0);
+            let misfit = middle.chi2_per_freedom.max(1.0);
             let sigma = (2.0 * misfit / curvature).sqrt();
             let shift = (-slope / curvature).clamp(-MAX_SHIFT * step, MAX_SHIFT * step);
             ratio += shift;
@@ -304,18 +304,6 @@ impl<'a> TurnedData<'a> {
             step = step.min(shift.abs()).max(sigma);
         }
         None
-    }
-
-    /// The modes at a ratio, and the least chi^2 of as many modes a step below it, at it and a step above it.
-    fn profile(
-        &self,
-        start: &ModalParameters,
-        ratio: f64,
-        step: f64,
-    ) -> (ModalParameters, [f64; 3]) {
-        let near = |ratio| modal::nearest(start, &self.turned_back(ratio), self.chain);
-        let (middle, chi2) = near(ratio);
-        (middle, [near(ratio - step).1, chi2, near(ratio + step).1])
     }
 }
 

@@ -257,15 +257,16 @@ impl Identification {
         signals: &Signals,
         analysis: ExternalAnalysis,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        let is_right =
-            analysis.verdict.cnmp != Cnmp::Undecided && is_sum_of_few_modes(&analysis.fit);
-        if self.repetition.is_some() || analysis.has_known_cause || is_right {
+        let is_decided = analysis.verdict.cnmp != Cnmp::Undecided;
+        if self.repetition.is_some() || analysis.has_known_cause || is_decided {
             return Ok(analysis);
         }
         let Some(skew) = ClockSkew::find(signals, analysis.band_hz, &analysis.chain) else {
             return Ok(analysis);
         };
-        let corrected = analyse(&skew.corrected(signals), *self, Some(skew))?;
+        let Ok(corrected) = analyse(&skew.corrected(signals), *self, Some(skew)) else {
+            return Ok(analysis);
+        };
         let is_better = is_sum_of_few_modes(&corrected.fit)
             && number_of_modes(&corrected) <= number_of_modes(&analysis);
         Ok(if is_better { corrected } else { analysis })

@@ -127,17 +127,29 @@ pub(crate) fn coarse_cost(
     search::coarse_cost(Problem { chain, data, nodes }, max_modes)
 }
 
-/// The parameters of least chi^2 near given ones, with as many modes, and that chi^2. The data are merged as `start` allows.
+/// The parameters of least chi^2 near given ones.
+pub(crate) struct Nearest {
+    pub(crate) parameters: ModalParameters,
+    pub(crate) chi2: f64,
+    pub(crate) chi2_per_freedom: f64,
+}
+
+/// The parameters of least chi^2 near given ones, with as many modes. The data are merged as `start` allows.
 pub(crate) fn nearest(
     start: &ModalParameters,
     data: &[FrfDatum],
     chain: &MeasurementChain,
-) -> (ModalParameters, f64) {
+) -> Nearest {
     let data = &merged(data, start);
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
     let solution = refine(problem, start.clone(), 0.0);
-    (solution.parameters, solution.chi2)
+    let freedom = (2 * data.len()).saturating_sub(start.free().len()).max(1);
+    Nearest {
+        chi2: solution.chi2,
+        chi2_per_freedom: solution.chi2 / freedom as f64,
+        parameters: solution.parameters,
+    }
 }
 
 fn too_few(data: &[FrfDatum]) -> FitError {
