@@ -10,15 +10,16 @@
 //! Modes and a constant delay do not describe that. e is found as the ratio with which they do: by a scan, in a band so low that the
 //! scan has few steps, and then in wider bands with smaller steps. The output is then resampled at the times of its own clock.
 //!
-//! An excitation without an order in time, as noise or a multisine, has no t(f), and nothing is found.
+//! An excitation without an order in time, as noise or a multisine, has no t(f), and nothing is found. In closed loop U is the reference.
 
 use nalgebra::Complex;
 
+use crate::external_signals::ExternalSignals;
 use crate::fft::RealFft;
 use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters};
 use crate::observation::describes;
 use crate::resampling::Readings;
-use crate::{Estimate, EstimatorSettings, FrfDatum, IdentifySettings, Signals};
+use crate::{Estimate, FrfDatum, Signals};
 
 /// Two clocks differ by at most this ratio: quartz has 1e-4, the timers of computers less than 1e-3.
 const MAX_RATIO: f64 = 2e-3;
@@ -68,21 +69,26 @@ pub struct ClockSkew {
 impl ClockSkew {
     /// The ratio with which modes describe a response between two frequencies; `None` without a sweep, or if none is significant.
     pub(super) fn find(
-        signals: &Signals,
+        record: ExternalSignals<'_>,
         band_hz: (f64, f64),
         chain: &MeasurementChain,
     ) -> Option<ClockSkew> {
-        let data = data_of(signals, band_hz)?;
-        let turned = TurnedData::new(signals, &data, chain)?;
+        let data = record.response(band_hz).ok()?.data;
+        let excited = record.excited();
+        let turned = TurnedData::new(&excited, &data, chain)?;
         let (near, modes) = turned.thinned(FITTED_DATA).described()?;
         let mut skew = ClockSkew {
             ratio: turned.refined(&modes, near)?,
-            duration_s: signals.len() as f64 / signals.rate_hz,
+            duration_s: excited.len() as f64 / excited.rate_hz,
         };
         // The turn of a datum is an approximation: the plant responds for a while after t(f). Of a small rest the error is small.
         for _ in 0..MAX_CORRECTIONS {
-            let data = data_of(&skew.corrected(signals), band_hz)?;
-            let rest = TurnedData::new(signals, &data, chain)?.refined(&modes, 0.0)?;
+            let corrected = ExternalSignals {
+                signals: &skew.corrected(record.signals),
+                ..record
+            };
+            let data = corrected.response(band_hz).ok()?.data;
+            let rest = TurnedData::new(&excited, &data, chain)?.refined(&modes, 0.0)?;
             skew.ratio = Estimate {
                 value: (1.0 + skew.ratio.value) * (1.0 + rest.value) - 1.0,
                 sigma: rest.sigma,
@@ -113,11 +119,11 @@ impl ClockSkew {
     pub(super) fn widened(
         &self,
         fit: ModalFit,
-        signals: &Signals,
+        record: ExternalSignals<'_>,
         data: &[FrfDatum],
         chain: &MeasurementChain,
     ) -> ModalFit {
-        let Some(turned) = TurnedData::new(signals, data, chain) else {
+        let Some(turned) = TurnedData::new(&record.excited(), data, chain) else {
             return fit;
         };
         let at = |ratio| {
@@ -167,6 +173,7 @@ struct TurnedData<'a> {
 }
 
 impl<'a> TurnedData<'a> {
+    /// The data of a record whose input excites it.
     fn new(
         signals: &Signals,
         data: &[FrfDatum],
@@ -305,12 +312,6 @@ impl<'a> TurnedData<'a> {
         }
         None
     }
-}
-
-/// The data of the response of a record.
-fn data_of(signals: &Signals, band_hz: (f64, f64)) -> Option<Vec<FrfDatum>> {
-    let settings = IdentifySettings::Local(EstimatorSettings::default());
-    Some(crate::response(signals, band_hz, &settings).ok()?.data)
 }
 
 /// When a frequency is excited.

@@ -38,6 +38,17 @@ pub enum IdentifyError {
         /// Upper limit of the band.
         high_hz: f64,
     },
+    /// The reference of a loop determines too little of its signals in the band.
+    #[error(
+        "the reference explains too little of the input between {low_hz} and {high_hz} Hz to distinguish the response from noise; \
+         excite this band, select the band that was excited, or check the column of the reference"
+    )]
+    WeakReference {
+        /// Lower limit of the band.
+        low_hz: f64,
+        /// Upper limit of the band.
+        high_hz: f64,
+    },
     /// A setting of an estimator is out of bounds.
     #[error("{name} is {value}; give a value from {min} to {max}")]
     Setting {
@@ -118,6 +129,17 @@ pub enum SignalsError {
         /// Their number.
         samples: usize,
     },
+    /// The reference of a loop does not change.
+    #[error(
+        "the reference is {value} at every one of {samples} samples, so it excites nothing; \
+         select the column of the set-point or of the excitation that was added in the loop"
+    )]
+    ConstantReference {
+        /// Value of all samples.
+        value: f64,
+        /// Their number.
+        samples: usize,
+    },
     /// The output does not change.
     #[error(
         "the output is {value} at every one of {samples} samples: the probe does not measure the stage; \
@@ -131,13 +153,15 @@ pub enum SignalsError {
     },
 }
 
-/// One of the two signals of a record.
+/// One of the signals of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// The input.
     Input,
     /// The output.
     Output,
+    /// The reference of the loop.
+    Reference,
 }
 
 impl fmt::Display for Signal {
@@ -145,6 +169,7 @@ impl fmt::Display for Signal {
         f.write_str(match self {
             Signal::Input => "input",
             Signal::Output => "output",
+            Signal::Reference => "reference",
         })
     }
 }
@@ -193,6 +218,11 @@ impl IdentifyError {
     /// The input has no energy in `band_hz`.
     pub(super) fn not_excited((low_hz, high_hz): (f64, f64)) -> Self {
         Self::NotExcited { low_hz, high_hz }
+    }
+
+    /// The reference does not determine the signals in `band_hz`.
+    pub(super) fn weak_reference((low_hz, high_hz): (f64, f64)) -> Self {
+        Self::WeakReference { low_hz, high_hz }
     }
 }
 

@@ -1,8 +1,11 @@
 //! From two signals to modes and verdict: force and displacement or similar quantities, without a model of the stage.
 
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use crate::ClockSkew;
+use crate::external_signals::ExternalSignals;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
@@ -11,12 +14,8 @@ use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{hint, implausible, unless_undetermined};
 use crate::record_check::Resolution;
-use crate::remedies::OF_SIGNALS;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
-use crate::{
-    EstimatorSettings, Frf, FrfDatum, IdentifyError, IdentifySettings, Signals, distortion_ratio,
-    excited_band_hz, record_check, with_distortion,
-};
+use crate::{Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, with_distortion};
 use bench_plant::{OutputKind, PlantError};
 
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
@@ -127,9 +126,14 @@ pub enum IdentificationError {
     /// The zeros of the fit cannot be computed.
     #[error(transparent)]
     Zeros(#[from] PlantError),
+    /// Periods are averaged, and a reference is given.
+    #[error(
+        "averages over periods need no reference, because noise that a controller feeds back averages out of input and output; leave out the reference, or the period"
+    )]
+    ReferenceOfPeriods,
 }
 
-/// How two signals are identified.
+/// How two signals are identified, or those of a closed loop with its reference.
 ///
 /// Units: with input in newtons and output in metres, residues are in 1/kg. With another unit of the input or the output, residues and
 /// responses are in that unit over this one; frequencies, damping ratios, signs, zeros and verdict are the same. Of a velocity or an
@@ -241,30 +245,76 @@ impl Identification {
         input: &[f64],
         output: &[f64],
     ) -> Result<ExternalAnalysis, IdentificationError> {
+        self.analysis(None, input, output)
+    }
+
+    /// Identifies an output as the response to an input of a closed loop, with the reference of the loop.
+    ///
+    /// ```text
+    /// y = G u + v       v: noise of the output, which the controller feeds back to u
+    /// G = S_yr/S_ur     response of the output to the reference r over that of the input
+    /// ```
+    ///
+    /// The response from input to output alone is biased from G towards -1/C, with C the controller in u = C (r - y), by the power of the
+    /// noise over that of noise and signal. Sign convention: a lag of the output is a negative phase; the controller need not be known.
+    ///
+    /// The reference is a set-point, or an excitation that is added in the loop, in any unit; it is independent of the noise. (The
+    /// control error is not.) The input is the whole signal that acts on the plant, with what is added to it. Before and after the
+    /// excitation the reference rests; a set-point may end elsewhere than it began. Without a stated band it is the one that the
+    /// reference excites. See [`joint::plant`](crate::joint::plant()) for the estimate and its source.
+    ///
+    /// # Errors
+    /// When the signals allow no estimate, or the zeros cannot be computed; with [`Self::periods`], whose averages need no reference.
+    pub fn run_with_reference(
+        &self,
+        reference: &[f64],
+        input: &[f64],
+        output: &[f64],
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        if self.repetition.is_some() {
+            return Err(IdentificationError::ReferenceOfPeriods);
+        }
+        self.analysis(Some(reference), input, output)
+    }
+
+    fn analysis(
+        &self,
+        reference: Option<&[f64]>,
+        input: &[f64],
+        output: &[f64],
+    ) -> Result<ExternalAnalysis, IdentificationError> {
         let signals = Signals {
             rate_hz: self.rate_hz,
             input: input.to_vec(),
             output: output.to_vec(),
         };
-        let analysis = analyse(&signals, *self, None)?;
-        self.with_one_clock(&signals, analysis)
+        let record = ExternalSignals {
+            signals: &signals,
+            reference,
+        };
+        let analysis = analyse(record, *self, None)?;
+        self.with_one_clock(record, analysis)
     }
 
     /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
     /// then.
     fn with_one_clock(
         &self,
-        signals: &Signals,
+        record: ExternalSignals<'_>,
         analysis: ExternalAnalysis,
     ) -> Result<ExternalAnalysis, IdentificationError> {
         let is_decided = analysis.verdict.cnmp != Cnmp::Undecided;
         if self.repetition.is_some() || analysis.has_known_cause || is_decided {
             return Ok(analysis);
         }
-        let Some(skew) = ClockSkew::find(signals, analysis.band_hz, &analysis.chain) else {
+        let Some(skew) = ClockSkew::find(record, analysis.band_hz, &analysis.chain) else {
             return Ok(analysis);
         };
-        let Ok(corrected) = analyse(&skew.corrected(signals), *self, Some(skew)) else {
+        let corrected = ExternalSignals {
+            signals: &skew.corrected(record.signals),
+            ..record
+        };
+        let Ok(corrected) = analyse(corrected, *self, Some(skew)) else {
             return Ok(analysis);
         };
         let is_better = is_sum_of_few_modes(&corrected.fit)
@@ -273,10 +323,10 @@ impl Identification {
     }
 }
 
-/// Analyses input and output between two frequencies, or in the band that the input excites. With a repetition, periods are averaged;
+/// Analyses input and output between two frequencies, or in the band that is excited. With a repetition, periods are averaged;
 /// without one, the record must begin and end at rest. `clock_skew` is that for which the output was corrected.
 fn analyse(
-    signals: &Signals,
+    record: ExternalSignals<'_>,
     identification: Identification,
     clock_skew: Option<ClockSkew>,
 ) -> Result<ExternalAnalysis, IdentificationError> {
@@ -286,18 +336,20 @@ fn analyse(
         input_path,
         ..
     } = identification;
-    signals.check()?;
+    record.check()?;
     // The lines of a periodic record are estimated one by one.
-    let stray_lines = match repetition {
-        Some(_) => Vec::new(),
-        None => record_check::stray_lines(signals),
+    let (signals, stray_lines) = match repetition {
+        Some(_) => (Cow::Borrowed(record.signals), Vec::new()),
+        None => record.without_stray_lines(),
     };
-    let (recorded, cleaned) = (signals, record_check::without(signals, &stray_lines));
-    let signals: &Signals = &cleaned;
-    let resolution = Resolution::of(recorded);
-    let defects = record_check::defects(recorded, signals, repetition.is_some());
-    let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(signals, repetition));
-    let (frf, periodic) = response(signals, requested_hz, repetition)?;
+    let cleaned = ExternalSignals {
+        signals: &signals,
+        ..record
+    };
+    let resolution = record.resolution();
+    let defects = record.defects(&cleaned, repetition.is_some());
+    let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(cleaned, repetition));
+    let (frf, periodic) = response(cleaned, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
     let band_hz = if band_hz.is_none() && periodic.is_some() {
         frf.band_hz()
@@ -319,7 +371,7 @@ fn analyse(
         (None, None) => modal::fit(&frf.data, &chain),
     };
     let fit = match &clock_skew {
-        Some(skew) => fit.map(|fit| skew.widened(fit, signals, &frf.data, &chain)),
+        Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
         None => fit,
     };
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
@@ -330,11 +382,11 @@ fn analyse(
         chain: &chain,
         stated,
         clear_kind,
-        remedies: &OF_SIGNALS,
+        remedies: record.remedies(),
     };
     let why = listed(&defects).or_else(|| implausible(&observation));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
-        hint(verdict, signals, repetition.is_some(), &fit)
+        hint(verdict, cleaned, repetition.is_some(), &fit)
     })?;
     let verdict = verdict.with(listed(&stray_lines));
     let verdict = verdict.with(clock_skew.map(|skew| skew.description()));
@@ -384,21 +436,22 @@ fn number_of_modes(analysis: &ExternalAnalysis) -> usize {
     }
 }
 
-/// The band that the input excites. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
-fn default_band_hz(signals: &Signals, repetition: Option<Repetition>) -> (f64, f64) {
-    let all = (0.0, signals.rate_hz / 2.0);
+/// The band that is excited. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
+fn default_band_hz(record: ExternalSignals<'_>, repetition: Option<Repetition>) -> (f64, f64) {
+    let all = (0.0, record.signals.rate_hz / 2.0);
     match repetition {
         Some(_) => all,
-        None => excited_band_hz(signals).unwrap_or(all),
+        None => record.excited_band_hz().unwrap_or(all),
     }
 }
 
 fn response(
-    signals: &Signals,
+    record: ExternalSignals<'_>,
     band_hz: (f64, f64),
     repetition: Option<Repetition>,
 ) -> Result<(Frf, Option<PeriodicPart>), IdentificationError> {
     if let Some(repetition) = repetition {
+        let signals = record.signals;
         let Periods { frf, count, .. } = periodic::estimate(signals, band_hz, repetition)?;
         let lines = harmonics(signals, band_hz, repetition, InputSignal::Measured)?;
         let linearity = lines.map(Linearity::new);
@@ -410,8 +463,7 @@ fn response(
         };
         return Ok((frf, Some(part)));
     }
-    let settings = IdentifySettings::Local(EstimatorSettings::default());
-    Ok((crate::response(signals, band_hz, &settings)?, None))
+    Ok((record.response(band_hz)?, None))
 }
 
 fn listed(items: &[impl ToString]) -> Option<String> {

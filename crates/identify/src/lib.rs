@@ -8,6 +8,7 @@
 //! | to find | look in |
 //! |---|---|
 //! | two signals, all steps with the default settings | [`Identification`] |
+//! | the same of a closed loop with its reference | [`Identification::run_with_reference`] |
 //! | a response of another program, in any unit | [`ResponseIdentification`] |
 //! | the default estimator, for records that begin and end at rest | [`local`] |
 //! | the same without smoothing, for a fit | [`Frf::data`] |
@@ -36,6 +37,7 @@ pub mod delay;
 mod error;
 mod estimator;
 mod excited_band;
+mod external_signals;
 mod fft;
 mod frf;
 pub mod frf_csv;

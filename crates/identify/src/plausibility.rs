@@ -2,11 +2,12 @@
 
 use bench_plant::OutputKind;
 
+use crate::external_signals::ExternalSignals;
 use crate::modal::{FitError, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
 use crate::other_kind::{better_kind, explained_otherwise, vanishes_at_rest};
 use crate::verdict::{Cnmp, Verdict};
-use crate::{Frf, Signals, record_check};
+use crate::{Frf, record_check};
 
 /// Half of the frequencies must have at least this coherence.
 const MIN_COHERENCE: f64 = 0.5;
@@ -23,13 +24,21 @@ const CERTAIN_SIGMAS: f64 = 5.0;
 const MANY_MODES: usize = 8;
 /// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
 const ACTIVE_RATIO: f64 = 0.3;
+/// Noise that a controller feeds back to the input makes the response none of modes.
+const CLOSED_LOOP: &str =
+    "if the record was taken in closed loop, give the column of its reference (--reference)";
 
 /// The reason, if the data cannot be those of input and output of a mechanical system.
 pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
     let Observation { frf, fit, .. } = seen;
     let of = seen.remedies;
     let reason = |(what, remedy): (String, &str)| format!("{what}; {remedy}");
-    let incoherent = || Some(reason((incoherent(frf, fit)?, of.incoherent)));
+    let incoherent = || {
+        Some(reason((
+            incoherent(frf, fit, of.excitation)?,
+            of.incoherent,
+        )))
+    };
     let growing = || {
         Some(reason((
             growing(frf, fit, seen.chain.output())?,
@@ -53,14 +62,14 @@ pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
 }
 
 /// Modes that describe the response may lie in less than half of the band.
-fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>) -> Option<String> {
+fn incoherent(frf: &Frf, fit: &Result<ModalFit, FitError>, excitation: &str) -> Option<String> {
     if fit.as_ref().is_ok_and(describes) {
         return None;
     }
     let median = frf.median_coherence()?;
     (median < MIN_COHERENCE).then(|| {
         format!(
-            "the input explains {:.0} % of the output's power, or less, at half of the frequencies",
+            "the {excitation} explains {:.0} % of the output's power, or less, at half of the frequencies",
             100.0 * median
         )
     })
@@ -128,14 +137,22 @@ pub(super) fn response_hint(verdict: &Verdict, fit: &Result<ModalFit, FitError>)
 /// What else may be the cause of an undecided verdict.
 pub(super) fn hint(
     verdict: &Verdict,
-    signals: &Signals,
+    record: ExternalSignals<'_>,
     is_periodic: bool,
     fit: &Result<ModalFit, FitError>,
 ) -> Option<String> {
     if verdict.cnmp != Cnmp::Undecided {
         return None;
     }
-    not_a_sum_of_modes(fit).or_else(|| begins_within_excitation(signals, is_periodic))
+    let is_open = record.reference.is_none() && !is_periodic;
+    let no_sum = not_a_sum_of_modes(fit).map(|why| {
+        if is_open {
+            format!("{why}; {CLOSED_LOOP}")
+        } else {
+            why
+        }
+    });
+    no_sum.or_else(|| begins_within_excitation(record, is_periodic))
 }
 
 /// A verdict that was decided from modes that are not determined, and whose residues cancel, is undecided.
@@ -177,11 +194,12 @@ fn no_sum_of_modes(found: &str) -> String {
     )
 }
 
-fn begins_within_excitation(signals: &Signals, is_periodic: bool) -> Option<String> {
-    let ratio = record_check::input_ratio_at_start(signals);
+fn begins_within_excitation(record: ExternalSignals<'_>, is_periodic: bool) -> Option<String> {
+    let ratio = record_check::input_ratio_at_start(&record.excited());
+    let excitation = record.remedies().excitation;
     (!is_periodic && ratio > ACTIVE_RATIO).then(|| {
         format!(
-            "at the first samples the RMS value of the input is already {:.0} % of that of the whole record; begin the record before the excitation, with the plant at rest",
+            "at the first samples the RMS value of the {excitation} is already {:.0} % of that of the whole record; begin the record before the excitation, with the plant at rest",
             100.0 * ratio
         )
     })

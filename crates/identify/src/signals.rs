@@ -66,6 +66,30 @@ impl Signals {
         Ok(self.check_motion()?)
     }
 
+    /// Checks that the reference of a loop belongs to the signals and changes.
+    ///
+    /// # Errors
+    /// When it differs from the signals in length, has samples that are not finite, or does not change.
+    pub fn check_reference(&self, reference: &[f64]) -> Result<(), IdentifyError> {
+        self.check_reference_length(reference)?;
+        check_samples(Signal::Reference, reference)?;
+        let samples = reference.len();
+        match constant_value(reference) {
+            Some(value) => Err(SignalsError::ConstantReference { value, samples }.into()),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that a reference has as many samples as the signals.
+    pub(super) fn check_reference_length(&self, reference: &[f64]) -> Result<(), SignalsError> {
+        let (reference, signals) = (reference.len(), self.len());
+        if reference == signals {
+            Ok(())
+        } else {
+            Err(SignalsError::ReferenceLength { reference, signals })
+        }
+    }
+
     fn check_motion(&self) -> Result<(), SignalsError> {
         let samples = self.len();
         if let Some(value) = constant_value(&self.input) {
@@ -103,6 +127,23 @@ impl Signals {
         }
     }
 
+    /// Reference, input and output without the steps from the end of the record to its beginning.
+    ///
+    /// An FFT treats the record as one period of a periodic signal. A set-point that ends elsewhere than it began makes a step of d in each
+    /// signal, which adds d/(2 pi f) at every frequency. With x k/n of the step x of each signal subtracted, where n is the number of
+    /// samples k, they have the spectra of their changes from sample to sample, divided by 1 - exp(-2 pi j f T): the ratios of these are
+    /// those of a record from rest to rest. The steps follow from the interval before the first change of the reference, and from the second
+    /// half of the one after the last. Without both intervals the signals are returned as they are.
+    pub(super) fn without_steps(&self, reference: &[f64]) -> [Vec<f64>; 3] {
+        let (before, after) = rest_intervals(reference);
+        let min_samples = (MIN_QUIET_S * self.rate_hz).max(8.0);
+        let signals = [reference, &self.input, &self.output];
+        if (before.len().min(after.len()) as f64) < min_samples {
+            return signals.map(<[f64]>::to_vec);
+        }
+        signals.map(|samples| without_step(samples, before.clone(), after.clone()))
+    }
+
     /// The interval of zero input before the excitation and the second half of the one after it.
     fn quiet_intervals(&self) -> (Range<usize>, Range<usize>) {
         let peak = self.input.iter().fold(0.0_f64, |peak, u| peak.max(u.abs()));
@@ -111,6 +152,31 @@ impl Signals {
         let after = self.input.iter().rev().take_while(quiet).count();
         (0..before, self.len() - after / 2..self.len())
     }
+}
+
+/// The interval before the first change of a signal, and the second half of the one after the last.
+fn rest_intervals(samples: &[f64]) -> (Range<usize>, Range<usize>) {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else {
+        return (0..0, 0..0);
+    };
+    let low = samples.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let is_near = |x: f64, rest: f64| (x - rest).abs() <= QUIET_RATIO * (high - low);
+    let before = samples.iter().take_while(|x| is_near(**x, *first)).count();
+    let after = samples
+        .iter()
+        .rev()
+        .take_while(|x| is_near(**x, *last))
+        .count();
+    (0..before, samples.len() - after / 2..samples.len())
+}
+
+/// A signal minus the straight line over the whole record that rises by the step between two intervals.
+fn without_step(samples: &[f64], before: Range<usize>, after: Range<usize>) -> Vec<f64> {
+    let step = mean(&samples[after]) - mean(&samples[before]);
+    let slope = step / samples.len() as f64;
+    let samples = samples.iter().enumerate();
+    samples.map(|(k, x)| x - slope * k as f64).collect()
 }
 
 /// Checks that input and output have the same number of samples.
@@ -192,6 +258,60 @@ mod tests {
             max: 1e100,
         });
         assert_eq!(signals.check(), Err(error));
+    }
+
+    #[test]
+    fn errors_of_a_reference_hold_its_length_its_sample_and_its_value() {
+        let signals = valid();
+        let mut reference = signals.input.clone();
+        reference[41] = f64::NAN;
+        let error = signals.check_reference(&reference).expect_err("a NaN");
+        assert!(
+            error
+                .to_string()
+                .contains("the reference is NaN at sample 41")
+        );
+        let error = signals.check_reference(&reference[1..]);
+        let (reference, samples) = (99, 100);
+        let lengths = SignalsError::ReferenceLength {
+            reference,
+            signals: samples,
+        };
+        assert_eq!(error, Err(lengths.into()));
+        let value = 0.5;
+        let constant = SignalsError::ConstantReference { value, samples };
+        assert_eq!(signals.check_reference(&[value; 100]), Err(constant.into()));
+    }
+
+    #[test]
+    fn ratio_of_a_step_is_that_of_its_changes() {
+        // The reference goes from 1 to 3 in 100 samples; y[k] = 0.9 y[k-1] + 0.1 r[k] follows with a gain of 1, u = 2 r + 1.
+        let n = 2000;
+        let level = |k: usize| ((k.clamp(500, 600) - 500) as f64 / 100.0) * 2.0 + 1.0;
+        let reference: Vec<f64> = (0..n).map(level).collect();
+        let mut y = 1.0;
+        let mut output = Vec::new();
+        for r in &reference {
+            y = 0.9 * y + 0.1 * r;
+            output.push(y);
+        }
+        let input = reference.iter().map(|r| 2.0 * r + 1.0).collect();
+        let signals = Signals {
+            rate_hz: 1000.0,
+            input,
+            output,
+        };
+        let fft = crate::fft::RealFft::new(n);
+        let spectra = signals.without_steps(&reference);
+        let [r, u, y] = spectra.map(|samples| fft.below_nyquist(samples));
+        // The spectrum of the ramp is zero at bin 20.
+        for k in 1..15 {
+            let back = nalgebra::Complex::cis(-std::f64::consts::TAU * k as f64 / n as f64);
+            let filter = (-back * 0.9 + 1.0).inv() * 0.1;
+            // Spectra of some 100 samples of 1 against the rounding of 2000 samples of 1.
+            assert!((u[k] / r[k] - 2.0).norm() < 1e-9, "{k}");
+            assert!((y[k] / r[k] / filter - 1.0).norm() < 1e-9, "{k}");
+        }
     }
 
     #[test]

@@ -4,8 +4,9 @@
 //! the input U itself as instrument R in open loop), is the mean of H over its bins, weighted with U conj(R), for any
 //! shape of H. Its variance is `S sum |R|^2 / |sum U conj(R)|^2`, where S, the power of the noise in a bin, follows from the
 //! residuals of local rational models. (The residual about a mean would count the top of a resonance as noise, and the fit
-//! would trust the data beside the resonance too much.) A model is compared with the mean of its values at f -+ spread, which
-//! has the first three moments of the block: the error is of the fourth order in the ratio of block width to mode width.
+//! would trust the data beside the resonance too much.) In the variance, U is without its noise if it has any. A model is
+//! compared with the mean of its values at f -+ spread, which has the first three moments of the block: the error is of the
+//! fourth order in the ratio of block width to mode width.
 
 use core::ops::RangeInclusive;
 
@@ -13,11 +14,14 @@ use nalgebra::Complex;
 
 use super::noise_floor::NoiseFloor;
 use super::record_spectra::RecordSpectra;
-use super::spectra::Spectra;
+use super::spectra::{ExpectedInput, Spectra};
 use crate::{EstimatorSettings, FrfDatum, IdentifyError, Signals, band};
 
 /// Width of a block as a ratio of frequency.
 const WIDTH_RATIO: f64 = 0.0005;
+/// A block counts if the power of its input exceeds that of the noise of the input by this factor: the error of a ratio has no variance
+/// where its denominator may be zero. At this factor it is a quarter larger than by the first order.
+const MIN_POWER_RATIO: f64 = 10.0;
 
 /// The data of a record that begins and ends at rest, each 0.05 % of its frequency wide and at least one bin; frequencies
 /// rise. Blocks without input or without any noise are omitted. Of the settings, only the smallest half-width is used.
@@ -51,10 +55,14 @@ pub(super) fn of_spectra(
     };
     let ends = (*bins.start() as f64, *bins.end() as f64);
     let floor = NoiseFloor::new(spectra, ends, &noise_settings);
-    blocks(bins)
-        .iter()
-        .filter_map(|block| datum(spectra, block, floor.power(middle(block))))
-        .collect()
+    let expected = spectra.expected_inputs(bins, &noise_settings);
+    let mut data = Vec::new();
+    for block in blocks(bins) {
+        let of_block = block.start() - bins.start()..=block.end() - bins.start();
+        let noise_power = floor.power(middle(&block));
+        data.extend(datum(spectra, &block, &expected[of_block], noise_power));
+    }
+    data
 }
 
 fn middle(block: &RangeInclusive<usize>) -> f64 {
@@ -72,22 +80,39 @@ fn blocks(bins: &RangeInclusive<usize>) -> Vec<RangeInclusive<usize>> {
     blocks
 }
 
+/// The datum of a block with the inputs of its bins without their noise; `None` if the noise of the input is too large.
 fn datum(
     spectra: &impl Spectra,
     block: &RangeInclusive<usize>,
+    expected: &[ExpectedInput],
     noise_power: f64,
 ) -> Option<FrfDatum> {
     let input: Complex<f64> = block.clone().map(|k| spectra.input_cross(k)).sum();
     let output: Complex<f64> = block.clone().map(|k| spectra.output_cross(k)).sum();
     let instrument_power: f64 = block.clone().map(|k| spectra.instrument_power(k)).sum();
+    let expected_power = expected_power(expected);
+    if expected_power < MIN_POWER_RATIO * mean_noise_power(expected) * instrument_power {
+        return None;
+    }
     let (centre, spread) = moments(spectra, block);
     let datum = FrfDatum {
         frequency_hz: centre * spectra.bin_hz(),
         spread_hz: spread * spectra.bin_hz(),
         response: output / input,
-        variance: noise_power * instrument_power / input.norm_sqr(),
+        variance: noise_power * instrument_power / expected_power,
     };
     (is_usable(&datum) && centre.is_finite()).then_some(datum)
+}
+
+/// |sum U conj(R)|^2 without the noise of U.
+fn expected_power(expected: &[ExpectedInput]) -> f64 {
+    let sum: Complex<f64> = expected.iter().map(|input| input.cross).sum();
+    sum.norm_sqr()
+}
+
+fn mean_noise_power(expected: &[ExpectedInput]) -> f64 {
+    let sum: f64 = expected.iter().map(|input| input.noise_power).sum();
+    sum / expected.len() as f64
 }
 
 fn is_usable(datum: &FrfDatum) -> bool {

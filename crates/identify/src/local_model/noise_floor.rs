@@ -19,7 +19,7 @@ const OUTLIER_RATIO: f64 = 10.0;
 const COMPARED: usize = 6;
 /// Poles of the models, and of those that are tried where the residual is large.
 const POLES: usize = 1;
-const MORE_POLES: usize = 3;
+pub(super) const MORE_POLES: usize = 3;
 
 /// The residual of one local model.
 struct Residual {

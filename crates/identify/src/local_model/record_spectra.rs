@@ -1,9 +1,11 @@
 //! The spectra of a whole record.
 
+use core::ops::RangeInclusive;
+
 use nalgebra::Complex;
 
 use super::model;
-use super::spectra::{Place, Spectra};
+use super::spectra::{ExpectedInput, Place, Spectra};
 use super::window::{LocalFit, Window};
 use crate::fft::RealFft;
 use crate::{EstimatorSettings, Signals};
@@ -80,6 +82,7 @@ impl RecordSpectra {
             .map(|x| libm::cos(core::f64::consts::FRAC_PI_2 * x))
             .collect();
         Window {
+            first_bin: low,
             x,
             root_weight,
             input: self.input[low..=high].to_vec(),
@@ -116,5 +119,14 @@ impl Spectra for RecordSpectra {
 
     fn instrument_power(&self, bin: usize) -> f64 {
         self.input[bin].norm_sqr()
+    }
+
+    fn expected_inputs(
+        &self,
+        bins: &RangeInclusive<usize>,
+        _: &EstimatorSettings,
+    ) -> Vec<ExpectedInput> {
+        let crosses = bins.clone().map(|k| self.input_cross(k));
+        crosses.map(ExpectedInput::exact).collect()
     }
 }

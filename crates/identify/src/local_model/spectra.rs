@@ -1,5 +1,7 @@
 //! The spectra that a response is estimated from.
 
+use core::ops::RangeInclusive;
+
 use nalgebra::Complex;
 
 use super::window::LocalFit;
@@ -28,4 +30,29 @@ pub(super) trait Spectra {
     fn output_cross(&self, bin: usize) -> Complex<f64>;
     /// |R|^2 of a bin.
     fn instrument_power(&self, bin: usize) -> f64;
+    /// U of each bin without its noise, as far as it is known: for the variance of the response.
+    fn expected_inputs(
+        &self,
+        bins: &RangeInclusive<usize>,
+        settings: &EstimatorSettings,
+    ) -> Vec<ExpectedInput>;
+}
+
+/// An input in a bin without its noise.
+#[derive(Clone, Copy, Default)]
+pub(super) struct ExpectedInput {
+    /// U conj(R) without the noise of U.
+    pub(super) cross: Complex<f64>,
+    /// E|noise of U|^2
+    pub(super) noise_power: f64,
+}
+
+impl ExpectedInput {
+    /// Of an input without noise.
+    pub(super) fn exact(cross: Complex<f64>) -> ExpectedInput {
+        ExpectedInput {
+            cross,
+            noise_power: 0.0,
+        }
+    }
 }

@@ -7,6 +7,8 @@ use crate::LocalModel;
 
 /// The bins around a position. Their weights are cos^2(pi x/2).
 pub(super) struct Window {
+    /// Index of its first bin in the spectrum.
+    pub(super) first_bin: usize,
     /// Distance from the position over the half-width, -1 to 1.
     pub(super) x: Vec<f64>,
     /// Square roots of the weights.

@@ -50,7 +50,7 @@ impl fmt::Display for StrayLine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "the output has a sinusoid of {:.3e} at {:.3} Hz from beginning to end that the input does not have; it was subtracted; remove its source, such as the mains",
+            "the output has a sinusoid of {:.3e} at {:.3} Hz from beginning to end that the excitation does not have; it was subtracted; remove its source, such as the mains",
             self.amplitude.norm(),
             self.frequency_hz
         )

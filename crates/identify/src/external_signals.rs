@@ -1,0 +1,114 @@
+//! The signals of an external record, with the reference of the loop in which they were taken.
+
+use std::borrow::Cow;
+
+use crate::record_check::{self, Defect, Resolution, StrayLine};
+use crate::remedies::{OF_LOOP, OF_SIGNALS, Remedies};
+use crate::{
+    EstimatorSettings, Frf, IdentifyError, IdentifySettings, Signals, excited_band_hz, joint,
+};
+
+/// Input and output, and what excites them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ExternalSignals<'a> {
+    pub(super) signals: &'a Signals,
+    /// The reference of a closed loop, which is independent of the noise; in open loop the input is.
+    pub(super) reference: Option<&'a [f64]>,
+}
+
+impl<'a> ExternalSignals<'a> {
+    pub(super) fn check(&self) -> Result<(), IdentifyError> {
+        self.signals.check()?;
+        match self.reference {
+            Some(reference) => self.signals.check_reference(reference),
+            None => Ok(()),
+        }
+    }
+
+    /// The output with the signal that excites it as its input: in closed loop the reference, from its first value.
+    pub(super) fn excited(&self) -> Cow<'a, Signals> {
+        let Some(reference) = self.reference else {
+            return Cow::Borrowed(self.signals);
+        };
+        let first = reference.first().copied().unwrap_or_default();
+        Cow::Owned(Signals {
+            rate_hz: self.signals.rate_hz,
+            input: reference.iter().map(|r| r - first).collect(),
+            output: self.signals.output.clone(),
+        })
+    }
+
+    /// The band that is excited; `None` without any excitation.
+    pub(super) fn excited_band_hz(&self) -> Option<(f64, f64)> {
+        let Some(reference) = self.reference else {
+            return excited_band_hz(self.signals);
+        };
+        let [input, _, output] = self.signals.without_steps(reference);
+        excited_band_hz(&Signals {
+            rate_hz: self.signals.rate_hz,
+            input,
+            output,
+        })
+    }
+
+    /// What to do about implausible data.
+    pub(super) fn remedies(&self) -> &'static Remedies {
+        match self.reference {
+            None => &OF_SIGNALS,
+            Some(_) => &OF_LOOP,
+        }
+    }
+
+    /// The response from input to output; in closed loop with the reference as the instrument.
+    pub(super) fn response(&self, band_hz: (f64, f64)) -> Result<Frf, IdentifyError> {
+        let settings = EstimatorSettings::default();
+        match self.reference {
+            None => crate::response(self.signals, band_hz, &IdentifySettings::Local(settings)),
+            Some(reference) => joint::plant(self.signals, reference, band_hz, &settings),
+        }
+    }
+
+    /// The resolution of input and output.
+    pub(super) fn resolution(&self) -> Resolution {
+        Resolution {
+            output: Resolution::of(&self.excited()).output,
+            ..Resolution::of(self.signals)
+        }
+    }
+
+    /// The first defect of each kind; `cleaned` is the record without its stray lines.
+    pub(super) fn defects(&self, cleaned: &ExternalSignals<'_>, is_periodic: bool) -> Vec<Defect> {
+        record_check::defects(&self.excited(), &cleaned.excited(), is_periodic)
+    }
+
+    /// The signals without sinusoids that do not come from the excitation, and those of the output. A loop feeds them back, so that the
+    /// input has them too.
+    pub(super) fn without_stray_lines(&self) -> (Cow<'a, Signals>, Vec<StrayLine>) {
+        let Some(reference) = self.reference else {
+            let lines = record_check::stray_lines(self.signals);
+            return (record_check::without(self.signals, &lines), lines);
+        };
+        let lines = record_check::stray_lines(&self.excited());
+        let cleaned = Signals {
+            rate_hz: self.signals.rate_hz,
+            input: without_lines(self.signals, reference),
+            output: record_check::without(self.signals, &lines)
+                .into_owned()
+                .output,
+        };
+        (Cow::Owned(cleaned), lines)
+    }
+}
+
+/// The input without the sinusoids that the reference does not have.
+fn without_lines(signals: &Signals, reference: &[f64]) -> Vec<f64> {
+    let by_reference = Signals {
+        rate_hz: signals.rate_hz,
+        input: reference.to_vec(),
+        output: signals.input.clone(),
+    };
+    let lines = record_check::stray_lines(&by_reference);
+    record_check::without(&by_reference, &lines)
+        .into_owned()
+        .output
+}
