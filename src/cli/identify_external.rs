@@ -30,12 +30,14 @@ struct Report {
     recording: String,
     input: String,
     output: String,
+    /// Column of the reference of a closed loop; `null` in open loop.
+    reference: Option<String>,
     ticks: usize,
     overruns: u64,
     lost_records: u64,
     truncated: bool,
     rate_hz: f64,
-    /// Whether the rate was given, the times are regular, or both columns were resampled.
+    /// Whether the rate was given, the times are regular, or the columns were resampled.
     times: TimeBase,
     /// Whether the times are taken as seconds only because the file does not state their unit.
     time_unit_assumed: bool,
@@ -89,12 +91,18 @@ pub(super) fn run(
     let columns = options.columns(path)?;
     let Record {
         signals,
+        reference,
         times,
         seconds_assumed,
     } = bench_external::read(path, &columns)?;
     signals.check()?;
     let identification = options.identification(&signals)?;
-    let analysis = identification.run(&signals.input, &signals.output);
+    let analysis = match &reference {
+        None => identification.run(&signals.input, &signals.output),
+        Some(reference) => {
+            identification.run_with_reference(reference, &signals.input, &signals.output)
+        }
+    };
     let analysis = analysis.map_err(|error| options.refused(error))?;
     let file = path.file_name().unwrap_or_default().to_string_lossy();
     let record = ExternalRecord {
@@ -102,6 +110,7 @@ pub(super) fn run(
         file: &file,
         input: &columns.input,
         output: &columns.output,
+        reference: columns.reference.as_deref(),
         rate_hz: signals.rate_hz,
         samples: signals.len(),
         times,
@@ -134,6 +143,7 @@ impl Report {
             recording: path.display().to_string(),
             input: input.into(),
             output: output.into(),
+            reference: record.reference.map(String::from),
             ticks: record.samples,
             overruns: 0,
             lost_records: 0,
@@ -181,18 +191,26 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
             self.input,
             self.output,
+            self.reference_text(),
             self.times_text(),
             self.clocks_text(),
             self.output_kind_text(),
             self.resolution_text(),
             self.input_path_text()
         )
+    }
+
+    /// The reference of a closed loop.
+    fn reference_text(&self) -> String {
+        let name = self.reference.as_ref();
+        let text = name.map(|name| format!("`{name}`, of a closed loop"));
+        text.map_or_else(String::new, |text| labelled("reference", &text))
     }
 
     /// What the output measures, if it is no position.

@@ -104,7 +104,14 @@ const COMMANDS: [(&str, &[&str]); 14] = [
     ),
     (
         "identify TABLE --input x --output y",
-        &["--rate", "--time", "--period", "--skip-periods", "--band"],
+        &[
+            "--rate",
+            "--time",
+            "--period",
+            "--skip-periods",
+            "--band",
+            "--reference",
+        ],
     ),
     ("identify TABLE --time t", &["--input", "--output"]),
     (

@@ -1,6 +1,7 @@
 //! External records: a CSV with named columns or a file of arrays, periodic or not, in any units.
 
 mod arrays;
+mod closed_loop;
 mod distortion;
 mod existing_results;
 mod forms;

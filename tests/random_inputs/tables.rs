@@ -59,6 +59,7 @@ fn damaged_external_record_is_refused_or_finite() {
     let columns = |sampling| Columns {
         input: "x".into(),
         output: "y".into(),
+        reference: None,
         sampling,
     };
     let timed = columns(Sampling::TimeColumn {

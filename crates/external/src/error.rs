@@ -53,7 +53,9 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 pub enum ColumnsError {
     /// The same column for two purposes.
-    #[error("`{name}` is selected twice; give different columns for input, output and time")]
+    #[error(
+        "`{name}` is selected twice; give different columns for input, output, reference and time"
+    )]
     SelectedTwice {
         /// Name of the column.
         name: String,

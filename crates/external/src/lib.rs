@@ -6,7 +6,8 @@
 //!      -> arrays (MAT-file, NPZ, NPY, universal file) -> series of the selected names ------------------/      -> signals
 //! ```
 //!
-//! Input and output may have any units: the [`Signals`] have them as well, and a residue is output per input per second squared.
+//! Input, output and the reference of a closed loop may have any units: the [`Signals`] have them as well, and a residue is output per
+//! input per second squared.
 
 #![deny(unsafe_code)]
 
@@ -41,6 +42,8 @@ pub struct Columns {
     pub input: String,
     /// Name of the output column.
     pub output: String,
+    /// Name of the column of the reference of a closed loop.
+    pub reference: Option<String>,
     /// Times of the samples.
     pub sampling: Sampling,
 }
@@ -64,45 +67,83 @@ pub enum Sampling {
 pub struct Record {
     /// Input and output at regular times.
     pub signals: Signals,
+    /// The reference at the same times, if a column was selected.
+    pub reference: Option<Vec<f64>>,
     /// The times of the file.
     pub times: TimeBase,
     /// Whether the times are taken as seconds only because the file does not state their unit.
     pub seconds_assumed: bool,
 }
 
-/// Reads two columns as a record.
+/// Reads the columns of a record.
 ///
 /// # Errors
 /// When the file is no table and has no arrays, lacks a column, holds something else than numbers, or when its times are not known: see
 /// [`ExternalCsvError`]. Use [`Signals::check`] to check that an estimator can process the signals.
 pub fn read(path: &Path, columns: &Columns) -> Result<Record, ExternalCsvError> {
     let source = Source::open(path)?;
-    match &columns.sampling {
-        Sampling::RateHz(rate_hz) => {
-            let [input, output] = source.numbers([&columns.input, &columns.output])?;
-            Ok(Record {
-                signals: Signals {
-                    rate_hz: *rate_hz,
-                    input,
-                    output,
-                },
+    let Columns {
+        input,
+        output,
+        reference,
+        sampling,
+    } = columns;
+    let Some(reference) = reference else {
+        let samples = Samples::read(&source, [input, output], sampling)?;
+        return Ok(samples.record(|[input, output]| (input, output, None)));
+    };
+    let samples = Samples::read(&source, [input, output, reference], sampling)?;
+    Ok(samples.record(|[input, output, reference]| (input, output, Some(reference))))
+}
+
+/// Columns at regular times.
+struct Samples<const N: usize> {
+    columns: [Vec<f64>; N],
+    rate_hz: f64,
+    times: TimeBase,
+    seconds_assumed: bool,
+}
+
+impl<const N: usize> Samples<N> {
+    fn read(
+        source: &Source<'_>,
+        names: [&String; N],
+        sampling: &Sampling,
+    ) -> Result<Samples<N>, ExternalCsvError> {
+        match sampling {
+            Sampling::RateHz(rate_hz) => Ok(Samples {
+                columns: source.numbers(names)?,
+                rate_hz: *rate_hz,
                 times: TimeBase::Given,
                 seconds_assumed: false,
-            })
-        }
-        Sampling::TimeColumn { name, unit } => {
-            let names = [&columns.input, &columns.output];
-            let (signals, times) = source.numbers_and_times(names, name, *unit)?;
-            let [input, output] = signals.map(|values| at_regular_times(values, &times));
-            Ok(Record {
-                signals: Signals {
+            }),
+            Sampling::TimeColumn { name, unit } => {
+                let (columns, times) = source.numbers_and_times(names, name, *unit)?;
+                Ok(Samples {
+                    columns: columns.map(|values| at_regular_times(values, &times)),
                     rate_hz: times.rate_hz,
-                    input,
-                    output,
-                },
-                times: times.base,
-                seconds_assumed: times.seconds_assumed,
-            })
+                    times: times.base,
+                    seconds_assumed: times.seconds_assumed,
+                })
+            }
+        }
+    }
+
+    /// The record of these columns, from which a function takes input, output and reference.
+    fn record(
+        self,
+        signals: impl FnOnce([Vec<f64>; N]) -> (Vec<f64>, Vec<f64>, Option<Vec<f64>>),
+    ) -> Record {
+        let (input, output, reference) = signals(self.columns);
+        Record {
+            signals: Signals {
+                rate_hz: self.rate_hz,
+                input,
+                output,
+            },
+            reference,
+            times: self.times,
+            seconds_assumed: self.seconds_assumed,
         }
     }
 }

@@ -124,7 +124,7 @@ impl fmt::Display for TimeBase {
                 largest_deviation_s,
             } => write!(
                 f,
-                "the times deviate by up to {} from regular ones, and are taken as true: both columns are resampled",
+                "the times deviate by up to {} from regular ones, and are taken as true: the columns are resampled",
                 duration(*largest_deviation_s)
             ),
         }

@@ -50,6 +50,7 @@ fn columns(time: &str, unit: Option<TimeUnit>) -> Columns {
     Columns {
         input: "u".into(),
         output: "y".into(),
+        reference: None,
         sampling: Sampling::TimeColumn {
             name: time.into(),
             unit,
@@ -156,6 +157,7 @@ fn what_is_no_column_is_refused_with_what_it_is() {
     let at_rate = |input: &str, output: &str| Columns {
         input: input.into(),
         output: output.into(),
+        reference: None,
         sampling: Sampling::RateHz(1000.0),
     };
     for (input, output, words) in [

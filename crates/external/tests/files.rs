@@ -53,6 +53,7 @@ fn columns(time: &str, unit: Option<TimeUnit>) -> Columns {
     Columns {
         input: "u".into(),
         output: "y".into(),
+        reference: None,
         sampling: Sampling::TimeColumn {
             name: time.into(),
             unit,
@@ -69,6 +70,39 @@ fn refusal(bytes: impl AsRef<[u8]>, columns: &Columns) -> String {
     let file = File::new(bytes);
     let error = read(&file.path, columns).expect_err("a refusal");
     error.to_string()
+}
+
+#[test]
+fn reference_is_read_and_resampled_with_the_signals() {
+    // Irregular times: 0.3 of a period to either side.
+    let time = |k: usize| (k as f64 + 0.3 * (k as f64).sin()) / RATE_HZ;
+    let row = |k: usize| {
+        let [u, y] = signals(time(k));
+        format!("{},{u:e},{:e},{y:e}\n", time(k), 2.0 * u)
+    };
+    let rows: String = (0..SAMPLES).map(row).collect();
+    let text = format!("t,u,r,y\n{rows}");
+    let with_reference = |name: &str| Columns {
+        reference: Some(name.into()),
+        ..columns("t", None)
+    };
+    let file = File::new(&text);
+    let found = read(&file.path, &with_reference("r")).expect("a record");
+    assert!(matches!(found.times, TimeBase::Resampled { .. }));
+    let reference = found.reference.expect("a reference");
+    assert_eq!(reference.len(), SAMPLES);
+    for (r, u) in reference.iter().zip(&found.signals.input) {
+        assert!((r - 2.0 * u).abs() < 1e-12, "{r} {u}");
+    }
+    assert_eq!(record(&text, "t").reference, None);
+    for (name, words) in [
+        ("u", "`u` is selected twice"),
+        ("t", "`t` is selected twice"),
+        ("ref", "no column `ref`; choose one of t, u, r, y"),
+    ] {
+        let why = refusal(&text, &with_reference(name));
+        assert!(why.contains(words), "{why}");
+    }
 }
 
 #[test]
@@ -201,6 +235,7 @@ fn names_may_have_separators_and_columns_no_names() {
     let by_number = Columns {
         input: "2".into(),
         output: "3".into(),
+        reference: None,
         sampling: Sampling::TimeColumn {
             name: "1".into(),
             unit: None,

@@ -80,6 +80,10 @@ pub struct ExternalOptions {
     /// Output column: the displacement, its velocity or acceleration (--output-kind), or a signal proportional to it, in any unit
     #[arg(long, value_name = "COLUMN", requires = "input")]
     pub output: Option<String>,
+    /// Reference column of a record that was taken in closed loop: the set-point, or the excitation that was added in the loop, in any
+    /// unit; not the control error. The input is then the whole signal that acts on the stage [default: none, open loop]
+    #[arg(long, value_name = "COLUMN", requires = "input")]
+    pub reference: Option<String>,
     /// What the output measures: `position`, `velocity` as of a laser vibrometer, or `acceleration`. The modes are those of the position
     /// [default: position, and no verdict if the output looks like another kind]
     #[arg(long, value_name = "KIND", requires = "data", value_enum)]
@@ -156,8 +160,19 @@ impl ExternalOptions {
         Ok(Columns {
             input,
             output,
+            reference: self.reference()?,
             sampling: self.sampling(path)?,
         })
+    }
+
+    /// The column of the reference, which averages over periods do not need.
+    fn reference(&self) -> Result<Option<String>, ExperimentError> {
+        if self.reference.is_some() && self.period.is_some() {
+            return Err(ExperimentError::Refused(
+                "--reference is not used with --period, because noise that a controller feeds back averages out of input and output; leave out --reference".into(),
+            ));
+        }
+        Ok(self.reference.clone())
     }
 
     fn sampling(&self, path: &Path) -> Result<Sampling, ColumnsError> {

@@ -18,7 +18,7 @@ pub struct ResponseOptions {
         long,
         value_name = "FILE",
         group = "data",
-        conflicts_with_all = ["recording", "input", "output", "time", "time_unit", "period", "skip_periods"]
+        conflicts_with_all = ["recording", "input", "output", "reference", "time", "time_unit", "period", "skip_periods"]
     )]
     #[serde(serialize_with = "optional_path_text")]
     pub frf: Option<PathBuf>,

@@ -35,7 +35,8 @@ fn orders() -> Vec<Value> {
         json!({ "command": "identify", "recording": "-a.csv", "input": "force N", "output": "y", "time": "t",
             "output_kind": "velocity", "period": "2500", "skip_periods": 1, "hold": "zoh", "input_lag": "0.16ms",
             "band": "11Hz:250Hz" }),
-        json!({ "command": "identify", "recording": "a.csv", "input": "u", "output": "y", "rate": "1000" }),
+        json!({ "command": "identify", "recording": "a.csv", "input": "u", "output": "y", "reference": "r",
+            "rate": "1000" }),
         json!({ "command": "identify", "frf": "a.frd", "frf_phase": "deg", "hold": "zoh", "rate": "5kHz",
             "input_lag": "0.16ms", "band": "11:250" }),
     ]
@@ -98,6 +99,14 @@ fn options_that_exclude_each_other_are_refused_as_on_the_command_line() {
         (
             json!({ "command": "identify", "frf": "a.csv", "time": "t" }),
             "--time",
+        ),
+        (
+            json!({ "command": "identify", "frf": "a.csv", "reference": "r" }),
+            "--reference",
+        ),
+        (
+            json!({ "command": "identify", "recording": "a.mcap", "reference": "r" }),
+            "--input",
         ),
         (
             json!({ "command": "identify", "recording": "a.csv", "band": "1:2" }),

@@ -19,6 +19,8 @@ pub struct ExternalRecord<'a> {
     pub input: &'a str,
     /// Column of the output.
     pub output: &'a str,
+    /// Column of the reference of a closed loop.
+    pub reference: Option<&'a str>,
     /// Samples per second.
     pub rate_hz: f64,
     /// Number of samples.
@@ -83,6 +85,10 @@ impl<'a> ExternalRecord<'a> {
         let pairs = named([
             ("Input", Some(self.input.to_string())),
             ("Output", Some(self.output.to_string())),
+            (
+                "Reference of the closed loop",
+                self.reference.map(String::from),
+            ),
             (
                 "Kind of the output",
                 Some(self.analysis.output_kind.name().to_string()),
