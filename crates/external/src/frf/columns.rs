@@ -184,7 +184,7 @@ impl Words {
         self.has(&NAMES) || is_per_second
     }
 
-    /// Whether the unit is another one than metres per ampere.
+    /// Whether words without a slash are those of another unit than metres per ampere.
     fn has_other_unit(&self) -> bool {
         const OTHERS: [&str; 30] = [
             "um", "µm", "μm", "micron", "microns", "mm", "nm", "inch", "mil", "mils", "n", "mn",
@@ -368,9 +368,7 @@ impl<'a> Named<'a> {
 
     fn check_unit(&self, column: &NamedColumn<'_>) -> Result<(), FrfTableError> {
         match self.rule {
-            UnitRule::MetresPerAmpere if column.words.has_other_unit() => {
-                Err(self.other_unit(column))
-            }
+            UnitRule::MetresPerAmpere if column.has_other_unit() => Err(self.other_unit(column)),
             UnitRule::Any if column.words.is_derivative() => Err(FrfTableError::Derivative {
                 path: self.table.path().to_owned(),
                 column: column.name.clone(),
@@ -383,5 +381,13 @@ impl<'a> Named<'a> {
 impl NamedColumn<'_> {
     fn stated_unit(&self) -> Option<ResponseUnit> {
         ResponseUnit::stated(self.name, self.unit)
+    }
+
+    /// Whether the unit is another one than metres per ampere.
+    fn has_other_unit(&self) -> bool {
+        let is_stated_as_other = self
+            .stated_unit()
+            .is_some_and(|unit| !unit.is_metres_per_ampere());
+        is_stated_as_other || self.words.has_other_unit()
     }
 }

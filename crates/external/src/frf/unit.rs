@@ -68,6 +68,19 @@ impl ResponseUnit {
         })
     }
 
+    /// Whether it is metres per ampere.
+    pub(super) fn is_metres_per_ampere(&self) -> bool {
+        const METRES: [&str; 5] = ["m", "metre", "metres", "meter", "meters"];
+        const AMPERES: [&str; 5] = ["a", "amp", "amps", "ampere", "amperes"];
+        let output = self.output.to_lowercase();
+        // `displacement_m` of `mag_displacement_m_per_a`.
+        let is_in_metres = output
+            .rsplit('_')
+            .next()
+            .is_some_and(|unit| METRES.contains(&unit));
+        is_in_metres && is_one_of(&self.input, &AMPERES)
+    }
+
     /// The unit of a residue, r in s^k r/(s^2 + 2 zeta w s + w^2): that of the response over s^2 for a position, over s for a velocity.
     pub fn of_residue(&self, kind: OutputKind) -> String {
         let ResponseUnit { output, input } = self;
@@ -83,6 +96,16 @@ impl fmt::Display for ResponseUnit {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "{}/{}", self.output, self.input)
     }
+}
+
+/// Whether the unit of an input is one of some words. The name of the quantity may stand beside it, and how its value is taken.
+fn is_one_of(text: &str, words: &[&str]) -> bool {
+    const BESIDE: [&str; 6] = ["current", "command", "rms", "peak", "pk", "pp"];
+    let text = text.to_lowercase();
+    let parts = text.split(|c: char| c.is_whitespace() || [',', '_'].contains(&c));
+    let mut unit = parts.filter(|part| !part.is_empty() && !BESIDE.contains(part));
+    let is_known = unit.next().is_some_and(|first| words.contains(&first));
+    is_known && unit.next().is_none()
 }
 
 /// What stands in the last pair of brackets.
@@ -140,6 +163,29 @@ mod tests {
             let found = ResponseUnit::stated(name, line);
             let found = found.map(|unit| unit.to_string());
             assert_eq!(found.as_deref(), unit, "{name} {line}");
+        }
+    }
+
+    #[test]
+    fn metres_per_ampere_are_no_other_ratio() {
+        for (name, line, is_one) in [
+            ("magnitude_m_per_a", "", true),
+            ("Magnitude (dB re 1 m/A)", "", true),
+            ("|G| [m/A, peak]", "", true),
+            ("mag_displacement_m_per_current_a", "", true),
+            ("magnitude", "m/A", true),
+            ("magnitude", "A/m", false),
+            ("magnitude", "g/A", false),
+            ("magnitude", "m/kN", false),
+            ("magnitude", "m/mA", false),
+            ("magnitude", "m/s/A", false),
+            ("magnitude", "m/(A s)", false),
+            ("magnitude", "m/V", false),
+            ("magnitude_mm_per_a", "", false),
+            ("magnitude (pm/A)", "", false),
+        ] {
+            let unit = ResponseUnit::stated(name, line).expect(name);
+            assert_eq!(unit.is_metres_per_ampere(), is_one, "{name} {line}");
         }
     }
 
