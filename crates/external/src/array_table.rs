@@ -7,7 +7,7 @@ use bench_base::input_file::MAX_RECORD_BYTES;
 
 use super::error::{ColumnsError, DataError, ExternalCsvError, Place};
 use super::stamp::Stamp;
-use super::times::{TimeUnit, Times};
+use super::times::{OtherUnit, TimeUnit, Times};
 
 /// Arrays with their file.
 pub(crate) struct ArrayTable<'a> {
@@ -81,7 +81,10 @@ impl<'a> ArrayTable<'a> {
         self.selected(&all)?;
         let numbers = self.numbers(names)?;
         let times = self.series(time)?;
-        let unit = unit.or_else(|| unit_of(times));
+        let unit = match unit {
+            Some(given) => Some(given),
+            None => unit_of(times).map_err(|other| other.in_file(self.path, time))?,
+        };
         let stamps = self.stamps(times)?;
         let places: Vec<Place> = (1..=stamps.len() as u64).map(Place::Sample).collect();
         let times = Times::new(&stamps, unit);
@@ -204,14 +207,16 @@ impl<'a> ArrayTable<'a> {
 }
 
 /// The unit of times, by the file or by the name. In `d.t` and `d:1` the `d` is a structure and a matrix, not a time in days.
-fn unit_of(series: &Series) -> Option<TimeUnit> {
-    let stated = series.unit.as_deref().and_then(TimeUnit::stated_in);
-    stated.or_else(|| {
-        let field = series.name.rsplit('.').next()?;
-        match field.split_once(':') {
-            None => TimeUnit::stated_in(field),
-            Some((matrix, _)) if TimeUnit::is_one(matrix) => None,
-            Some((matrix, _)) => TimeUnit::stated_in(matrix),
-        }
-    })
+fn unit_of(series: &Series) -> Result<Option<TimeUnit>, OtherUnit> {
+    let stated = TimeUnit::beside(series.unit.as_deref().unwrap_or_default())?;
+    Ok(stated.or_else(|| unit_of_name(&series.name)))
+}
+
+fn unit_of_name(name: &str) -> Option<TimeUnit> {
+    let field = name.rsplit('.').next()?;
+    match field.split_once(':') {
+        None => TimeUnit::stated_in(field),
+        Some((matrix, _)) if TimeUnit::is_one(matrix) => None,
+        Some((matrix, _)) => TimeUnit::stated_in(matrix),
+    }
 }

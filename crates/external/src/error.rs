@@ -184,6 +184,20 @@ pub enum DataError {
         /// Step in the unit of the file.
         step: f64,
     },
+    /// The file states a unit of the times that is none of time.
+    #[error(
+        "{path}: column `{column}` is in `{unit}` by the file, which is no unit of time; give the column of times with --time, \
+         --time-unit s, ms, us, ns, min, h or d if the unit is stated wrongly, or --rate HZ if the samples are equidistant in time",
+        path = .path.display()
+    )]
+    OtherTimeUnit {
+        /// The file.
+        path: PathBuf,
+        /// Name of the column of times.
+        column: String,
+        /// The unit of the file.
+        unit: String,
+    },
     /// The text is not a table.
     #[error(
         "{path}{}: {reason}; repair the file: a record is a table with one sample per line",

@@ -6,7 +6,7 @@ use super::cells::{Format, Separator};
 use super::error::{ColumnsError, DataError, ExternalCsvError, Place};
 use super::layout::{Layout, NoLayout, is_skipped};
 use super::stamp::Stamp;
-use super::times::{TimeUnit, Times};
+use super::times::{OtherUnit, TimeUnit, Times};
 
 /// A text with its layout.
 pub(crate) struct Table<'a> {
@@ -81,18 +81,26 @@ impl<'a> Table<'a> {
             places.push(Place::Line(last.line));
             Ok(())
         })?;
-        let unit = unit.or_else(|| self.unit_of(time));
+        let are_dates = stamps.first().is_some_and(Stamp::is_date);
+        let unit = match unit {
+            Some(given) => Some(given),
+            None if are_dates => None,
+            None => {
+                let stated = self.unit_of(time);
+                stated.map_err(|other| other.in_file(self.path, time))?
+            }
+        };
         let times = Times::new(&stamps, unit);
         let times = times.map_err(|defect| defect.in_file(self.path, time, &places));
         Ok((numbers, times?))
     }
 
     /// The unit of a column of times, by the line of units or by its name.
-    fn unit_of(&self, time: &str) -> Option<TimeUnit> {
-        let index = self.layout.names.iter().position(|name| name == time)?;
-        let stated = self.layout.units.get(index);
-        let stated = stated.and_then(|unit| TimeUnit::stated_in(unit));
-        stated.or_else(|| TimeUnit::stated_in(time).filter(|_| self.layout.has_names))
+    fn unit_of(&self, time: &str) -> Result<Option<TimeUnit>, OtherUnit> {
+        let index = self.layout.names.iter().position(|name| name == time);
+        let text = index.map_or("", |index| self.unit(index));
+        let by_name = TimeUnit::stated_in(time).filter(|_| self.layout.has_names);
+        Ok(TimeUnit::beside(text)?.or(by_name))
     }
 
     /// Calls a function with the cells of some columns of each line of samples.

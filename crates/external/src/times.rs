@@ -81,6 +81,17 @@ impl TimeUnit {
         words.rev().find_map(TimeUnit::of_word)
     }
 
+    /// The unit that a file states beside times. `none` and a text without letters state none.
+    ///
+    /// # Errors
+    /// The text of a unit that is none of time, as `rev`.
+    pub(crate) fn beside(text: &str) -> Result<Option<TimeUnit>, OtherUnit> {
+        match TimeUnit::stated_in(text) {
+            None if states_a_unit(text) => Err(OtherUnit(text.trim().into())),
+            unit => Ok(unit),
+        }
+    }
+
     /// Whether a text is a unit of time.
     pub(crate) fn is_one(text: &str) -> bool {
         TimeUnit::of_word(text).is_some()
@@ -96,6 +107,27 @@ impl TimeUnit {
             "h" | "hr" | "hrs" | "hour" | "hours" => Some(TimeUnit::H),
             "d" | "day" | "days" => Some(TimeUnit::D),
             _ => None,
+        }
+    }
+}
+
+/// Whether a text has letters, apart from those of `none`.
+fn states_a_unit(text: &str) -> bool {
+    let mut words = text.split(|c: char| !c.is_alphabetic());
+    words.any(|word| !word.is_empty() && !word.eq_ignore_ascii_case("none"))
+}
+
+/// A unit that is none of time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct OtherUnit(String);
+
+impl OtherUnit {
+    /// The error of a column of times that the file states in this unit.
+    pub fn in_file(self, path: &Path, column: &str) -> DataError {
+        DataError::OtherTimeUnit {
+            path: path.to_owned(),
+            column: column.into(),
+            unit: self.0,
         }
     }
 }
@@ -473,6 +505,21 @@ mod tests {
         );
         let times = times(&cells, Some(TimeUnit::S)).unwrap_or_else(|defect| panic!("{defect:?}"));
         assert_eq!(times.period_s, 2.0);
+    }
+
+    #[test]
+    fn unit_beside_times_is_none_or_one_of_time() {
+        for (text, unit) in [
+            ("[ms]", Some(TimeUnit::Ms)),
+            ("", None),
+            ("-", None),
+            ("[none]", None),
+        ] {
+            assert_eq!(TimeUnit::beside(text), Ok(unit), "{text}");
+        }
+        for text in ["rev", "[Hz]", "samples"] {
+            assert_eq!(TimeUnit::beside(text), Err(OtherUnit(text.into())));
+        }
     }
 
     #[test]

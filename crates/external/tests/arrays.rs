@@ -177,6 +177,27 @@ fn what_is_no_column_is_refused_with_what_it_is() {
 }
 
 #[test]
+fn axis_in_another_unit_is_no_time() {
+    let text = universal(3, " 4.0 5.0 6.0\n");
+    for (unit, is_refused) in [
+        ("rev", true),
+        ("Hz", true),
+        ("msec", false),
+        ("NONE", false),
+    ] {
+        let label = format!("NONE                 {unit}\n");
+        let file = File::new(text.replace("NONE                 NONE\n", &label));
+        let found = read(&file.path, &columns("u.time", None));
+        let why = found.err().map(|error| error.to_string());
+        assert_eq!(why.is_some(), is_refused, "{unit}: {why:?}");
+        let is_named = |why: String| why.contains(&format!("`u.time` is in `{unit}`"));
+        assert!(why.is_none_or(is_named), "{unit}");
+        let found = read(&file.path, &columns("u.time", Some(TimeUnit::S)));
+        assert!(found.is_ok(), "{unit}: the given unit decides");
+    }
+}
+
+#[test]
 fn name_of_a_matrix_or_a_structure_is_no_unit_of_time() {
     let row = |k: usize| {
         [k as f64 * 1e-3, (k % 7) as f64, (k % 11) as f64]
