@@ -2,7 +2,7 @@
 
 use super::analysis_error::AnalysisError;
 use super::closed_responses::estimate_loop;
-use super::missing_ticks::{self, MAX_RATIO_ON_LINES, MissingTicks, shortest_window};
+use super::missing_ticks::{MAX_RATIO_OF_LOOP, MAX_RATIO_ON_LINES, MissingTicks, shortest_window};
 use super::read_run::is_closed_loop;
 use super::response_estimate::ResponseEstimate;
 use super::run_signals::RunSignals;
@@ -53,20 +53,30 @@ impl<'a> ExcitedRun<'a> {
     /// How often the positions in missing ticks are to be predicted. The lines of a periodic excitation are estimated from its periods,
     /// which missing ticks lengthen.
     pub(super) fn predictions(&self) -> usize {
-        if self.missing.is_empty() || self.has_lines() {
+        if self.has_lines() {
             0
         } else {
-            missing_ticks::ROUNDS
+            self.missing.rounds()
         }
+    }
+
+    /// Fails if there are too many missing ticks for positions on straight lines.
+    pub(super) fn check_positions_on_lines(&self) -> Result<(), AnalysisError> {
+        self.missing.check_ratio(MAX_RATIO_ON_LINES)
     }
 
     /// The factor by which missing ticks increase the variances; fails if there are too many.
     pub(super) fn variance_factor(&self) -> Result<f64, AnalysisError> {
         if self.has_lines() {
-            self.missing.check_ratio(MAX_RATIO_ON_LINES)?;
+            self.check_positions_on_lines()?;
             return Ok(1.0);
         }
-        let duration_s = self.missing.ticks as f64 * self.config.servo.period_s();
+        if matches!(self.excitation, RunExcitation::Reference) {
+            self.missing.check_ratio(MAX_RATIO_OF_LOOP)?;
+        }
+        let record_s = self.missing.ticks as f64 * self.config.servo.period_s();
+        // Without the rest at both ends, and not more than was recorded.
+        let duration_s = record_s.min(self.config.chirp.duration_s);
         let window = shortest_window(self.config, self.band_hz, duration_s);
         self.missing.variance_factor(window)
     }

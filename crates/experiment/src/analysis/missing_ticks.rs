@@ -39,13 +39,21 @@ pub(super) const MAX_RATIO: f64 = 0.05;
 /// Largest ratio of missing ticks if positions stay on straight lines, which have an error of (w T)^2/2 of the amplitude, and of lost
 /// records.
 pub(super) const MAX_RATIO_ON_LINES: f64 = 1e-3;
+/// Largest ratio of missing ticks of a run in closed loop: in a missed tick the loop is open, so that its margins and sensitivities differ
+/// from those of the loop by about this ratio.
+pub(super) const MAX_RATIO_OF_LOOP: f64 = 0.01;
 /// Largest ratio of missing ticks in the shortest time that determines a mode: half of the data remain.
 const MAX_RATIO_OF_WINDOW: f64 = 0.5;
 /// Rounding of a product of a number of ticks and a ratio.
 const ROUNDING: f64 = 1e-6;
-/// Number of predictions. With single missed ticks the first one suffices. Straight lines through gaps of ten ticks are wrong by the whole
-/// amplitude, so that the first fits have too many modes: the third one still changes the result.
-pub(super) const ROUNDS: usize = 4;
+/// Number of predictions with at most a ratio of [`MAX_RATIO_ON_LINES`] of single missed ticks: straight lines through them are nearly
+/// right, and the first prediction removes their error.
+const ROUNDS_OF_FEW: usize = 1;
+/// Number of predictions with more single missed ticks.
+const ROUNDS_OF_SINGLE: usize = 2;
+/// Number of predictions with longer gaps. Straight lines through gaps of ten ticks are wrong by the whole amplitude, so that the first
+/// fits have too many modes: the third one still changes the result.
+const ROUNDS: usize = 4;
 /// A mode far above all frequencies of interest acts as a constant compliance.
 const FAR_RAD_S: f64 = 1e6;
 
@@ -75,6 +83,17 @@ impl MissingTicks {
     /// The ratio of missing ticks.
     fn ratio(&self) -> f64 {
         self.indices.len() as f64 / self.ticks.max(1) as f64
+    }
+
+    /// Number of predictions after which the positions no longer change.
+    pub(super) fn rounds(&self) -> usize {
+        let are_single = self.indices.windows(2).all(|pair| pair[0] + 1 < pair[1]);
+        match (self.is_empty(), are_single) {
+            (true, _) => 0,
+            (false, true) if self.ratio() <= MAX_RATIO_ON_LINES => ROUNDS_OF_FEW,
+            (false, true) => ROUNDS_OF_SINGLE,
+            (false, false) => ROUNDS,
+        }
     }
 
     /// Fails with more than a ratio of all ticks.
@@ -339,6 +358,14 @@ mod tests {
             let error = error_of_prediction(&missing, 1e-5);
             assert!(error < 1e-6, "{error}");
         }
+    }
+
+    #[test]
+    fn number_of_predictions_depends_on_the_longest_gap_and_the_ratio() {
+        assert_eq!(missing(|_| false).rounds(), 0);
+        assert_eq!(missing(|k| k == 7).rounds(), ROUNDS_OF_FEW);
+        assert_eq!(missing(|k| k % 97 == 50).rounds(), ROUNDS_OF_SINGLE);
+        assert_eq!(missing(|k| k == 7 || k == 8).rounds(), ROUNDS);
     }
 
     #[test]

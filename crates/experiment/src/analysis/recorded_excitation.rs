@@ -160,9 +160,13 @@ pub(crate) fn estimated(
     report(progress, AnalysisPhase::Response, 0.0)?;
     let run = ExcitedRun::new(recording, config, signals.missing())?;
     let variance_factor = run.variance_factor()?;
-    for round in 0..run.predictions() {
-        let frf = run.estimate(&signals)?.frf;
-        let Some(fit) = fit_for_prediction(&frf, config, round, progress)? else {
+    let rounds = run.predictions();
+    for round in 0..rounds {
+        let mut as_part = part_of_response(round, rounds, progress);
+        let Some(fit) = fit_for_prediction(&run, &signals, config, &mut as_part)? else {
+            if round == 0 {
+                run.check_positions_on_lines()?;
+            }
             break;
         };
         signals.predict_missing(&fit, &SignalPath::from(config));
@@ -172,18 +176,30 @@ pub(crate) fn estimated(
         .with_variance_factor(variance_factor))
 }
 
+/// Progress of a fit for one of several predictions, as part of that of the response.
+fn part_of_response(
+    round: usize,
+    rounds: usize,
+    progress: &mut AnalysisProgress<'_>,
+) -> impl FnMut(AnalysisPhase, f64) -> ControlFlow<()> {
+    move |_, fraction| {
+        let done = (round as f64 + fraction) / rounds as f64;
+        progress(AnalysisPhase::Response, done)
+    }
+}
+
 /// The modes by which missing ticks are predicted; `None` if none can be fitted.
 fn fit_for_prediction(
-    frf: &Frf,
+    run: &ExcitedRun<'_>,
+    signals: &RunSignals,
     config: &Config,
-    round: usize,
     progress: &mut AnalysisProgress<'_>,
 ) -> Result<Option<ModalFit>, AnalysisError> {
-    let mut as_part = |_: AnalysisPhase, fraction: f64| {
-        let done = (round as f64 + fraction) / missing_ticks::ROUNDS as f64;
-        progress(AnalysisPhase::Response, done)
+    // Positions on straight lines may spoil the margins of a loop.
+    let Ok(estimate) = run.estimate(signals) else {
+        return Ok(None);
     };
-    let fit = fit_modes(frf, &MeasurementChain::bench(config), &mut as_part)?;
+    let fit = fit_modes(&estimate.frf, &MeasurementChain::bench(config), progress)?;
     Ok(fit.ok())
 }
 
