@@ -27,6 +27,14 @@ pub enum Defect {
         /// Number of samples.
         samples: usize,
     },
+    /// The output keeps its value at the beginning or the end of the record, while the input changes: a command at rest, or a probe that
+    /// fails for good.
+    Constant {
+        /// Time of the first one.
+        time_s: f64,
+        /// Number of samples.
+        samples: usize,
+    },
     /// The probe is slower than the log: each of its values is repeated.
     Held {
         /// Samples for each value.
@@ -67,6 +75,10 @@ impl fmt::Display for Defect {
             Defect::Repeated { time_s, samples } => write!(
                 f,
                 "{samples} samples of the output from {time_s:.4} s on have the same value; check the probe and its connection, and repeat the record"
+            ),
+            Defect::Constant { time_s, samples } => write!(
+                f,
+                "{samples} samples of the output from {time_s:.4} s on have the same value, while the input changes; exchange --input and --output if the output is the command, or else check the probe and its connection"
             ),
             Defect::Held { samples, probe_hz } => write!(
                 f,

@@ -73,13 +73,21 @@ pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) ->
         })
         .max_by_key(|run| run.samples)?;
     let chance = longest.chance(output, quantisation);
-    (chance < CHANCE).then(|| Defect::Repeated {
-        time_s: longest.start as f64 / signals.rate_hz,
-        samples: longest.samples,
-    })
+    (chance < CHANCE).then(|| longest.defect(signals, quantisation.is_some()))
 }
 
 impl Run {
+    /// The run as a defect. A quantised output that came from fast motion is no command at rest.
+    fn defect(&self, signals: &Signals, is_quantised: bool) -> Defect {
+        let (time_s, samples) = (self.start as f64 / signals.rate_hz, self.samples);
+        let reaches_an_end = self.start == 0 || self.start + samples == signals.len();
+        if reaches_an_end && !is_quantised {
+            Defect::Constant { time_s, samples }
+        } else {
+            Defect::Repeated { time_s, samples }
+        }
+    }
+
     fn input_changes(&self, input: &[f64]) -> bool {
         let pairs = input[self.start..self.start + self.samples].windows(2);
         2 * pairs.filter(|pair| pair[0] != pair[1]).count() >= self.samples

@@ -34,6 +34,8 @@ const DEFECT_SIGMAS: f64 = 20.0;
 const NORMAL_MEDIAN: f64 = 0.6745;
 /// The input jumps if it changes by more than this multiple of its median change.
 const JUMP_RATIO: f64 = 30.0;
+/// An input that changes in less than one of so many samples is an impulse.
+const IMPULSE_RATIO: usize = 100;
 /// The square of a spike is at least this ratio of the energy of the noise.
 const MIN_ENERGY_RATIO: f64 = 0.02;
 /// A spike or a jump is larger than this number of steps of the output: rounding may add one half at each side of it.
@@ -243,12 +245,28 @@ fn jumps(samples: &[f64]) -> Vec<usize> {
         .windows(2)
         .map(|pair| (pair[1] - pair[0]).abs())
         .collect();
-    let limit = JUMP_RATIO * median(changes.clone());
+    let limit = JUMP_RATIO * median(while_active(&changes).to_vec());
     let jumps = changes
         .iter()
         .enumerate()
         .filter(|(_, change)| **change > limit);
     jumps.map(|(k, _)| k + 1).collect()
+}
+
+/// The changes from the first to the last one that is not 0: a record may rest for longer than it is excited. All of a record whose input
+/// is an impulse.
+fn while_active(changes: &[f64]) -> &[f64] {
+    let first = changes.iter().position(|change| *change > 0.0);
+    let last = changes.iter().rposition(|change| *change > 0.0);
+    let (Some(first), Some(last)) = (first, last) else {
+        return changes;
+    };
+    let active = &changes[first..=last];
+    if active.len() * IMPULSE_RATIO < changes.len() {
+        changes
+    } else {
+        active
+    }
 }
 
 /// Whether one of the jumps lies at most two orders of the prediction before a sample.

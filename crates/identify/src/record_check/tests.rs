@@ -67,6 +67,20 @@ fn spike_is_found_with_its_time_and_height() {
 }
 
 #[test]
+fn spike_is_found_in_a_record_that_rests_for_longer_than_it_is_excited() {
+    let mut signals = signals();
+    let at_rest = 0..25_000;
+    signals.input.extend(at_rest.clone().map(|_| 0.0));
+    // The noise of the rest before the excitation.
+    let noise: Vec<f64> = signals.output[..900].to_vec();
+    signals.output.extend(at_rest.map(|k| noise[k * 7 % 900]));
+    assert_eq!(found_in(&signals, false), []);
+    signals.output[12_000] += 3.0;
+    let found = found_in(&signals, false);
+    assert!(matches!(found[..], [Defect::Spike { .. }]), "{found:?}");
+}
+
+#[test]
 fn step_is_found_with_its_time_and_height() {
     let found = spoiled(|k, y| if k >= 15_000 { y - 0.5 } else { y });
     let [Defect::Step { time_s, height }] = found[..] else {
@@ -137,6 +151,21 @@ fn repeated_samples_are_found_with_their_number() {
 }
 
 /// The output rounded to steps of 1/40 of its largest amplitude, more than its noise.
+#[test]
+fn command_in_the_place_of_the_output_is_named() {
+    let mut signals = signals();
+    std::mem::swap(&mut signals.input, &mut signals.output);
+    let found = found_in(&signals, false);
+    let [Defect::Constant { time_s, samples }] = found[..] else {
+        panic!("{found:?}");
+    };
+    // The command ends after 1 + 20 s of 25 s.
+    assert!((time_s - 21.0).abs() < 0.01, "{time_s}");
+    assert!((3990..=4000).contains(&samples), "{samples}");
+    let text = found[0].to_string();
+    assert!(text.contains("exchange --input and --output"), "{text}");
+}
+
 fn rounded(signals: Signals) -> Signals {
     rounded_to(40.0, signals)
 }
