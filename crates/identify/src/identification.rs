@@ -9,7 +9,7 @@ use crate::external_signals::ExternalSignals;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::observation::{Observation, Source, describes};
+use crate::observation::{NOISE_CHI2, Observation, Source, describes};
 use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Periods, Repetition};
 use crate::plausibility::{hint, implausible, unless_undetermined};
@@ -20,8 +20,6 @@ use bench_plant::{OutputKind, PlantError};
 
 /// Error of a line by distortion, as a ratio of the response, if neighbouring lines do not show it.
 const RELATIVE_ERROR: f64 = 0.01;
-/// Largest reduced chi-square of a residual that is noise: the noise is estimated with an error of some per cent.
-const NOISE_CHI2: f64 = 1.5;
 /// A fit is far better if its chi-square is smaller by this factor.
 const FAR_BETTER: f64 = 10.0;
 

@@ -16,6 +16,8 @@ pub(super) struct Source {
     pub(super) input_path: InputPath,
 }
 
+/// Largest reduced chi-square of a residual that is noise: the noise is estimated with an error of some per cent.
+pub(super) const NOISE_CHI2: f64 = 1.5;
 /// Number of data of a part.
 const PART_DATA: usize = 400;
 /// Largest number of modes that are fitted to a part.

@@ -9,7 +9,7 @@ use bench_plant::OutputKind;
 use nalgebra::Complex;
 
 use crate::modal::{self, MeasurementChain, ModalFit};
-use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
+use crate::observation::{NOISE_CHI2, Observation, PART_MODES, Source, describes, fit_part, part};
 use crate::{Estimate, FrfDatum};
 
 /// A constant above this ratio of the response at the end of the band is nearly all of it.
@@ -18,6 +18,9 @@ const CONSTANT_RATIO: f64 = 0.7;
 const STATIC_RATIO: f64 = 0.05;
 /// ... unless it exceeds this multiple of its standard deviation.
 const STATIC_SIGMAS: f64 = 5.0;
+/// A kind of output describes the data better if its chi-square is smaller by this factor: that of a part of the data has some 700
+/// degrees of freedom and a standard deviation of 5 %, so that noise alone never reaches it.
+const CLEARLY_BETTER: f64 = 1.5;
 const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
@@ -38,10 +41,15 @@ pub(super) fn modes_of_other_kind(
 
 /// What describes the data in place of modes with the kind of output of the fit.
 pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
-    if seen.fit.as_ref().is_ok_and(describes) {
-        return None;
-    }
     let assumed = seen.chain.output();
+    if let Some(fit) = seen.fit.as_ref().ok().filter(|fit| describes(fit)) {
+        let is_clear = seen.stated.is_some() || fit.chi2_per_freedom <= NOISE_CHI2;
+        return if is_clear {
+            None
+        } else {
+            described_better(seen)
+        };
+    }
     let found = || Some(other_kind(&seen.source, &seen.frf.data, assumed)?.0);
     match seen.clear_kind.or_else(found) {
         Some(kind) => Some(give_kind(assumed, kind)),
@@ -52,6 +60,23 @@ pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
 fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {
     let (assumed, kind) = (assumed.name(), kind.name());
     format!("modes describe the output as {kind}, but not as {assumed}; give --output-kind {kind}")
+}
+
+/// The only other kind of output, of which as many modes describe the data to their noise, clearly better than those of the assumed kind.
+fn described_better(seen: &Observation<'_>) -> Option<String> {
+    let (data, assumed) = (&seen.frf.data, seen.chain.output());
+    let (kind, other) = other_kind(&seen.source, data, assumed)?;
+    let few = fit_part(&part(data), seen.chain).ok()?;
+    let ratio = few.chi2_per_freedom / other.chi2_per_freedom;
+    let is_better = ratio > CLEARLY_BETTER
+        && other.chi2_per_freedom <= NOISE_CHI2
+        && other.parameters.modes.len() <= few.parameters.modes.len();
+    let (assumed, kind) = (assumed.name(), kind.name());
+    is_better.then(|| {
+        format!(
+            "modes describe the output as {kind} with a {ratio:.1} times smaller chi-square than as {assumed}; give --output-kind {kind}, or --output-kind {assumed} if it is one"
+        )
+    })
 }
 
 /// The kind of an output that modes describe as the assumed kind only implausibly: the only other kind of which they describe it.

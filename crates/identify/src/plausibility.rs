@@ -30,35 +30,22 @@ const CLOSED_LOOP: &str =
 
 /// The reason, if the data cannot be those of input and output of a mechanical system.
 pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
-    let Observation { frf, fit, .. } = seen;
     let of = seen.remedies;
-    let reason = |(what, remedy): (String, &str)| format!("{what}; {remedy}");
-    let incoherent = || {
-        Some(reason((
-            incoherent(frf, fit, of.excitation)?,
-            of.incoherent,
-        )))
-    };
-    let growing = || {
-        Some(reason((
-            growing(frf, fit, seen.chain.output())?,
-            of.growing,
-        )))
-    };
-    let early = || {
-        Some(reason((
-            early(seen.source.rate_hz, fit.as_ref().ok()?)?,
-            of.early,
-        )))
-    };
-    incoherent()
+    with_remedy(incoherent(seen.frf, seen.fit, of.excitation), of.incoherent)
         .or_else(|| explained_otherwise(seen))
         .or_else(|| vanishes_at_rest(seen))
-        .or_else(|| {
-            let why = growing()?;
-            Some(better_kind(seen).unwrap_or(why))
-        })
-        .or_else(early)
+        .or_else(|| grows_with_frequency(seen))
+        .or_else(|| with_remedy(early(seen), of.early))
+}
+
+fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
+    what.map(|what| format!("{what}; {remedy}"))
+}
+
+/// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one.
+fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
+    let what = growing(seen.frf, seen.fit, seen.chain.output())?;
+    better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
 }
 
 /// Modes that describe the response may lie in less than half of the band.
@@ -117,9 +104,9 @@ fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
     (square > 0.0).then(|| product / square)
 }
 
-fn early(rate_hz: f64, fit: &ModalFit) -> Option<String> {
-    let delay = fit.delay_s();
-    let limit_s = (EARLY_SAMPLES / rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
+fn early(seen: &Observation<'_>) -> Option<String> {
+    let delay = seen.fit.as_ref().ok()?.delay_s();
+    let limit_s = (EARLY_SAMPLES / seen.source.rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
         format!(
             "the output precedes the input by {:.3} ms",

@@ -324,6 +324,45 @@ fn kind_that_is_not_stated_is_named_and_no_verdict_is_made() {
 }
 
 #[test]
+fn kind_that_is_not_stated_is_never_decided_wrongly_in_noise() {
+    for noise in [3e-3, 1e-2, 3e-2, 1e-1, 3e-1] {
+        for seed in 0..3 {
+            let mut random = Random(0x51_7CC1 * (seed + 1));
+            let stage = Stage::random(&mut random);
+            for kind in [OutputKind::Velocity, OutputKind::Acceleration] {
+                let force = Force::HeldReadBefore;
+                let signals = record(&stage.modes, kind, force, noise, &mut random);
+                let found = identified(None, force, &signals);
+                let case = format!("{} {noise} {seed}: {:?}", kind.name(), stage.modes);
+                assert!(!is_wrong(&found, &stage), "{case}: {}", found.verdict.why);
+            }
+        }
+    }
+}
+
+#[test]
+fn lag_that_is_far_shorter_than_the_hold_changes_nothing() {
+    let force = Force::HeldReadAfter;
+    for kind in OutputKind::ALL {
+        let (input, output) = record(&STAGE, kind, force, 1e-3, &mut Random(3));
+        let chain = Identification::new(RATE_HZ)
+            .band_hz(BAND_HZ.0, BAND_HZ.1)
+            .held_s(1.0 / RATE_HZ)
+            .output_kind(kind);
+        let without = chain.run(&input, &output).expect("an analysis");
+        for lag_s in [1e-15, 1e-9] {
+            let with = chain
+                .lag_s(lag_s)
+                .run(&input, &output)
+                .expect("an analysis");
+            assert_eq!(with.verdict.cnmp, Cnmp::Excluded, "{lag_s}");
+            let [with, without] = [&with, &without].map(|found| found.fit.as_ref().expect("modes"));
+            assert_eq!(with.modes(), without.modes(), "{} {lag_s}", kind.name());
+        }
+    }
+}
+
+#[test]
 fn swapped_columns_are_named_and_no_other_kind() {
     let stages: [&[Mode]; 2] = [&STAGE, &[(20.0, 0.01, 0.7), (33.0, 0.01, 0.4)]];
     for stage in stages {

@@ -42,6 +42,9 @@ const ALIAS_PHASE_RAD: f64 = 0.1;
 const ALIAS_PHASE_RATIO: f64 = 0.1;
 /// A hold that differs from a period by less than this ratio is one: the times of a file are rounded.
 const HOLD_ROUNDING: f64 = 1e-6;
+/// A lag below this ratio of the hold is none: it turns the response by 3e-4 rad at the Nyquist frequency, which the fitted delay
+/// removes, and changes its magnitude by 5e-8. The exact sampling of a much shorter lag is a difference of nearly equal numbers.
+const NEGLIGIBLE_LAG: f64 = 1e-4;
 /// Advance of a reading that is measured after the step of its sample, as a ratio of the period. It turns the response by 3e-6 rad at
 /// the Nyquist frequency, which the fitted delay removes.
 const ADVANCE_RATIO: f64 = 1e-6;
@@ -53,10 +56,11 @@ impl InputPath {
         if (held_periods - 1.0).abs() > HOLD_ROUNDING {
             return MeasurementChain::Input(*self, OutputKind::Position);
         }
+        let lag_s = if self.has_lag() { self.lag_s } else { 0.0 };
         MeasurementChain::Bench(SignalPath {
             period_s: self.hold_s,
             // Infinite without a lag.
-            amplifier_bandwidth_hz: 1.0 / (2.0 * std::f64::consts::PI * self.lag_s),
+            amplifier_bandwidth_hz: 1.0 / (2.0 * std::f64::consts::PI * lag_s),
             force_constant_n_per_a: 1.0,
             delays_s: vec![0.0],
             output: OutputKind::Position,
@@ -72,13 +76,18 @@ impl InputPath {
         let MeasurementChain::Bench(path) = self.chain(rate_hz).observing(output) else {
             return None;
         };
-        let steps = output == OutputKind::Acceleration && self.lag_s == 0.0;
+        let steps = output == OutputKind::Acceleration && !self.has_lag();
         steps.then(|| {
             MeasurementChain::Bench(SignalPath {
                 delays_s: vec![-ADVANCE_RATIO * path.period_s],
                 ..path
             })
         })
+    }
+
+    /// Whether the lag of a held input changes its samples.
+    fn has_lag(&self) -> bool {
+        self.lag_s > NEGLIGIBLE_LAG * self.hold_s
     }
 
     fn response(&self, s: Complex<f64>) -> Complex<f64> {

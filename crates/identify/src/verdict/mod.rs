@@ -172,7 +172,7 @@ fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
     let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
     (!good).then(|| {
         format!(
-            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes with real residues; lower the amplitude, so that the stage stays linear, or find in the Bode plot where response and fit differ and select a band without it"
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes with real residues; lower the amplitude if a record with half of it has other modes, and remove or state a filter or a lag in the channel; the damping may also be not proportional, or the stage may have changed during the record; the Bode plot shows where response and fit differ: leave that out of the band"
         )
     })
 }
