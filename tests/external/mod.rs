@@ -5,6 +5,7 @@ mod closed_loop;
 mod distortion;
 mod existing_results;
 mod forms;
+mod impaired_records;
 mod motor_bench;
 mod output_kinds;
 mod periodic;
