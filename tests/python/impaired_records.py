@@ -404,7 +404,8 @@ def closed_loop(rng):
     """Integral feedback with a bandwidth below the first mode; the sweep is added to the force. Noise of the probe runs through the loop."""
     b = Bench(rng)
     static = np.sum(b.modes[:, 2] / b.modes[:, 0] ** 2)
-    gain = np.sign(static) * 0.3 * np.min(b.modes[:, 0]) * 0.02 / abs(static) / b.rate
+    # The crossover is below the half-width of each mode, so that the loop is stable.
+    gain = np.sign(static) * 0.3 * np.min(b.modes[:, 0] * b.modes[:, 1]) / abs(static) / b.rate
     poles = [complex(-z * w, w * np.sqrt(1 - z * z)) for w, z, _ in b.modes]
     factor = np.exp(np.array(poles) / b.rate)
     drive = np.expm1(np.array(poles) / b.rate) / np.array(poles)
@@ -512,7 +513,9 @@ def integrated(b, force, substeps=8):
 def friction(rng):
     b = Bench(rng, seconds=10.0)
     size = rng.uniform(0.02, 0.3) * b.amplitude
-    scale = np.std(b.motion(derivatives=1)) * 0.05
+    # Not so steep that a step of the integration reverses the velocity.
+    steepest = size * np.sum(abs(b.modes[:, 2])) * 2 / (8 * b.rate)
+    scale = max(np.std(b.motion(derivatives=1)) * 0.05, steepest)
     y = integrated(b, lambda u, y, v: u - size * np.tanh(v / scale))
     return b.record(b.noisy(y), causes=["misfit", "nonlinear", "complex"], model_holds=False)
 

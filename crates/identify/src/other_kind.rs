@@ -21,11 +21,13 @@ const STATIC_SIGMAS: f64 = 5.0;
 /// A kind of output describes the data better if its chi-square is smaller by this factor: that of a part of the data has some 700
 /// degrees of freedom and a standard deviation of 5 %, so that noise alone never reaches it.
 const CLEARLY_BETTER: f64 = 1.5;
+/// Far better: the residual is smaller by a factor of ten.
+const FAR_BETTER: f64 = 100.0;
 const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
-/// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do.
-/// With these few modes of the assumed kind; many more would be fitted in vain.
+/// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do, or
+/// as many far better. With these few modes of the assumed kind; many more would be fitted in vain.
 pub(super) fn modes_of_other_kind(
     source: &Source,
     data: &[FrfDatum],
@@ -36,7 +38,9 @@ pub(super) fn modes_of_other_kind(
         return None;
     }
     let (kind, other) = other_kind(source, data, chain.output())?;
-    (2 * other.parameters.modes.len() <= PART_MODES).then_some((kind, few))
+    let is_clear = 2 * other.parameters.modes.len() <= PART_MODES
+        || few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
+    is_clear.then_some((kind, few))
 }
 
 /// What describes the data in place of modes with the kind of output of the fit.

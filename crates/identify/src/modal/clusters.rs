@@ -8,12 +8,15 @@ use core::ops::Range;
 use super::parameters::ModalParameters;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
+use crate::verdict::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
 
 /// Neighbouring modes belong to one cluster if their distance is below this multiple of the sum of their half-widths zeta w.
 const REACH: f64 = 4.0;
 /// The residues of a cluster cancel if the sum of their magnitudes exceeds the magnitude of their sum by this factor.
 const CANCELLATION: f64 = 3.0;
+/// Modes of a pair.
+const PAIR: usize = 2;
 /// Largest number of starts for each number of modes.
 const MAX_STARTS: usize = 12;
 /// Tolerance of the fit of each start, see [`refine`]: with a thousand data, a twentieth of the decrease that is significant.
@@ -35,8 +38,8 @@ pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -
 
 /// The clusters of modes, of rising frequency, whose residues cancel: their indices.
 pub(super) fn cancelling(modes: &[ModalTerm]) -> Vec<Range<usize>> {
-    let indices = |cluster: Cluster| cluster.first..cluster.first + cluster.count;
-    clusters(modes).into_iter().map(indices).collect()
+    let clusters = clusters(modes);
+    clusters.iter().map(Cluster::modes).collect()
 }
 
 /// Neighbours in a list of modes of rising frequency.
@@ -44,6 +47,13 @@ pub(super) fn cancelling(modes: &[ModalTerm]) -> Vec<Range<usize>> {
 struct Cluster {
     first: usize,
     count: usize,
+}
+
+impl Cluster {
+    /// The indices of its modes.
+    fn modes(&self) -> Range<usize> {
+        self.first..self.first + self.count
+    }
 }
 
 /// The clusters whose residues cancel.
@@ -75,14 +85,32 @@ fn cancels(modes: &[ModalTerm]) -> bool {
     modes.len() > 1 && magnitudes > CANCELLATION * sum.abs()
 }
 
-/// The solution with the fewest modes in place of a cluster, if chi^2 does not increase significantly.
+/// The solution with the fewest modes in place of a cluster, if chi^2 does not increase significantly. In place of a cluster of modes that
+/// do not describe the data only one or two are tried.
 fn with_fewer(problem: Problem<'_>, solution: &Solution, cluster: Cluster) -> Option<Solution> {
+    let describes = problem.misfit(solution.chi2) <= MAX_CHI2_PER_FREEDOM;
+    let with = |count: usize| with_count(problem, solution, cluster, count);
+    let one_or_two = (1..cluster.count.min(PAIR + 1)).find_map(with);
+    if one_or_two.is_some() || !describes || cluster.count <= PAIR + 1 {
+        return one_or_two;
+    }
+    // What all modes but one do not describe, fewer do not either.
+    let all_but_one = with(cluster.count - 1)?;
+    let fewest = (PAIR + 1..cluster.count - 1).find_map(with);
+    fewest.or(Some(all_but_one))
+}
+
+/// The solution with a number of modes in place of a cluster, if chi^2 does not increase significantly.
+fn with_count(
+    problem: Problem<'_>,
+    solution: &Solution,
+    cluster: Cluster,
+    count: usize,
+) -> Option<Solution> {
     let limit_per_mode = problem.significant_decrease() * problem.misfit(solution.chi2);
-    (1..cluster.count).find_map(|count| {
-        let best = best_of(problem, solution, cluster, count)?;
-        let removed = (cluster.count - count) as f64;
-        (best.chi2 - solution.chi2 <= removed * limit_per_mode).then_some(best)
-    })
+    let best = best_of(problem, solution, cluster, count)?;
+    let removed = (cluster.count - count) as f64;
+    (best.chi2 - solution.chi2 <= removed * limit_per_mode).then_some(best)
 }
 
 /// The best solution with `count` modes in place of a cluster, from starts at the frequencies of its modes; `None` if its coarse fit
@@ -93,8 +121,15 @@ fn best_of(
     cluster: Cluster,
     count: usize,
 ) -> Option<Solution> {
-    let starts = subsets(cluster.count, count).take(MAX_STARTS);
-    let starts = starts.map(|kept| only(&solution.parameters, cluster, kept));
+    let parameters = &solution.parameters;
+    let subsets = subsets(cluster.count, count).take(MAX_STARTS);
+    let subsets = subsets.map(|kept| only(parameters, cluster, kept));
+    let pairs = if count == 2 {
+        parameters.with_pair_in_place(cluster.modes())
+    } else {
+        Vec::new()
+    };
+    let starts = pairs.into_iter().chain(subsets);
     let coarse = starts.map(|start| refine(problem, start, TOLERANCE));
     let best = coarse.min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let is_promising = problem.misfit(best.chi2) < PROMISING * problem.misfit(solution.chi2);

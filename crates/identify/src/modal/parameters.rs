@@ -1,5 +1,7 @@
 //! The parameters of a sum of modes.
 
+use core::ops::Range;
+
 use nalgebra::DVector;
 
 use bench_plant::zeros::ModalTerm;
@@ -13,6 +15,48 @@ const DAMPING_RATIO: (f64, f64) = (1e-6, 2.0);
 
 /// A mode is split for a residual at most this many half-widths away: beyond, a mode there is another one.
 const SPLIT_REACH: f64 = 3.0;
+/// One of two modes in place of one.
+struct Part {
+    /// Its distance from that one in half-widths.
+    side: f64,
+    /// Its damping as a multiple.
+    damping: f64,
+}
+
+/// Two peaks side by side; a narrow mode within a broad one, below and above its middle. Closer than their widths, the best two modes
+/// depend on the start.
+const SPLITS: [[Part; 2]; 3] = [
+    [
+        Part {
+            side: -1.0,
+            damping: 0.5,
+        },
+        Part {
+            side: 1.0,
+            damping: 0.5,
+        },
+    ],
+    [
+        Part {
+            side: -0.3,
+            damping: 0.3,
+        },
+        Part {
+            side: 0.3,
+            damping: 1.0,
+        },
+    ],
+    [
+        Part {
+            side: -0.3,
+            damping: 1.0,
+        },
+        Part {
+            side: 0.3,
+            damping: 0.3,
+        },
+    ],
+];
 /// Only a mode with a peak is split.
 const MAX_SPLIT_DAMPING: f64 = 0.2;
 
@@ -72,9 +116,35 @@ impl ModalParameters {
         self
     }
 
-    /// The parameters with the nearest mode within [`SPLIT_REACH`] half-widths of a frequency replaced by two: one half-width to either side of it,
-    /// with half of its damping. `None` if there is no such mode.
-    pub(super) fn with_split_mode(&self, omega_rad_s: f64) -> Option<ModalParameters> {
+    /// The parameters with the nearest mode within [`SPLIT_REACH`] half-widths of a frequency replaced by two, in each way of [`SPLITS`];
+    /// none if there is no such mode.
+    pub(super) fn with_split_mode(&self, omega_rad_s: f64) -> Vec<ModalParameters> {
+        let Some(index) = self.mode_at(omega_rad_s) else {
+            return Vec::new();
+        };
+        let splits = SPLITS.iter().map(|split| self.split(index, split));
+        splits.collect()
+    }
+
+    /// The parameters with neighbouring modes replaced by two, in each way of [`SPLITS`] of one mode in their place.
+    pub(super) fn with_pair_in_place(&self, modes: Range<usize>) -> Vec<ModalParameters> {
+        let replaced = &self.modes[modes.clone()];
+        let sum = |of: fn(&ModalTerm) -> f64| replaced.iter().map(of).sum::<f64>();
+        let size = sum(|mode| mode.residue_per_kg.abs());
+        let one = ModalTerm {
+            omega_rad_s: sum(|mode| mode.residue_per_kg.abs() * mode.omega_rad_s) / size,
+            damping_ratio: sum(|mode| mode.residue_per_kg.abs() * mode.damping_ratio) / size,
+            residue_per_kg: sum(|mode| mode.residue_per_kg),
+        };
+        let mut merged = self.clone();
+        let index = modes.start;
+        merged.modes.splice(modes, [one]);
+        let splits = SPLITS.iter().map(|split| merged.split(index, split));
+        splits.collect()
+    }
+
+    /// The mode with a peak that is nearest to a frequency, within [`SPLIT_REACH`] half-widths.
+    fn mode_at(&self, omega_rad_s: f64) -> Option<usize> {
         let distance = |mode: &ModalTerm| {
             let half_width_rad_s = mode.damping_ratio * mode.omega_rad_s;
             (mode.omega_rad_s - omega_rad_s).abs() / half_width_rad_s
@@ -84,17 +154,21 @@ impl ModalParameters {
         };
         let modes = self.modes.iter().enumerate();
         let close = modes.filter(|(_, mode)| near(mode));
-        let (index, _) = close.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
+        let nearest = close.min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
+        Some(nearest.0)
+    }
+
+    fn split(&self, index: usize, split: &[Part; 2]) -> ModalParameters {
         let mut next = self.clone();
         let one = next.modes[index];
-        let half = |side: f64| ModalTerm {
-            omega_rad_s: one.omega_rad_s * (1.0 + side * one.damping_ratio),
-            damping_ratio: 0.5 * one.damping_ratio,
+        let [low, high] = split.each_ref().map(|part| ModalTerm {
+            omega_rad_s: one.omega_rad_s * (1.0 + part.side * one.damping_ratio),
+            damping_ratio: part.damping * one.damping_ratio,
             residue_per_kg: 0.5 * one.residue_per_kg,
-        };
-        next.modes[index] = half(-1.0);
-        next.modes.push(half(1.0));
-        Some(next)
+        });
+        next.modes[index] = low;
+        next.modes.push(high);
+        next
     }
 
     /// The free parameters, in the order of a covariance.

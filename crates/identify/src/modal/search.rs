@@ -9,6 +9,7 @@ use core::ops::ControlFlow;
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
+use super::clusters::cancelling;
 use super::error::{FitError, Progress, report};
 use super::merge::merged;
 use super::parameters::ModalParameters;
@@ -16,6 +17,7 @@ use super::peaks::peak_starts;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
 use crate::FrfDatum;
+use crate::verdict::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
 
 /// Largest number of modes.
@@ -183,6 +185,7 @@ impl Search<'_, '_> {
             let problem = Problem { chain, data, nodes };
             let start = std::mem::take(&mut self.parameters);
             let solution = refine(problem, start, pass.tolerance);
+            let solution = with_other_pairs(problem, solution, pass.tolerance);
             match first_misfit {
                 None if solution.parameters.modes.is_empty() => {}
                 None => self.orders.push(order(problem, &solution, f64::INFINITY)),
@@ -302,7 +305,7 @@ fn with_another_mode(
         .find(significant)
 }
 
-/// The better solution of two: with a mode added, and, if a mode lies there already, with that one split.
+/// The best solution of those with a mode added, and, if a mode lies there already, with that one split.
 fn best_with(
     problem: Problem<'_>,
     parameters: &ModalParameters,
@@ -310,10 +313,23 @@ fn best_with(
     tolerance: f64,
 ) -> Solution {
     let added = refine(problem, parameters.clone().with_mode(mode), tolerance);
-    match parameters.with_split_mode(mode.omega_rad_s) {
-        Some(start) => better(added, refine(problem, start, tolerance)),
-        None => added,
+    let starts = parameters.with_split_mode(mode.omega_rad_s).into_iter();
+    let split = starts.map(|start| refine(problem, start, tolerance));
+    split.fold(added, better)
+}
+
+/// The solution with other pairs in place of those whose residues cancel, if it is better. Two close modes that a coarse pass did not need
+/// apart are at the limit of a double pole, from which steps do not lead back.
+fn with_other_pairs(problem: Problem<'_>, solution: Solution, tolerance: f64) -> Solution {
+    if problem.misfit(solution.chi2) <= MAX_CHI2_PER_FREEDOM {
+        return solution;
     }
+    let parameters = solution.parameters.clone().by_rising_frequency();
+    let pairs = cancelling(&parameters.modes).into_iter();
+    let pairs = pairs.filter(|modes| modes.len() == 2);
+    let starts = pairs.flat_map(|pair| parameters.with_pair_in_place(pair));
+    let other = starts.map(|start| refine(problem, start, tolerance));
+    other.fold(solution, better)
 }
 
 fn better(a: Solution, b: Solution) -> Solution {
