@@ -19,6 +19,7 @@ fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
         orders: Vec::new(),
         chi2_per_freedom: 1.0,
         band_hz: (1.0, 500.0),
+        left_out_hz: Vec::new(),
     }
 }
 

@@ -104,6 +104,9 @@ class Bench:
             total += 2 * np.real(r / (2j * damped) * pole**derivatives * state(pole, u, 1 / self.rate))
         return total
 
+    def at_motor(self, derivatives=0):
+        return self.motion(derivatives=derivatives, modes=self.modes * [1, 1, 0] + [0, 0, 1])
+
     def noisy(self, y):
         return y + self.noise * np.std(y) * self.rng.standard_normal(len(y))
 
@@ -405,7 +408,8 @@ def closed_loop(rng):
     b = Bench(rng)
     static = np.sum(b.modes[:, 2] / b.modes[:, 0] ** 2)
     # The crossover is below the half-width of each mode, so that the loop is stable.
-    gain = np.sign(static) * 0.3 * np.min(b.modes[:, 0] * b.modes[:, 1]) / abs(static) / b.rate
+    parts = np.sum(abs(b.modes[:, 2]) / b.modes[:, 0] ** 2)
+    gain = np.sign(static) * 0.3 * np.min(b.modes[:, 0] * b.modes[:, 1]) / parts / b.rate
     poles = [complex(-z * w, w * np.sqrt(1 - z * z)) for w, z, _ in b.modes]
     factor = np.exp(np.array(poles) / b.rate)
     drive = np.expm1(np.array(poles) / b.rate) / np.array(poles)
@@ -495,7 +499,9 @@ def damper(rng):
 
 
 def integrated(b, force, substeps=8):
-    """The position of the modes with a force by the state, as `force(u, y, v)`: a leapfrog of small steps."""
+    """The position of the modes with a force at the motor, as `force(u, y, v)` of its position and velocity: a leapfrog of small steps.
+
+    Shapes are 1 at the motor and r at the probe."""
     w, zeta, r = b.modes.T
     step = 1 / (b.rate * substeps)
     q, v, y = np.zeros(len(w)), np.zeros(len(w)), np.zeros(len(b.u))
@@ -504,7 +510,7 @@ def integrated(b, force, substeps=8):
     for k, u in enumerate(b.u):
         y[k] = q @ shape
         for _ in range(substeps):
-            v = decay * v + step * (force(u, q @ shape, v @ shape) - w * w * q)
+            v = decay * v + step * (force(u, np.sum(q), np.sum(v)) - w * w * q)
             q = q + step * v
     return y
 
@@ -514,8 +520,8 @@ def friction(rng):
     b = Bench(rng, seconds=10.0)
     size = rng.uniform(0.02, 0.3) * b.amplitude
     # Not so steep that a step of the integration reverses the velocity.
-    steepest = size * np.sum(abs(b.modes[:, 2])) * 2 / (8 * b.rate)
-    scale = max(np.std(b.motion(derivatives=1)) * 0.05, steepest)
+    steepest = size * len(b.modes) * 2 / (8 * b.rate)
+    scale = max(np.std(b.at_motor(derivatives=1)) * 0.05, steepest)
     y = integrated(b, lambda u, y, v: u - size * np.tanh(v / scale))
     return b.record(b.noisy(y), causes=["misfit", "nonlinear", "complex"], model_holds=False)
 
@@ -523,8 +529,7 @@ def friction(rng):
 @kind("stiffness that depends on amplitude")
 def duffing(rng):
     b = Bench(rng, seconds=10.0)
-    y = b.motion()
-    stiff = rng.uniform(0.05, 0.5) * b.amplitude / np.max(abs(y)) ** 3
+    stiff = rng.uniform(0.05, 0.5) * b.amplitude / np.max(abs(b.at_motor())) ** 3
     return b.record(b.noisy(integrated(b, lambda u, y, v: u - stiff * y**3)), causes=["misfit", "nonlinear", "complex"], model_holds=False)
 
 

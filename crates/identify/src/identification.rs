@@ -9,9 +9,10 @@ use crate::external_signals::ExternalSignals;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::multisine_lines::useful_band::useful_limit_hz;
 use crate::observation::{NOISE_CHI2, Observation, Source, describes};
 use crate::other_kind::modes_of_other_kind;
-use crate::periodic::{self, Periods, Repetition};
+use crate::periodic::{self, Repetition};
 use crate::plausibility::{hint, implausible, unless_undetermined};
 use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
@@ -434,11 +435,15 @@ fn number_of_modes(analysis: &ExternalAnalysis) -> usize {
     }
 }
 
-/// The band that is excited. Of a periodic record the excited lines are found one by one, so that all frequencies are used.
+/// The band that is excited. Of a periodic record the excited lines are found one by one, so that all frequencies are used; of a held
+/// sequence such as a PRBS those up to half of its power.
 fn default_band_hz(record: ExternalSignals<'_>, repetition: Option<Repetition>) -> (f64, f64) {
     let all = (0.0, record.signals.rate_hz / 2.0);
     match repetition {
-        Some(_) => all,
+        Some(repetition) => {
+            let limit_hz = useful_limit_hz(record.signals, repetition);
+            (all.0, limit_hz.unwrap_or(all.1))
+        }
         None => record.excited_band_hz().unwrap_or(all),
     }
 }
@@ -450,7 +455,9 @@ fn response(
 ) -> Result<(Frf, Option<PeriodicPart>), IdentificationError> {
     if let Some(repetition) = repetition {
         let signals = record.signals;
-        let Periods { frf, count, .. } = periodic::estimate(signals, band_hz, repetition)?;
+        let periods = periodic::estimate(signals, band_hz, repetition)?;
+        let count = periods.count;
+        let frf = periods.pooled();
         let lines = harmonics(signals, band_hz, repetition, InputSignal::Measured)?;
         let linearity = lines.map(Linearity::new);
         let part = PeriodicPart {
@@ -517,8 +524,9 @@ fn with_relative_error(data: &[FrfDatum]) -> Vec<FrfDatum> {
     increased.collect()
 }
 
-/// Reduced chi-square with the noise alone.
+/// Reduced chi-square of the fitted data with the noise alone.
 fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
+    let data = fit.used_data(data);
     let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
     let fitted = fit.response(chain, &frequency_hz);
     let squares = data

@@ -79,7 +79,7 @@ pub use identify_response::{ResponseAnalysis, ResponseError, ResponseIdentificat
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
-pub use noise_parts::{NoiseParts, PowerDatum};
+pub(crate) use noise_parts::{NoiseParts, PowerDatum};
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};

@@ -10,11 +10,8 @@
 use bench_excitation::{Pattern, Window};
 use bench_identify::harmonics::{InputSignal, harmonics};
 use bench_identify::linearity::Linearity;
-use bench_identify::periodic::{self, Periods, Repetition};
-use bench_identify::{Frf, FrfDatum, IdentifyError, NoiseParts, PowerDatum, Signals, repeated};
-
-/// Number of lines on either side from which the noise is estimated for a fit.
-const NEIGHBOURS: usize = 4;
+use bench_identify::periodic::{self, Periods, Repetition, with_pooled_noise};
+use bench_identify::{Frf, IdentifyError, Signals, repeated};
 
 /// A record to be estimated as a whole, or the estimate from the lines of a run.
 pub(super) enum Segments {
@@ -57,45 +54,20 @@ fn periodic_lines(
     band_hz: (f64, f64),
     repetition: Repetition,
 ) -> Result<Segments, IdentifyError> {
-    let Periods {
-        frf, input_powers, ..
-    } = periodic::estimate(signals, band_hz, repetition)?;
+    let periods = periodic::estimate(signals, band_hz, repetition)?;
     let Some(lines) = harmonics(signals, band_hz, repetition, InputSignal::Commanded)? else {
-        let data = with_mean_variance(&frf.data, &input_powers);
-        return Ok(Segments::Lines(Frf { data, ..frf }, None));
+        return Ok(Segments::Lines(periods.pooled(), None));
     };
     let linearity = Linearity::new(lines);
+    let Periods {
+        frf,
+        input_powers,
+        count,
+    } = periods;
     let distorted = linearity.with_odd_distortion(&frf.data);
-    let data = with_mean_variance(&distorted, &input_powers);
+    let data = with_pooled_noise(&distorted, &input_powers, count);
     let frf = Frf { data, ..frf };
     Ok(Segments::Lines(frf, Some(Box::new(linearity))))
-}
-
-/// The data with the variances that those of neighbouring lines give. The scatter of a few periods alone is occasionally far too
-/// small, and a fit would then take such a line for a mode. `input_powers` are |U|^2 of the lines.
-pub(super) fn with_mean_variance(data: &[FrfDatum], input_powers: &[f64]) -> Vec<FrfDatum> {
-    let lines = data.iter().zip(input_powers);
-    let powers: Vec<PowerDatum> = lines.map(power_of).collect();
-    let with_mean = data.iter().enumerate().map(|(k, datum)| {
-        let near = k.saturating_sub(NEIGHBOURS)..(k + NEIGHBOURS + 1).min(data.len());
-        let PowerDatum {
-            of_probe, of_plant, ..
-        } = powers[k];
-        FrfDatum {
-            variance: NoiseParts::of(&powers[near]).power(of_probe, of_plant),
-            ..*datum
-        }
-    });
-    with_mean.collect()
-}
-
-/// The variance of a line: of noise that is white, or passes through the plant, over the power of the input.
-fn power_of((datum, input_power): (&FrfDatum, &f64)) -> PowerDatum {
-    PowerDatum {
-        power: datum.variance,
-        of_probe: 1.0 / input_power,
-        of_plant: datum.response.norm_sqr() / input_power,
-    }
 }
 
 /// Up to `length` samples of a signal from `start` on.
@@ -115,11 +87,13 @@ fn estimate_stepped_sine(
     (low_hz, high_hz): (f64, f64),
 ) -> Result<Segments, IdentifyError> {
     let (mut frf, mut input_powers) = (Frf::default(), Vec::new());
+    let mut fewest = usize::MAX;
     for (hz, window) in rising_windows(signals, windows) {
         match sine(signals, window, hz) {
             Ok(periods) => {
                 frf.append(periods.frf);
                 input_powers.extend(periods.input_powers);
+                fewest = fewest.min(periods.count);
             }
             // The other sines are still usable.
             Err(IdentifyError::NotExcited { .. }) => {}
@@ -129,7 +103,7 @@ fn estimate_stepped_sine(
     if frf.data.is_empty() {
         Err(IdentifyError::NotExcited { low_hz, high_hz })
     } else {
-        let data = with_mean_variance(&frf.data, &input_powers);
+        let data = with_pooled_noise(&frf.data, &input_powers, fewest);
         Ok(Segments::Lines(Frf { data, ..frf }, None))
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! FRF data --search--> orders 1, 2, ... --prune--> needed modes --residual as noise--> refine --> modes, R, tau, covariance
+//!     ^--- without a datum that alone shows a mode
 //! ```
 //!
 //! The model is that of the plant, G(s) = R + sum of r_k/(s^2 + 2 zeta_k w_k s + w_k^2) (Eq. 3-2) with real residues, observed
@@ -14,6 +15,7 @@
 mod candidates;
 mod clusters;
 mod error;
+mod lone_lines;
 mod measurement_chain;
 mod merge;
 mod modal_fit;
@@ -31,6 +33,7 @@ use core::ops::ControlFlow;
 
 use error::report;
 pub use error::{FitError, Progress};
+use lone_lines::{UsedData, lone_data};
 pub use measurement_chain::{InputPath, MeasurementChain};
 pub use modal_fit::{FittedMode, ModalFit, ModeGroup, UncertainPole};
 pub use parameters::{ModalParameters, Parameter};
@@ -100,20 +103,43 @@ fn fit_up_to(
     let [first, .., last] = data else {
         return Err(too_few(data));
     };
-    let (low_hz, high_hz) = (first.frequency_hz, last.frequency_hz);
-    let nodes = &chain.nodes(data, 0.0);
-    let problem = Problem { chain, data, nodes };
-    let orders = search::orders(problem, max_modes, &mut |done| {
-        progress(SEARCH_PROGRESS * done)
-    })?;
-    let best = orders.last().ok_or(FitError::NoMode { low_hz, high_hz })?;
-    report(progress, SEARCH_PROGRESS)?;
-    let fit = ModalFit {
-        band_hz: (low_hz, high_hz),
-        ..final_fit(problem, best.parameters.clone())?
-    };
-    report(progress, 1.0)?;
-    Ok(ModalFit { orders, ..fit })
+    let band_hz = (first.frequency_hz, last.frequency_hz);
+    let mut used = UsedData::all(data);
+    let mut searched = 0.0_f64;
+    loop {
+        let data = &used.data;
+        let nodes = &chain.nodes(data, 0.0);
+        let problem = Problem { chain, data, nodes };
+        // A search that is repeated makes no progress until it is farther than the one before.
+        let orders = search::orders(problem, max_modes, &mut |done| {
+            searched = searched.max(SEARCH_PROGRESS * done);
+            progress(searched)
+        })?;
+        let best = orders.last().ok_or(no_mode(band_hz))?;
+        let lone = lone_data(problem, &best.parameters);
+        if used.can_leave_out(&lone) {
+            used.leave_out(&lone);
+            continue;
+        }
+        report(progress, SEARCH_PROGRESS)?;
+        let fit = final_fit(problem, best.parameters.clone())?;
+        let lone = lone_data(problem, &fit.parameters);
+        if used.can_leave_out(&lone) {
+            used.leave_out(&lone);
+            continue;
+        }
+        report(progress, 1.0)?;
+        return Ok(ModalFit {
+            orders,
+            band_hz,
+            left_out_hz: used.left_out_hz,
+            ..fit
+        });
+    }
+}
+
+fn no_mode((low_hz, high_hz): (f64, f64)) -> FitError {
+    FitError::NoMode { low_hz, high_hz }
 }
 
 /// How well at most `max_modes` modes describe the data, for a comparison of similar data: chi^2 with a relative error of some per cent
@@ -194,6 +220,7 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
             orders: Vec::new(),
             parameters: solution.parameters.clone(),
             band_hz: (0.0, 0.0),
+            left_out_hz: Vec::new(),
         })
     };
     let Some(first) = fit(&by_estimator, data) else {

@@ -7,6 +7,7 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::clusters::cancelling;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
+use crate::FrfDatum;
 use bench_plant::Sign;
 use bench_plant::zeros::ModalTerm;
 
@@ -23,6 +24,9 @@ pub struct ModalFit {
     pub chi2_per_freedom: f64,
     /// Lowest and highest fitted frequency in hertz.
     pub band_hz: (f64, f64),
+    /// Frequencies in hertz, rising, at which the response alone shows a mode: as a disturbance does that repeats with the periods, or a
+    /// mode that is narrower than the distance of the data. They are not fitted.
+    pub left_out_hz: Vec<f64>,
 }
 
 /// A fitted mode.
@@ -104,6 +108,12 @@ pub struct UncertainPole {
 }
 
 impl ModalFit {
+    /// The data that are fitted.
+    pub fn used_data(&self, data: &[FrfDatum]) -> Vec<FrfDatum> {
+        let is_used = |datum: &&FrfDatum| !self.left_out_hz.contains(&datum.frequency_hz);
+        data.iter().filter(is_used).copied().collect()
+    }
+
     /// The modes with their standard deviations, lowest frequency first.
     pub fn modes(&self) -> Vec<FittedMode> {
         let modes = self.parameters.modes.iter().enumerate();

@@ -90,6 +90,7 @@ mod tests {
             orders: Vec::new(),
             chi2_per_freedom: 1.0,
             band_hz: (1.0, 200.0),
+            left_out_hz: Vec::new(),
         };
         let path = crate::modal::InputPath {
             hold_s: 1e-3,

@@ -7,4 +7,6 @@ pub mod harmonics;
 pub mod linearity;
 mod lines;
 pub mod periodic;
+mod pooled;
 pub mod settling;
+pub(crate) mod useful_band;

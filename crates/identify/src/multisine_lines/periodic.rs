@@ -7,18 +7,21 @@
 //!
 //! so that noise on the measured input counts as well as that on the output (Pintelon, Schoukens, System Identification, 2nd
 //! ed., section 2.5). What the plant repeats in every period, distortion included, is not noise here: a model that does not
-//! describe it has a reduced chi-square above 1. With P periods, chi-square is (P - 1)/(P - 2) times too high.
+//! describe it has a reduced chi-square above 1. With these variances of P periods, chi-square is (P - 1)/(P - 2) times too high; for a
+//! fit they are pooled over neighbouring lines by [`with_pooled_noise`].
 
 use super::excited::excited;
 use super::lines::{Line, ROUNDING, lines, mean};
 use crate::{Frf, FrfDatum, FrfPoint, IdentifyError, Signals};
 
 pub use super::lines::Repetition;
+pub use super::pooled::with_pooled_noise;
 
 /// The response by averages over periods.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Periods {
-    /// The response at the excited lines, with one datum per line; the resolution is the distance of the lines.
+    /// The response at the excited lines, with one datum per line, and variances by the scatter of the periods of the line; the resolution
+    /// is the distance of the lines.
     pub frf: Frf,
     /// |mean U|^2 of each datum.
     pub input_powers: Vec<f64>,
@@ -53,6 +56,12 @@ pub fn estimate(
 }
 
 impl Periods {
+    /// The response with its data for a fit: variances that are pooled over neighbouring lines.
+    pub fn pooled(self) -> Frf {
+        let data = with_pooled_noise(&self.frf.data, &self.input_powers, self.count);
+        Frf { data, ..self.frf }
+    }
+
     fn push(&mut self, line: &Line, line_hz: f64) {
         let (frequency_hz, response) = (line.number as f64 * line_hz, line.response());
         let variance = line

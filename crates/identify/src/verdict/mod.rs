@@ -153,11 +153,27 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
             None => (Cnmp::Undecided, no_phase_drop(modes.len()).into()),
         },
     };
-    Ok(Verdict {
+    let verdict = Verdict {
         cnmp,
         why,
         zeros,
         phase_drop,
+    };
+    Ok(verdict.with(left_out(input.fit)))
+}
+
+/// The frequencies that are not fitted, as a caution.
+fn left_out(fit: &ModalFit) -> Option<String> {
+    let frequencies: Vec<String> = fit
+        .left_out_hz
+        .iter()
+        .map(|hz| format!("{hz:.2}"))
+        .collect();
+    (!frequencies.is_empty()).then(|| {
+        format!(
+            "the response at {} Hz alone differs from the modes, as by a disturbance or a mode narrower than the distance of the frequencies; it is left out, and a finer resolution (a longer period) shows which it is",
+            frequencies.join(", ")
+        )
     })
 }
 

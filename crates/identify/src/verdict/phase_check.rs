@@ -61,7 +61,8 @@ fn last_rad_s(input: &VerdictInput<'_>, modes: &[FittedMode], zeros: &[Uncertain
 /// The smoothed data beside the fit, both of the mechanics alone. Data that are not significant have the value of the fit.
 fn curve(input: &VerdictInput<'_>) -> Result<PhaseCurve, PlantError> {
     let parameters = &input.fit.parameters;
-    let data = significant_range(merged(input.frf_data, parameters));
+    let used = input.fit.used_data(input.frf_data);
+    let data = significant_range(merged(&used, parameters));
     let sum = ModalSum::new(parameters.modes.clone(), parameters.remainder_m_per_n)?;
     let omega_rad_s: Vec<f64> = data.iter().map(FrfDatum::omega_rad_s).collect();
     let fitted: Vec<Complex<f64>> = omega_rad_s

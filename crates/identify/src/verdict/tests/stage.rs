@@ -127,6 +127,7 @@ impl Stage {
             orders: Vec::new(),
             chi2_per_freedom: 1.0,
             band_hz: (hertz(FIRST_RAD_S), hertz(FIRST_RAD_S + FREQUENCIES as f64)),
+            left_out_hz: Vec::new(),
         }
     }
 
