@@ -2,7 +2,7 @@
 
 use super::table::{result_table, wrap};
 use bench_experiment::outputs::ModalSummary;
-use bench_report::figures::{mode_table, zero_table};
+use bench_report::figures::{COMPLEX_RESIDUES_NOTE, has_complex_residues, mode_table, zero_table};
 use bench_report::table::Width;
 
 /// Tables of modes and zeros, and the verdict.
@@ -20,5 +20,10 @@ pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
     } else {
         result_table(&zeros)
     };
-    format!("\n{modes}\n{zeros}\n± is the 95 % confidence interval\n{verdict}")
+    let note = if has_complex_residues(&summary.modes) {
+        wrap(COMPLEX_RESIDUES_NOTE, 0)
+    } else {
+        String::new()
+    };
+    format!("\n{modes}\n{zeros}\n± is the 95 % confidence interval\n{note}{verdict}")
 }

@@ -109,6 +109,7 @@ fn uncertain_or_missing_signs_do_not_differ() {
                     value: mode.residue_per_kg(),
                     sigma: residue_sigma,
                 },
+                residue_imaginary_per_kg: None,
             })
             .collect()
     };

@@ -12,6 +12,7 @@ fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
         modes,
         remainder_m_per_n: REMAINDER_M_PER_N,
         delay_s: DELAY_S,
+        ..ModalParameters::default()
     };
     ModalFit {
         parameters,

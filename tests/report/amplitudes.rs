@@ -26,6 +26,7 @@ fn modes(frequencies_hz: &[f64]) -> Vec<ModeOverAmplitude> {
         omega_rad_s: estimate(omega_rad_s),
         damping_ratio: estimate(0.005),
         residue_per_kg: estimate(0.5),
+        residue_imaginary_per_kg: None,
     };
     let run = |ratio: f64| {
         frequencies_hz

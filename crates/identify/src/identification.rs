@@ -10,10 +10,10 @@ use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{NOISE_CHI2, Observation, Source, describes};
+use crate::observation::{Observation, Source, describes};
 use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Repetition};
-use crate::plausibility::{hint, implausible, unless_undetermined};
+use crate::plausibility::{complex_fit, hint, implausible, known_cause, unless_undetermined};
 use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, with_distortion};
@@ -51,6 +51,10 @@ pub struct ExternalAnalysis {
     pub clock_skew: Option<ClockSkew>,
     /// Whether defects of the record, or its kind of output, explain an undecided verdict.
     has_known_cause: bool,
+    /// Whether it is known why modes do not describe the response: a defect, or another kind of output.
+    is_explained: bool,
+    /// The sinusoids that were subtracted, and other cautions of the verdict.
+    cautions: Vec<String>,
 }
 
 /// What only a periodic record shows.
@@ -292,7 +296,8 @@ impl Identification {
             reference,
         };
         let analysis = analyse(record, *self, None)?;
-        self.with_one_clock(record, analysis)
+        let analysis = self.with_one_clock(record, analysis)?;
+        self.with_complex_residues(record, analysis)
     }
 
     /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
@@ -319,6 +324,48 @@ impl Identification {
         let is_better = is_sum_of_few_modes(&corrected.fit)
             && number_of_modes(&corrected) <= number_of_modes(&analysis);
         Ok(if is_better { corrected } else { analysis })
+    }
+
+    /// The analysis with complex residues, if modes with real ones do not describe the response, and nothing else explains that.
+    fn with_complex_residues(
+        &self,
+        record: ExternalSignals<'_>,
+        analysis: ExternalAnalysis,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        if analysis.is_explained {
+            return Ok(analysis);
+        }
+        let ExternalAnalysis { frf, chain, .. } = &analysis;
+        let observation = Observation {
+            source: self.source(),
+            frf,
+            fit: &analysis.fit,
+            chain,
+            stated: self.output_kind,
+            clear_kind: None,
+            remedies: record.remedies(),
+        };
+        let Some(fit) = complex_fit(&observation) else {
+            return Ok(analysis);
+        };
+        let up_to_rad_s = analysis.judged_up_to_rad_s;
+        let is_periodic = self.repetition.is_some();
+        let verdict = judged(None, frf, &fit, chain, up_to_rad_s, |verdict| {
+            hint(verdict, record, is_periodic, &fit)
+        })?;
+        Ok(ExternalAnalysis {
+            verdict: verdict.with(listed(&analysis.cautions)),
+            fit,
+            ..analysis
+        })
+    }
+
+    /// Where the signals come from.
+    fn source(&self) -> Source {
+        Source {
+            rate_hz: self.rate_hz,
+            input_path: self.input_path,
+        }
     }
 }
 
@@ -357,10 +404,7 @@ fn analyse(
     };
     let stated = identification.output_kind;
     let output_kind = stated.unwrap_or_default();
-    let source = Source {
-        rate_hz: signals.rate_hz,
-        input_path,
-    };
+    let source = identification.source();
     let chain = source.chain(output_kind, &frf.data);
     let other = modes_of_other_kind(&source, &frf.data, &chain);
     let clear_kind = other.as_ref().map(|(kind, _)| *kind);
@@ -383,12 +427,16 @@ fn analyse(
         clear_kind,
         remedies: record.remedies(),
     };
-    let why = listed(&defects).or_else(|| implausible(&observation));
+    let known = listed(&defects).or_else(|| known_cause(&observation));
+    let is_explained = known.is_some();
+    let why = known.or_else(|| implausible(&observation));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
         hint(verdict, cleaned, repetition.is_some(), &fit)
     })?;
-    let verdict = verdict.with(listed(&stray_lines));
-    let verdict = verdict.with(clock_skew.map(|skew| skew.description()));
+    let clocks = clock_skew.map(|skew| skew.description());
+    let stray_lines = stray_lines.iter().map(ToString::to_string);
+    let cautions: Vec<String> = stray_lines.chain(clocks).collect();
+    let verdict = verdict.with(listed(&cautions));
     Ok(ExternalAnalysis {
         frf,
         fit,
@@ -402,6 +450,8 @@ fn analyse(
         resolution,
         clock_skew,
         has_known_cause: !defects.is_empty() || clear_kind.is_some(),
+        is_explained,
+        cautions,
     })
 }
 
@@ -422,10 +472,9 @@ pub(super) fn judged(
     Ok(unless_undetermined(verdict.with(hint), fit))
 }
 
-/// Whether the residual of a fit is noise, and no residues nearly cancel, as those of modes in the place of something else.
+/// Whether a few modes with real residues describe the data.
 fn is_sum_of_few_modes(fit: &Result<ModalFit, FitError>) -> bool {
-    fit.as_ref()
-        .is_ok_and(|fit| fit.chi2_per_freedom <= NOISE_CHI2 && fit.cancelling_modes().is_none())
+    fit.as_ref().is_ok_and(ModalFit::is_sum_of_few_modes)
 }
 
 fn number_of_modes(analysis: &ExternalAnalysis) -> usize {

@@ -4,15 +4,16 @@ use bench_base::units::rad_s;
 use bench_plant::{OutputKind, PlantError};
 
 use crate::Frf;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, Source};
 use crate::other_kind::modes_of_other_kind;
-use crate::plausibility::{implausible, response_hint};
+use crate::plausibility::{complex_fit, implausible, known_cause, response_hint};
 use crate::remedies::OF_RESPONSE;
 use crate::scatter::Scatter;
-use crate::verdict::{Cnmp, MAX_CHI2_PER_FREEDOM, Verdict};
+use crate::verdict::{Cnmp, Verdict};
 
 /// Samples per second over the last frequency of a response whose rate is not known: 400 lines of 1024 samples, the usual ratio of
 /// analysers.
@@ -179,7 +180,7 @@ impl ResponseIdentification {
         let clear_kind = other.as_ref().map(|(kind, _)| *kind);
         let fit = other.map_or_else(|| modal::fit(&frf.data, &chain), |(_, few)| Ok(few));
         let judged_up_to_rad_s = rad_s(band_hz.1);
-        let why = implausible(&Observation {
+        let observation = Observation {
             source,
             frf: &frf,
             fit: &fit,
@@ -187,7 +188,17 @@ impl ResponseIdentification {
             stated: self.output_kind,
             clear_kind,
             remedies: &OF_RESPONSE,
-        });
+        };
+        let known = known_cause(&observation);
+        let complex = match known {
+            Some(_) => None,
+            None => complex_fit(&observation),
+        };
+        let why = match complex {
+            Some(_) => None,
+            None => known.or_else(|| implausible(&observation)),
+        };
+        let fit = complex.unwrap_or(fit);
         let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
             response_hint(verdict, &fit)
         })?;

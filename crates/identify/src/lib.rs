@@ -32,7 +32,9 @@
 #![deny(unsafe_code)]
 
 mod band;
+mod chi2_limits;
 mod clock_skew;
+mod complex_residues;
 pub mod delay;
 mod error;
 mod estimator;

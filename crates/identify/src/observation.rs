@@ -2,9 +2,9 @@
 
 use bench_plant::OutputKind;
 
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::remedies::Remedies;
-use crate::verdict::MAX_CHI2_PER_FREEDOM;
 use crate::{Frf, FrfDatum};
 
 /// Where signals come from, apart from the kind of the output.
@@ -16,8 +16,6 @@ pub(super) struct Source {
     pub(super) input_path: InputPath,
 }
 
-/// Largest reduced chi-square of a residual that is noise: the noise is estimated with an error of some per cent.
-pub(super) const NOISE_CHI2: f64 = 1.5;
 /// Number of data of a part.
 const PART_DATA: usize = 400;
 /// Largest number of modes that are fitted to a part.

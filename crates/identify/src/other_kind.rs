@@ -8,8 +8,10 @@
 use bench_plant::OutputKind;
 use nalgebra::Complex;
 
+use crate::chi2_limits::NOISE_CHI2;
+use crate::complex_residues::fit_complex;
 use crate::modal::{self, MeasurementChain, ModalFit};
-use crate::observation::{NOISE_CHI2, Observation, PART_MODES, Source, describes, fit_part, part};
+use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
 use crate::{Estimate, FrfDatum};
 
 /// A constant above this ratio of the response at the end of the band is nearly all of it.
@@ -43,8 +45,8 @@ pub(super) fn modes_of_other_kind(
     is_clear.then_some((kind, few))
 }
 
-/// What describes the data in place of modes with the kind of output of the fit.
-pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
+/// Another kind of output that describes the data in place of that of the fit.
+pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
     let assumed = seen.chain.output();
     if let Some(fit) = seen.fit.as_ref().ok().filter(|fit| describes(fit)) {
         let is_clear = seen.stated.is_some() || fit.chi2_per_freedom <= NOISE_CHI2;
@@ -54,11 +56,27 @@ pub(super) fn explained_otherwise(seen: &Observation<'_>) -> Option<String> {
             described_better(seen)
         };
     }
-    let found = || Some(other_kind(&seen.source, &seen.frf.data, assumed)?.0);
-    match seen.clear_kind.or_else(found) {
-        Some(kind) => Some(give_kind(assumed, kind)),
-        None => inverse_fits(seen).then(|| format!("{SWAPPED}; {}", seen.remedies.swapped)),
+    if let Some(kind) = seen.clear_kind {
+        return Some(give_kind(assumed, kind));
     }
+    let (kind, other) = other_kind(&seen.source, &seen.frf.data, assumed)?;
+    let is_simplest = !complex_residues_are_simpler(seen, &other);
+    is_simplest.then(|| give_kind(assumed, kind))
+}
+
+/// Exchanged columns: modes describe the inverse of a response that they do not describe.
+pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
+    let is_described = seen.fit.as_ref().is_ok_and(describes);
+    (!is_described && inverse_fits(seen)).then(|| format!("{SWAPPED}; {}", seen.remedies.swapped))
+}
+
+/// Whether modes of the assumed kind with complex residues describe a part of the data with fewer parameters than those of another kind.
+/// (They can be those of an acceleration as well, but need more parameters for it.)
+fn complex_residues_are_simpler(seen: &Observation<'_>, other: &ModalFit) -> bool {
+    let complex = fit_complex(&part(&seen.frf.data), seen.chain, seen.fit);
+    complex.is_some_and(|fit| {
+        !vanishes(&fit) && fit.number_of_parameters() < other.number_of_parameters()
+    })
 }
 
 fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {

@@ -2,10 +2,11 @@
 
 use bench_plant::OutputKind;
 
+use crate::complex_residues::fit_complex;
 use crate::external_signals::ExternalSignals;
 use crate::modal::{FitError, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
-use crate::other_kind::{better_kind, explained_otherwise, vanishes_at_rest};
+use crate::other_kind::{better_kind, explained_by_kind, swapped, vanishes_at_rest};
 use crate::verdict::{Cnmp, Verdict};
 use crate::{Frf, record_check};
 
@@ -28,14 +29,19 @@ const ACTIVE_RATIO: f64 = 0.3;
 const CLOSED_LOOP: &str =
     "if the record was taken in closed loop, give the column of its reference (--reference)";
 
-/// The reason, if the data cannot be those of input and output of a mechanical system.
-pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
+/// Why modes do not describe the data, if that is known: little of the output is that of the input, or it is of another kind.
+pub(super) fn known_cause(seen: &Observation<'_>) -> Option<String> {
     let of = seen.remedies;
     with_remedy(incoherent(seen.frf, seen.fit, of.excitation), of.incoherent)
-        .or_else(|| explained_otherwise(seen))
+        .or_else(|| explained_by_kind(seen))
+}
+
+/// The reason, if the data cannot be those of input and output of a mechanical system.
+pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
+    swapped(seen)
         .or_else(|| vanishes_at_rest(seen))
         .or_else(|| grows_with_frequency(seen))
-        .or_else(|| with_remedy(early(seen), of.early))
+        .or_else(|| with_remedy(early(seen), seen.remedies.early))
 }
 
 fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
@@ -46,6 +52,14 @@ fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
 fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
     let what = growing(seen.frf, seen.fit, seen.chain.output())?;
     better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
+}
+
+/// The modes with complex residues, if real ones do not describe the data, and if they are plausible as well.
+pub(super) fn complex_fit(seen: &Observation<'_>) -> Option<Result<ModalFit, FitError>> {
+    let fit = Ok(fit_complex(&seen.frf.data, seen.chain, seen.fit)?);
+    let with_complex = Observation { fit: &fit, ..*seen };
+    let is_plausible = implausible(&with_complex).is_none();
+    is_plausible.then_some(fit)
 }
 
 /// Modes that describe the response may lie in less than half of the band.
@@ -105,7 +119,7 @@ fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
 }
 
 fn early(seen: &Observation<'_>) -> Option<String> {
-    let delay = seen.fit.as_ref().ok()?.delay_s();
+    let delay = seen.fit.as_ref().ok()?.determined_delay_s()?;
     let limit_s = (EARLY_SAMPLES / seen.source.rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
         format!(

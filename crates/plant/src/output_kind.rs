@@ -41,6 +41,15 @@ impl OutputKind {
         }
     }
 
+    /// The kind of its derivative by time; `None` of an acceleration, whose derivative no probe measures.
+    pub fn derivative(self) -> Option<OutputKind> {
+        match self {
+            OutputKind::Position => Some(OutputKind::Velocity),
+            OutputKind::Velocity => Some(OutputKind::Acceleration),
+            OutputKind::Acceleration => None,
+        }
+    }
+
     /// s^k.
     pub fn factor(self, s: Complex<f64>) -> Complex<f64> {
         s.powi(self.derivatives())
@@ -65,5 +74,14 @@ mod tests {
         let s = Complex::new(0.0, 3.0);
         let factors = OutputKind::ALL.map(|kind| kind.factor(s));
         assert_eq!(factors, [Complex::new(1.0, 0.0), s, s * s]);
+    }
+
+    #[test]
+    fn derivative_has_one_more_factor_s() {
+        for kind in OutputKind::ALL {
+            let derivatives = kind.derivative().map(OutputKind::derivatives);
+            let expected = (kind != OutputKind::Acceleration).then(|| kind.derivatives() + 1);
+            assert_eq!(derivatives, expected);
+        }
     }
 }

@@ -251,6 +251,7 @@ impl From<&CertifiedMode> for FittedMode {
             omega_rad_s: estimate(mode.frequency_hz, mode.frequency_hz_sigma).scaled(TAU),
             damping_ratio: estimate(mode.damping_ratio, mode.damping_ratio_sigma),
             residue_per_kg: estimate(mode.residue, mode.residue_sigma),
+            residue_imaginary_per_kg: None,
         }
     }
 }

@@ -159,6 +159,7 @@ mod tests {
             omega_rad_s: known(hz * std::f64::consts::TAU),
             damping_ratio: known(0.01),
             residue_per_kg: known(0.5),
+            residue_imaginary_per_kg: None,
         };
         let why = |runs: &[Vec<FittedMode>]| compare_modes(runs, (5.0, 200.0), true).why;
         let both = vec![mode(29.0), mode(82.0)];

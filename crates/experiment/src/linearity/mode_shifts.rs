@@ -120,6 +120,7 @@ mod tests {
             omega_rad_s: known(omega_rad_s),
             damping_ratio: known(damping_ratio),
             residue_per_kg: known(-0.5),
+            residue_imaginary_per_kg: None,
         }
     }
 
@@ -199,6 +200,7 @@ mod tests {
                 omega_rad_s: chance(omega),
                 damping_ratio: chance(0.01),
                 residue_per_kg: chance(0.5),
+                residue_imaginary_per_kg: None,
             };
             vec![mode(180.0), mode(500.0), mode(530.0)]
         };

@@ -19,6 +19,8 @@ use bench_identify::verdict::{Cnmp, UncertainZero, Verdict};
 pub struct ModalSummary {
     /// The modes, lowest frequency first.
     pub modes: Vec<FittedMode>,
+    /// `real` or `complex`; `null` without modes.
+    pub residues: Option<&'static str>,
     /// Zeros of the fit, with damping, in the band of the verdict; of a conjugate pair the one above the real axis.
     pub zeros: Vec<UncertainZero>,
     /// The verdict.
@@ -27,7 +29,7 @@ pub struct ModalSummary {
     pub why: String,
     /// Reduced chi-square: 1 if the residual of the fit is noise.
     pub fit_chi2_per_freedom: Option<f64>,
-    /// Delay beyond that of the configuration, by the fit.
+    /// Delay beyond that of the configuration, by the fit; `None` also with complex residues, which do not determine it.
     pub fit_delay_s: Option<f64>,
     /// Its standard deviation.
     pub fit_delay_sigma_s: Option<f64>,
@@ -42,14 +44,16 @@ pub struct ModalSummary {
 impl ModalSummary {
     /// The summary of a fit and its verdict.
     pub fn new(fit: Option<&ModalFit>, verdict: &Verdict) -> ModalSummary {
+        let delay_s = fit.and_then(ModalFit::determined_delay_s);
         ModalSummary {
             modes: fit.map_or(Vec::new(), ModalFit::modes),
+            residues: fit.map(|fit| fit.parameters.residues.name()),
             zeros: verdict.zeros.clone(),
             cnmp: verdict.cnmp,
             why: verdict.why.clone(),
             fit_chi2_per_freedom: fit.map(|fit| fit.chi2_per_freedom),
-            fit_delay_s: fit.map(|fit| fit.delay_s().value),
-            fit_delay_sigma_s: fit.map(|fit| fit.delay_s().sigma),
+            fit_delay_s: delay_s.map(|delay| delay.value),
+            fit_delay_sigma_s: delay_s.map(|delay| delay.sigma),
             phase_drop_deg: verdict.phase_drop.map(|phase_drop| phase_drop.drop_deg),
             orders: fit.map_or(Vec::new(), |fit| fit.orders.clone()),
         }

@@ -364,9 +364,10 @@ fn deviation(
 fn covariance(fit: &ModalFit, roles: &[ModeRole]) -> DMatrix<f64> {
     let free = fit.parameters.free();
     let is_used = |parameter: &Parameter| match parameter {
-        Parameter::Frequency(k) | Parameter::Damping(k) | Parameter::Residue(k) => {
-            roles[*k] == ModeRole::Signed
-        }
+        Parameter::Frequency(k)
+        | Parameter::Damping(k)
+        | Parameter::Residue(k)
+        | Parameter::Rate(k) => roles[*k] == ModeRole::Signed,
         Parameter::Remainder | Parameter::Delay => true,
     };
     let used: Vec<usize> = (0..free.len()).filter(|i| is_used(&free[*i])).collect();

@@ -120,6 +120,7 @@ mod tests {
                 value: residue,
                 sigma,
             },
+            residue_imaginary_per_kg: None,
         }
     }
 

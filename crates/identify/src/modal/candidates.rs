@@ -104,7 +104,11 @@ pub(super) fn first_mode_starts(
             residue_per_kg,
             ..term
         };
-        starts.push((decrease, ModalParameters::one_mode(term, delay_s)));
+        let start = ModalParameters {
+            delay_s,
+            ..solution.parameters.clone()
+        };
+        starts.push((decrease, start.with_mode(term)));
         projection.delay(&step);
     }
     let mut starts = best_first(starts);

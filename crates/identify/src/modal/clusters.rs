@@ -5,10 +5,12 @@
 
 use core::ops::Range;
 
+use nalgebra::Complex;
+
 use super::parameters::ModalParameters;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
-use crate::verdict::MAX_CHI2_PER_FREEDOM;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
 
 /// Neighbouring modes belong to one cluster if their distance is below this multiple of the sum of their half-widths zeta w.
@@ -29,7 +31,7 @@ const PROMISING: f64 = 2.0;
 pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -> Solution {
     let parameters = solution.parameters.by_rising_frequency();
     // From the last cluster on: the positions of the others remain.
-    let clusters = clusters(&parameters.modes).into_iter().rev();
+    let clusters = clusters(&parameters).into_iter().rev();
     let solution = Solution::new(problem, parameters);
     clusters.fold(solution, |best, cluster| {
         with_fewer(problem, &best, cluster).unwrap_or(best)
@@ -37,8 +39,8 @@ pub(super) fn with_fewer_in_clusters(problem: Problem<'_>, solution: Solution) -
 }
 
 /// The clusters of modes, of rising frequency, whose residues cancel: their indices.
-pub(super) fn cancelling(modes: &[ModalTerm]) -> Vec<Range<usize>> {
-    let clusters = clusters(modes);
+pub(super) fn cancelling(parameters: &ModalParameters) -> Vec<Range<usize>> {
+    let clusters = clusters(parameters);
     clusters.iter().map(Cluster::modes).collect()
 }
 
@@ -57,14 +59,15 @@ impl Cluster {
 }
 
 /// The clusters whose residues cancel.
-fn clusters(modes: &[ModalTerm]) -> Vec<Cluster> {
+fn clusters(parameters: &ModalParameters) -> Vec<Cluster> {
+    let (modes, residues) = (&parameters.modes, parameters.complex_residues());
     let mut clusters = Vec::new();
     let mut first = 0;
     for next in 1..=modes.len() {
         if next < modes.len() && are_close(&modes[next - 1], &modes[next]) {
             continue;
         }
-        if cancels(&modes[first..next]) {
+        if cancels(&residues[first..next]) {
             let count = next - first;
             clusters.push(Cluster { first, count });
         }
@@ -78,11 +81,10 @@ fn are_close(a: &ModalTerm, b: &ModalTerm) -> bool {
     (b.omega_rad_s - a.omega_rad_s).abs() < REACH * half_widths
 }
 
-fn cancels(modes: &[ModalTerm]) -> bool {
-    let residues = modes.iter().map(|mode| mode.residue_per_kg);
-    let sum: f64 = residues.clone().sum();
-    let magnitudes: f64 = residues.map(f64::abs).sum();
-    modes.len() > 1 && magnitudes > CANCELLATION * sum.abs()
+fn cancels(residues: &[Complex<f64>]) -> bool {
+    let sum: Complex<f64> = residues.iter().sum();
+    let magnitudes: f64 = residues.iter().map(|residue| residue.norm()).sum();
+    residues.len() > 1 && magnitudes > CANCELLATION * sum.norm()
 }
 
 /// The solution with the fewest modes in place of a cluster, if chi^2 does not increase significantly. In place of a cluster of modes that
@@ -107,7 +109,8 @@ fn with_count(
     cluster: Cluster,
     count: usize,
 ) -> Option<Solution> {
-    let limit_per_mode = problem.significant_decrease() * problem.misfit(solution.chi2);
+    let significant = problem.significant_decrease(&solution.parameters.residues);
+    let limit_per_mode = significant * problem.misfit(solution.chi2);
     let best = best_of(problem, solution, cluster, count)?;
     let removed = (cluster.count - count) as f64;
     (best.chi2 - solution.chi2 <= removed * limit_per_mode).then_some(best)
@@ -148,14 +151,10 @@ fn only(parameters: &ModalParameters, cluster: Cluster, kept: u64) -> ModalParam
         Some(within) if within < cluster.count => kept >> within & 1 == 1,
         _ => true,
     };
-    let modes = parameters.modes.iter().enumerate();
-    ModalParameters {
-        modes: modes
-            .filter(|(k, _)| is_kept(*k))
-            .map(|(_, mode)| *mode)
-            .collect(),
-        ..parameters.clone()
-    }
+    let kept: Vec<usize> = (0..parameters.modes.len())
+        .filter(|k| is_kept(*k))
+        .collect();
+    parameters.selected(&kept)
 }
 
 #[cfg(test)]
@@ -163,7 +162,7 @@ mod tests {
     use super::*;
     use crate::FrfDatum;
     use crate::modal::MeasurementChain;
-    use nalgebra::Complex;
+    use crate::modal::Residues;
 
     fn term(hz: f64, damping_ratio: f64, residue_per_kg: f64) -> ModalTerm {
         ModalTerm {
@@ -239,15 +238,26 @@ mod tests {
 
     #[test]
     fn only_close_modes_with_residues_that_cancel_are_a_cluster() {
-        let modes = [
+        let real = |modes: &[ModalTerm]| ModalParameters {
+            modes: modes.to_vec(),
+            ..ModalParameters::default()
+        };
+        let modes = real(&[
             term(30.0, 0.01, 0.5),
             term(80.0, 0.01, 9.0),
             term(80.5, 0.01, -8.0),
-        ];
+        ]);
         assert_eq!(clusters(&modes), [Cluster { first: 1, count: 2 }]);
-        let alike = [term(80.0, 0.01, 9.0), term(80.5, 0.01, 8.0)];
+        let alike = real(&[term(80.0, 0.01, 9.0), term(80.5, 0.01, 8.0)]);
         assert_eq!(clusters(&alike), []);
-        let distant = [term(80.0, 0.001, 9.0), term(82.0, 0.001, -8.0)];
+        let distant = real(&[term(80.0, 0.001, 9.0), term(82.0, 0.001, -8.0)]);
         assert_eq!(clusters(&distant), []);
+        // 9 + 9 j and -8 + 9 j have the sum 1 + 18 j.
+        let w = std::f64::consts::TAU * 80.0;
+        let complex = ModalParameters {
+            residues: Residues::Complex(vec![0.0, 9.0 / w, 9.0 / w]),
+            ..modes
+        };
+        assert_eq!(clusters(&complex), []);
     }
 }

@@ -86,8 +86,7 @@ pub(super) fn lone_data(problem: Problem<'_>, parameters: &ModalParameters) -> V
 /// The datum that alone shows a mode.
 fn lone_datum(problem: Problem<'_>, parameters: &ModalParameters, mode: usize) -> Option<usize> {
     let nearest = narrow_at(problem.data, &parameters.modes[mode])?;
-    let mut fewer = parameters.clone();
-    fewer.modes.remove(mode);
+    let fewer = parameters.without_mode(mode);
     let others = &without(problem.data, &[nearest]);
     let beside = Problem {
         chain: problem.chain,
@@ -113,7 +112,8 @@ fn is_needed(
 ) -> bool {
     let with_mode = Solution::new(problem, parameters.clone());
     let without_mode = refine(problem, without_mode, 0.0);
-    let limit = problem.significant_decrease() * problem.misfit(with_mode.chi2);
+    let significant = problem.significant_decrease(&parameters.residues);
+    let limit = significant * problem.misfit(with_mode.chi2);
     without_mode.chi2 - with_mode.chi2 > limit
 }
 

@@ -173,6 +173,15 @@ impl Node {
         Node { s, chain, far }
     }
 
+    /// The factor from an observed derivative to that of the node's chain: in samples of a bench it is observed itself, elsewhere it is s
+    /// times the mode, as the chain of the node has its own output.
+    fn rate_factor(&self) -> Complex<f64> {
+        match self.chain {
+            ChainResponse::Bench(_) => Complex::new(1.0, 0.0),
+            ChainResponse::Direct | ChainResponse::Input(_) => self.s,
+        }
+    }
+
     /// exp(-s tau).
     fn delay(&self, delay_s: f64) -> Complex<f64> {
         unit_phasor(-self.s.im * delay_s)
@@ -276,6 +285,17 @@ impl Nodes {
         self.response(|node| mode.response(node.s, &node.chain))
     }
 
+    /// The response of a mode of rate 1 s/kg, with the numerator s: the derivative by time of that of residue 1. Through the chain of
+    /// a bench it is that of the next kind of output; of an acceleration, which has none, it is 0.
+    pub(super) fn mode_rate(&self, term: &ModalTerm) -> NodeResponse {
+        let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
+        let mode = self.chain.derivative().map(|chain| chain.observed(w, zeta));
+        self.response(|node| match &mode {
+            None => Complex::new(0.0, 0.0),
+            Some(mode) => mode.response(node.s, &node.chain) * node.rate_factor(),
+        })
+    }
+
     fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> NodeResponse {
         NodeResponse(
             self.data
@@ -318,6 +338,12 @@ impl MeasurementChain {
             (MeasurementChain::Direct, _) => MeasurementChain::Input(InputPath::default(), output),
             (MeasurementChain::Input(path, _), _) => MeasurementChain::Input(path, output),
         }
+    }
+
+    /// The same chain with the derivative by time of its output; `None` of an acceleration.
+    pub(crate) fn derivative(&self) -> Option<MeasurementChain> {
+        let output = self.output().derivative()?;
+        Some(self.clone().observing(output))
     }
 
     /// What is measured.

@@ -98,7 +98,7 @@ mod tests {
             damping_ratio,
             residue_per_kg: 1.0,
         };
-        ModalParameters::one_mode(mode, 0.0)
+        ModalParameters::default().with_mode(mode)
     }
 
     #[test]

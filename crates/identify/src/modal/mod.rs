@@ -9,11 +9,15 @@
 //! through hold, amplifier and delays ([`MeasurementChain`]). Therefore every parameter is one of the mechanics, there are no
 //! computational poles, and no polynomials are expanded.
 //!
+//! Damping that is not proportional makes the residues complex ([`Residues`]). They are fitted to data only if such a sum with real
+//! residues does not describe them.
+//!
 //! The noise is that of the estimator first, and then the residual of the fit around each datum: where the model does not
 //! describe the data, the standard deviations grow accordingly.
 
 mod candidates;
 mod clusters;
+mod determined_delay;
 mod error;
 mod lone_lines;
 mod measurement_chain;
@@ -31,12 +35,13 @@ mod solution;
 
 use core::ops::ControlFlow;
 
+use determined_delay::with_determined_delay;
 use error::report;
 pub use error::{FitError, Progress};
 use lone_lines::{UsedData, lone_data};
 pub use measurement_chain::{InputPath, MeasurementChain};
-pub use modal_fit::{FittedMode, ModalFit, ModeGroup, UncertainPole};
-pub use parameters::{ModalParameters, Parameter};
+pub use modal_fit::{COMPLEX_SIGN, FittedMode, ModalFit, ModeGroup, UncertainPole};
+pub use parameters::{ModalParameters, Parameter, Residues};
 pub use search::ModelOrder;
 
 use crate::FrfDatum;
@@ -45,7 +50,7 @@ pub use merge::merged;
 use prune::{pruned, without_least_certain};
 use refine::refine;
 use residual_noise::with_residual_noise;
-pub(crate) use sensitivity::{by_denominator, mechanics_derivative};
+pub(crate) use sensitivity::{mechanics_derivative, mechanics_slope};
 use solution::{Problem, Solution};
 
 /// Progress at the end of the search; the rest is the final fit.
@@ -82,7 +87,7 @@ pub fn fit_with_progress(
     chain: &MeasurementChain,
     progress: &mut Progress<'_>,
 ) -> Result<ModalFit, FitError> {
-    fit_up_to(data, chain, search::MAX_MODES, progress)
+    fit_up_to(data, chain, &Residues::Real, search::MAX_MODES, progress)
 }
 
 /// As [`fit`], with at most `max_modes` modes: enough to see whether modes describe data.
@@ -91,12 +96,15 @@ pub(crate) fn fit_few(
     chain: &MeasurementChain,
     max_modes: usize,
 ) -> Result<ModalFit, FitError> {
-    fit_up_to(data, chain, max_modes, &mut |_| ControlFlow::Continue(()))
+    let progress = &mut |_| ControlFlow::Continue(());
+    fit_up_to(data, chain, &Residues::Real, max_modes, progress)
 }
 
-fn fit_up_to(
+/// As [`fit_with_progress`], with residues of this kind and at most `max_modes` modes.
+pub(crate) fn fit_up_to(
     data: &[FrfDatum],
     chain: &MeasurementChain,
+    residues: &Residues,
     max_modes: usize,
     progress: &mut Progress<'_>,
 ) -> Result<ModalFit, FitError> {
@@ -111,7 +119,7 @@ fn fit_up_to(
         let nodes = &chain.nodes(data, 0.0);
         let problem = Problem { chain, data, nodes };
         // A search that is repeated makes no progress until it is farther than the one before.
-        let orders = search::orders(problem, max_modes, &mut |done| {
+        let orders = search::orders(problem, residues, max_modes, &mut |done| {
             searched = searched.max(SEARCH_PROGRESS * done);
             progress(searched)
         })?;
@@ -193,7 +201,7 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     let chain = problem.chain;
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
-    let mut parameters = pruned(problem, start);
+    let mut parameters = pruned(problem, with_determined_delay(problem, start));
     loop {
         match with_covariance(problem, parameters.clone()) {
             Err(FitError::Undetermined { modes }) if modes > 1 => {

@@ -6,17 +6,22 @@ use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::clusters::cancelling;
+use super::measurement_chain::NodeResponse;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
 use crate::FrfDatum;
 use bench_plant::Sign;
 use bench_plant::zeros::ModalTerm;
+
+/// The sign of a complex residue.
+pub const COMPLEX_SIGN: char = 'c';
 
 /// The modes that fit a response.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalFit {
     /// The parameters, lowest frequency first.
     pub parameters: ModalParameters,
-    /// Covariance of w (rad/s), zeta, r (1/kg) of each mode (of a free body r alone), of R (m/N) and tau (s), in that order.
+    /// Covariance of w (rad/s), zeta, r (1/kg) of each mode (of a free body r alone), with complex residues q (s/kg) after r, of R (m/N)
+    /// and, unless it is fixed, tau (s), in that order.
     pub covariance: DMatrix<f64>,
     /// All significant model orders, for the stability chart.
     pub orders: Vec<ModelOrder>,
@@ -36,12 +41,14 @@ pub struct FittedMode {
     pub omega_rad_s: Estimate,
     /// Damping ratio.
     pub damping_ratio: Estimate,
-    /// Residue in 1/kg.
+    /// Residue r in 1/kg; the real part of a complex one.
     pub residue_per_kg: Estimate,
+    /// q w in 1/kg: the imaginary part of a complex residue, whose numerator at s = j w is r + j q w. `None` of a real residue.
+    pub residue_imaginary_per_kg: Option<Estimate>,
 }
 
 impl FittedMode {
-    /// Probability that the residue has the opposite sign, for normally distributed errors.
+    /// Probability that the residue, or the real part of a complex one, has the opposite sign, for normally distributed errors.
     pub fn sign_error_probability(&self) -> f64 {
         let magnitude = self.residue_per_kg.value.abs();
         Estimate {
@@ -51,19 +58,28 @@ impl FittedMode {
         .below_zero_probability()
     }
 
-    /// The sign of the residue.
+    /// The sign of the residue; [`COMPLEX_SIGN`] of a complex one, which has none.
     pub fn sign(&self) -> char {
-        Sign::of(self.residue_per_kg.value).symbol()
+        match self.residue_imaginary_per_kg {
+            Some(_) => COMPLEX_SIGN,
+            None => Sign::of(self.residue_per_kg.value).symbol(),
+        }
     }
 
-    /// The sign of the residue; `?` if its 95 % confidence interval contains 0.
+    /// The sign of the residue; of a real one `?` if its 95 % confidence interval contains 0.
     pub fn certain_sign(&self) -> char {
-        let residue = self.residue_per_kg;
-        if residue.value.abs() > residue.half_width_95() {
+        if self.residue_imaginary_per_kg.is_some() || self.is_determined() {
             self.sign()
         } else {
             '?'
         }
+    }
+
+    /// Whether the 95 % confidence interval of the residue, or of one part of a complex one, excludes 0.
+    fn is_determined(&self) -> bool {
+        let excludes_zero = |part: Estimate| part.value.abs() > part.half_width_95();
+        let imaginary = self.residue_imaginary_per_kg;
+        excludes_zero(self.residue_per_kg) || imaginary.is_some_and(excludes_zero)
     }
 
     /// Undamped natural frequency in hertz.
@@ -74,15 +90,26 @@ impl FittedMode {
 
 impl Serialize for FittedMode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut mode = serializer.serialize_struct("FittedMode", 8)?;
+        let fields = if self.residue_imaginary_per_kg.is_some() {
+            10
+        } else {
+            8
+        };
+        let mut mode = serializer.serialize_struct("FittedMode", fields)?;
         mode.serialize_field("frequency_hz", &self.frequency_hz().value)?;
         mode.serialize_field("frequency_hz_sigma", &self.frequency_hz().sigma)?;
         mode.serialize_field("damping_ratio", &self.damping_ratio.value)?;
         mode.serialize_field("damping_ratio_sigma", &self.damping_ratio.sigma)?;
         mode.serialize_field("residue", &self.residue_per_kg.value)?;
         mode.serialize_field("residue_sigma", &self.residue_per_kg.sigma)?;
+        if let Some(imaginary) = self.residue_imaginary_per_kg {
+            mode.serialize_field("residue_imaginary", &imaginary.value)?;
+            mode.serialize_field("residue_imaginary_sigma", &imaginary.sigma)?;
+        }
         mode.serialize_field("sign", &self.sign())?;
-        mode.serialize_field("sign_error_probability", &self.sign_error_probability())?;
+        let is_real = self.residue_imaginary_per_kg.is_none();
+        let error_probability = is_real.then(|| self.sign_error_probability());
+        mode.serialize_field("sign_error_probability", &error_probability)?;
         mode.end()
     }
 }
@@ -125,12 +152,28 @@ impl ModalFit {
             omega_rad_s: self.estimate(term.omega_rad_s, Parameter::Frequency(k)),
             damping_ratio: self.estimate(term.damping_ratio, Parameter::Damping(k)),
             residue_per_kg: self.estimate(term.residue_per_kg, Parameter::Residue(k)),
+            residue_imaginary_per_kg: self.residue_imaginary_per_kg(k, term),
         }
     }
 
-    /// The delay beyond that of the measurement chain, in seconds.
+    /// q w. Its error is that of q, beside which that of w is negligible. (The rate of a free body has no such unit: 0.)
+    fn residue_imaginary_per_kg(&self, k: usize, term: &ModalTerm) -> Option<Estimate> {
+        let is_complex = !self.parameters.has_real_residues();
+        is_complex.then(|| {
+            let rate = self.estimate(self.parameters.rate_s_per_kg(k), Parameter::Rate(k));
+            rate.scaled(term.omega_rad_s)
+        })
+    }
+
+    /// The delay beyond that of the measurement chain, in seconds; with the standard deviation 0 if it is fixed.
     pub fn delay_s(&self) -> Estimate {
         self.estimate(self.parameters.delay_s, Parameter::Delay)
+    }
+
+    /// The delay beyond that of the measurement chain, if it is determined: complex residues leave it open.
+    pub fn determined_delay_s(&self) -> Option<Estimate> {
+        let is_free = !self.parameters.has_fixed_delay;
+        is_free.then(|| self.delay_s())
     }
 
     /// The static compliance C = sum of r_k/w_k^2 + R in m/N, extrapolated by the fit to zero frequency. Its variance is g' P g, with
@@ -146,7 +189,7 @@ impl ModalFit {
             Parameter::Frequency(k) => -2.0 * compliance(&modes[k]) / modes[k].omega_rad_s,
             Parameter::Residue(k) => modes[k].omega_rad_s.powi(-2),
             Parameter::Remainder => 1.0,
-            Parameter::Damping(_) | Parameter::Delay => 0.0,
+            Parameter::Damping(_) | Parameter::Rate(_) | Parameter::Delay => 0.0,
         });
         let gradient = DVector::from_iterator(free.len(), gradient);
         let variance = (&self.covariance * &gradient).dot(&gradient);
@@ -184,7 +227,7 @@ impl ModalFit {
         let modes = self.modes();
         let is_undetermined = |group: &ModeGroup| {
             let group = &modes[group.first..group.first + group.count];
-            let uncertain = group.iter().filter(|mode| mode.certain_sign() == '?');
+            let uncertain = group.iter().filter(|mode| !mode.is_determined());
             uncertain.count() >= 2
         };
         self.cancelling_groups().into_iter().find(is_undetermined)
@@ -199,7 +242,10 @@ impl ModalFit {
             count: indices.len(),
             band_hz: (hz(indices.start), hz(indices.end - 1)),
         };
-        cancelling(modes).into_iter().map(group).collect()
+        cancelling(&self.parameters)
+            .into_iter()
+            .map(group)
+            .collect()
     }
 
     /// The response of the fit through `chain`, its delay included, at frequencies in hertz, in the unit of the fitted data
@@ -210,11 +256,17 @@ impl ModalFit {
         let mut sum = nodes.constant(&delays);
         sum.iter_mut()
             .for_each(|h| *h *= self.parameters.remainder_m_per_n);
-        for term in &self.parameters.modes {
-            let mode = nodes.mean(&nodes.mode(term), &delays);
+        let mut add = |response: &NodeResponse, factor: f64| {
+            let mean = nodes.mean(response, &delays);
             sum.iter_mut()
-                .zip(mode)
-                .for_each(|(h, mode)| *h += mode * term.residue_per_kg);
+                .zip(mean)
+                .for_each(|(h, mode)| *h += mode * factor);
+        };
+        for (k, term) in self.parameters.modes.iter().enumerate() {
+            add(&nodes.mode(term), term.residue_per_kg);
+            if !self.parameters.has_real_residues() {
+                add(&nodes.mode_rate(term), self.parameters.rate_s_per_kg(k));
+            }
         }
         sum
     }

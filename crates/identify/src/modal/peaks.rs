@@ -1,7 +1,7 @@
 //! Start values with one mode at each peak of the response.
 
 use super::candidates::{TRIALS, delays_s};
-use super::parameters::ModalParameters;
+use super::parameters::{ModalParameters, Residues};
 use super::solution::{Problem, Solution, node_responses};
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
@@ -20,15 +20,15 @@ const MAX_PEAKS: usize = 8;
 const DAMPING_RATIO: (f64, f64) = (1e-3, 0.06);
 
 /// Modes at the peaks, with the delays of least chi^2; none with fewer than two peaks.
-pub(super) fn peak_starts(problem: Problem<'_>) -> Vec<ModalParameters> {
+pub(super) fn peak_starts(problem: Problem<'_>, residues: &Residues) -> Vec<ModalParameters> {
     let modes = peaks(problem);
     let [first, _, ..] = modes[..] else {
         return Vec::new();
     };
-    let start = ModalParameters {
-        modes,
-        ..ModalParameters::default()
-    };
+    let without_modes = ModalParameters::without_modes(residues);
+    let start = modes
+        .into_iter()
+        .fold(without_modes, ModalParameters::with_mode);
     let responses = node_responses(problem, &start);
     let solutions = delays_s(problem.data, first).map(|delay_s| {
         let start = ModalParameters {

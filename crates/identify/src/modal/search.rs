@@ -12,12 +12,12 @@ use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
 use super::clusters::cancelling;
 use super::error::{FitError, Progress, report};
 use super::merge::merged;
-use super::parameters::ModalParameters;
+use super::parameters::{ModalParameters, Residues};
 use super::peaks::peak_starts;
 use super::refine::refine;
 use super::solution::{Problem, Solution};
 use crate::FrfDatum;
-use crate::verdict::MAX_CHI2_PER_FREEDOM;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
 
 /// Largest number of modes.
@@ -92,16 +92,18 @@ impl Serialize for ModelOrder {
 ///
 /// A relative error is added to the noise: a large one first, then a small one, then none. So modes are found in the order of
 /// their effect on the response rather than of the accuracy of the data, and an approximate model of all of them exists before
-/// small differences count.
+/// small differences count. The residues are real or complex as `residues`.
 pub(super) fn orders(
     problem: Problem<'_>,
+    residues: &Residues,
     max_modes: usize,
     progress: &mut Progress<'_>,
 ) -> Result<Vec<ModelOrder>, FitError> {
     let mut search = Search {
+        residues,
         max_modes,
         orders: Vec::new(),
-        parameters: ModalParameters::default(),
+        parameters: ModalParameters::without_modes(residues),
         done: 0.0,
         progress,
     };
@@ -117,6 +119,7 @@ pub(super) fn orders(
 /// well a few modes describe the data, at little cost.
 pub(super) fn coarse_cost(problem: Problem<'_>, max_modes: usize) -> Result<f64, FitError> {
     let mut search = Search {
+        residues: &Residues::Real,
         max_modes,
         orders: Vec::new(),
         parameters: ModalParameters::default(),
@@ -128,6 +131,8 @@ pub(super) fn coarse_cost(problem: Problem<'_>, max_modes: usize) -> Result<f64,
 
 /// The state of the search between two passes.
 struct Search<'a, 'p> {
+    /// Real or complex.
+    residues: &'a Residues,
     /// Largest number of modes.
     max_modes: usize,
     /// The orders found so far.
@@ -145,7 +150,7 @@ impl Search<'_, '_> {
         let data = &pass.data(problem.data, &self.parameters);
         let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
-        let starts = peak_starts(Problem { chain, data, nodes });
+        let starts = peak_starts(Problem { chain, data, nodes }, self.residues);
         let by_one = self.cost_of_run(pass, problem)?;
         let first = (by_one, self.parameters.clone(), self.orders.clone());
         let mut best = first;
@@ -154,7 +159,7 @@ impl Search<'_, '_> {
             self.orders.clear();
             self.done = 0.0;
             let cost = self.cost_of_run(pass, problem)?;
-            if cost + problem.significant_decrease() < best.0 {
+            if cost + problem.significant_decrease(self.residues) < best.0 {
                 best = (cost, self.parameters.clone(), self.orders.clone());
             }
         }
@@ -172,7 +177,7 @@ impl Search<'_, '_> {
         let problem = Problem { chain, data, nodes };
         let chi2 = Solution::new(problem, self.parameters.clone()).chi2;
         let modes = self.parameters.modes.len() as f64;
-        Ok(chi2 + modes * problem.significant_decrease())
+        Ok(chi2 + modes * problem.significant_decrease(self.residues))
     }
 
     /// Adds modes, with the errors of a pass, as long as they are significant.
@@ -325,7 +330,7 @@ fn with_other_pairs(problem: Problem<'_>, solution: Solution, tolerance: f64) ->
         return solution;
     }
     let parameters = solution.parameters.clone().by_rising_frequency();
-    let pairs = cancelling(&parameters.modes).into_iter();
+    let pairs = cancelling(&parameters).into_iter();
     let pairs = pairs.filter(|modes| modes.len() == 2);
     let starts = pairs.flat_map(|pair| parameters.with_pair_in_place(pair));
     let other = starts.map(|start| refine(problem, start, tolerance));
@@ -350,5 +355,6 @@ fn first_mode(problem: Problem<'_>, solution: &Solution, tolerance: f64) -> Opti
 /// The decrease of chi^2 over the smallest significant one.
 fn evidence(problem: Problem<'_>, solution: &Solution, next: &Solution) -> f64 {
     let misfit = problem.misfit(next.chi2);
-    (solution.chi2 - next.chi2) / (problem.significant_decrease() * misfit)
+    let significant = problem.significant_decrease(&next.parameters.residues);
+    (solution.chi2 - next.chi2) / (significant * misfit)
 }

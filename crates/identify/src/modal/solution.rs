@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! H(f) = R V_0(f) + sum of r_k V(f; w_k, zeta_k)        V: a mode of residue 1 through the measurement chain and a delay tau
+//!                 + sum of q_k V'(f; w_k, zeta_k)       with complex residues; V': its derivative by time, of numerator s
 //! chi^2 = sum over data of 2 |H_b - H(f_b)|^2 / v_b                      v_b = E|error|^2
 //! ```
 
@@ -9,7 +10,7 @@ use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
 use super::measurement_chain::{MeasurementChain, NodeResponse, Nodes, log_derivatives};
 use super::normal_equations::{NormalEquations, WeightedColumns};
-use super::parameters::{ModalParameters, Parameter};
+use super::parameters::{ModalParameters, Parameter, Residues};
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
 
@@ -28,11 +29,12 @@ impl Problem<'_> {
         (chi2 / (2 * self.data.len()) as f64).max(1.0)
     }
 
-    /// By how much chi^2 must decrease for three more parameters, chosen as the best of as many places as there are data, to be
-    /// significant: 3 ln 2N (Bayesian information criterion), and 2 ln N for the choice.
-    pub(super) fn significant_decrease(&self) -> f64 {
+    /// By how much chi^2 must decrease for the parameters of one more mode, chosen as the best of as many places as there are data, to
+    /// be significant: ln 2N for each parameter (Bayesian information criterion), three or, with a complex residue, four, and 2 ln N for
+    /// the choice.
+    pub(super) fn significant_decrease(&self, residues: &Residues) -> f64 {
         let n = self.data.len() as f64;
-        3.0 * (2.0 * n).ln() + 2.0 * n.ln()
+        residues.parameters_per_mode() * (2.0 * n).ln() + 2.0 * n.ln()
     }
 }
 
@@ -41,6 +43,8 @@ pub(super) struct Solution {
     pub(super) parameters: ModalParameters,
     /// Each mode with residue 1, with the delay.
     modes: Vec<Vec<Complex<f64>>>,
+    /// Each mode with rate 1 s/kg, with the delay; none if residues are real.
+    rates: Vec<Vec<Complex<f64>>>,
     /// A constant compliance of 1, with the delay.
     constant: Vec<Complex<f64>>,
     /// The data minus the model.
@@ -70,7 +74,7 @@ impl Solution {
     pub(super) fn of_modes(
         problem: Problem<'_>,
         parameters: ModalParameters,
-        modes: &[NodeResponse],
+        modes: &ModeResponses,
     ) -> Solution {
         let mut solution = Solution::components(problem, parameters, modes);
         if let Some(linear) = solution.best_residues(problem.data) {
@@ -83,12 +87,17 @@ impl Solution {
     fn components(
         problem: Problem<'_>,
         parameters: ModalParameters,
-        modes: &[NodeResponse],
+        modes: &ModeResponses,
     ) -> Solution {
         let nodes = problem.nodes;
         let delays = nodes.delays(parameters.delay_s);
+        let means = |responses: &[NodeResponse]| -> Vec<Vec<Complex<f64>>> {
+            let means = responses.iter().map(|mode| nodes.mean(mode, &delays));
+            means.collect()
+        };
         Solution {
-            modes: modes.iter().map(|mode| nodes.mean(mode, &delays)).collect(),
+            modes: means(&modes.residues),
+            rates: means(&modes.rates),
             constant: nodes.constant(&delays),
             parameters,
             residual: Vec::new(),
@@ -112,35 +121,50 @@ impl Solution {
     }
 
     fn residual_of(&self, b: usize, datum: &FrfDatum) -> Complex<f64> {
-        let terms = self.parameters.modes.iter().zip(&self.modes);
-        let sum: Complex<f64> = terms
-            .map(|(mode, response)| response[b] * mode.residue_per_kg)
-            .sum();
+        let modes = 0..self.modes.len();
+        let sum: Complex<f64> = modes.map(|k| self.of_mode(k, b)).sum();
         datum.response - sum - self.constant[b] * self.parameters.remainder_m_per_n
     }
 
-    /// The residues and R of least chi^2. Normal equations suffice: an error of theirs increases chi^2, and the step is rejected.
+    /// The response of mode `k` with its residue at datum `b`.
+    fn of_mode(&self, k: usize, b: usize) -> Complex<f64> {
+        let by_residue = self.modes[k][b] * self.parameters.modes[k].residue_per_kg;
+        match self.rates.get(k) {
+            None => by_residue,
+            Some(rate) => by_residue + rate[b] * self.parameters.rate_s_per_kg(k),
+        }
+    }
+
+    /// The residues, with their rates, and R of least chi^2, in the order of [`ModalParameters::with_linear`]. Normal equations suffice: an
+    /// error of theirs increases chi^2, and the step is rejected.
     fn best_residues(&self, data: &[FrfDatum]) -> Option<DVector<f64>> {
         let mut columns = WeightedColumns::new(data);
-        for response in self.modes.iter().chain([&self.constant]) {
+        let modes = self.modes.iter().chain(&self.rates);
+        for response in modes.chain([&self.constant]) {
             columns.add(response.iter().copied());
         }
         let responses = data.iter().map(|datum| datum.response);
         columns.normal_equations(responses).solve(|_| 0.0)
     }
 
-    /// The normal equations of a step in ln w, ln zeta, r, R and tau, in the order of [`ModalParameters::free`].
+    /// The normal equations of a step in ln w, ln zeta, r, q, R and, unless it is fixed, tau, in the order of [`ModalParameters::free`].
     pub(super) fn normal_equations(&self, data: &[FrfDatum]) -> NormalEquations {
         let mut columns = WeightedColumns::new(data);
-        for (mode, response) in self.parameters.modes.iter().zip(&self.modes) {
+        for (k, mode) in self.parameters.modes.iter().enumerate() {
             if mode.omega_rad_s != 0.0 {
-                let (by_omega, by_damping) = logarithm_columns(mode, response, data);
+                let (by_omega, by_damping) = self.logarithm_columns(k, data);
                 columns.add(by_omega.into_iter());
                 columns.add(by_damping.into_iter());
             }
-            columns.add(response.iter().copied());
+            columns.add(self.modes[k].iter().copied());
+            if let Some(rate) = self.rates.get(k) {
+                columns.add(rate.iter().copied());
+            }
         }
         columns.add(self.constant.iter().copied());
+        if self.parameters.has_fixed_delay {
+            return columns.normal_equations(self.residual.iter().copied());
+        }
         // Aliases have another phase. Neglecting it changes the step and the covariance by their share of the response, not the
         // minimum.
         let by_delay = self.residual.iter().zip(data).map(|(residual, datum)| {
@@ -150,7 +174,25 @@ impl Solution {
         columns.normal_equations(self.residual.iter().copied())
     }
 
-    /// The covariance of w (rad/s), zeta, r (1/kg) of each mode, R (m/N) and tau (s), in the order of
+    /// The derivatives of a mode's response to its ln w and ln zeta.
+    fn logarithm_columns(
+        &self,
+        k: usize,
+        data: &[FrfDatum],
+    ) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
+        let mode = &self.parameters.modes[k];
+        let derivatives = data.iter().enumerate().map(|(b, datum)| {
+            let [by_omega, by_damping] = log_derivatives(mode, datum.omega_rad_s());
+            let response = self.of_mode(k, b);
+            (
+                response * by_omega * mode.omega_rad_s,
+                response * by_damping * mode.damping_ratio,
+            )
+        });
+        derivatives.unzip()
+    }
+
+    /// The covariance of w (rad/s), zeta, r (1/kg), q (s/kg) if residues are complex, of each mode, R (m/N) and tau (s) unless it is fixed, in the order of
     /// [`ModalParameters::free`]; `None` where the data do not determine them.
     pub(super) fn covariance(&self, data: &[FrfDatum]) -> Option<DMatrix<f64>> {
         let free = self.parameters.free();
@@ -175,28 +217,25 @@ impl Solution {
     }
 }
 
-/// The response of each mode at the nodes of the data.
-pub(super) fn node_responses(
-    problem: Problem<'_>,
-    parameters: &ModalParameters,
-) -> Vec<NodeResponse> {
-    let modes = parameters.modes.iter();
-    modes.map(|mode| problem.nodes.mode(mode)).collect()
+/// The responses of modes at the nodes of the data.
+pub(super) struct ModeResponses {
+    /// Each mode with residue 1.
+    residues: Vec<NodeResponse>,
+    /// Each mode with rate 1 s/kg; none if residues are real.
+    rates: Vec<NodeResponse>,
 }
 
-/// The derivatives of a mode's response to its ln w and ln zeta.
-fn logarithm_columns(
-    mode: &ModalTerm,
-    response: &[Complex<f64>],
-    data: &[FrfDatum],
-) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
-    let derivatives = response.iter().zip(data).map(|(response, datum)| {
-        let [by_omega, by_damping] = log_derivatives(mode, datum.omega_rad_s());
-        let response = response * mode.residue_per_kg;
-        (
-            response * by_omega * mode.omega_rad_s,
-            response * by_damping * mode.damping_ratio,
-        )
-    });
-    derivatives.unzip()
+/// The response of each mode at the nodes of the data.
+pub(super) fn node_responses(problem: Problem<'_>, parameters: &ModalParameters) -> ModeResponses {
+    let of = |response: fn(&Nodes, &ModalTerm) -> NodeResponse| -> Vec<NodeResponse> {
+        let modes = parameters.modes.iter();
+        modes.map(|mode| response(problem.nodes, mode)).collect()
+    };
+    ModeResponses {
+        residues: of(Nodes::mode),
+        rates: match &parameters.residues {
+            Residues::Real => Vec::new(),
+            Residues::Complex(_) => of(Nodes::mode_rate),
+        },
+    }
 }

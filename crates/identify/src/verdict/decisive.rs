@@ -8,12 +8,12 @@
 //! theta' = theta +- q C e_k/sqrt(C_kk)             q: the quantile of the required certainty, 3.1 for one look
 //! ```
 //!
-//! If the number of CNMP pairs stays the same, the sign has no effect on the verdict.
+//! If the number of CNMP pairs stays the same, the sign has no effect on the verdict. Complex residues have no sign.
 
 use super::input::VerdictInput;
 use crate::modal::{ModalParameters, Parameter};
 use bench_plant::PlantError;
-use bench_plant::zeros::{ModalSum, ZeroKind};
+use bench_plant::zeros::ZeroKind;
 
 /// The first mode of the verdict, by its index, whose sign is uncertain and changes the number of CNMP pairs.
 ///
@@ -22,6 +22,9 @@ use bench_plant::zeros::{ModalSum, ZeroKind};
 pub(super) fn decisive_uncertain_mode(
     input: &VerdictInput<'_>,
 ) -> Result<Option<usize>, PlantError> {
+    if !input.fit.parameters.has_real_residues() {
+        return Ok(None);
+    }
     let pairs = cnmp_pairs(input, &input.fit.parameters)?;
     let modes = input.fit.modes();
     let is_decisive = |k: &usize| {
@@ -64,8 +67,7 @@ fn with_shifted_residue(
 
 /// Number of CNMP pairs in the band of the verdict.
 fn cnmp_pairs(input: &VerdictInput<'_>, parameters: &ModalParameters) -> Result<usize, PlantError> {
-    let sum = ModalSum::new(parameters.modes.clone(), parameters.remainder_m_per_n)?;
-    let zeros = sum.damped_zeros()?;
+    let zeros = parameters.sum()?.damped_zeros()?;
     let pairs = zeros.iter().filter(|zero| {
         zero.kind == ZeroKind::Cnmp && zero.s.im > 0.0 && input.covers(zero.s.norm())
     });

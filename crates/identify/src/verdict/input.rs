@@ -1,7 +1,7 @@
 //! Input of a verdict, and the certainty that it requires.
 
-use crate::FrfDatum;
 use crate::modal::{FittedMode, MeasurementChain, ModalFit};
+use crate::{Estimate, FrfDatum};
 
 /// Largest number of looks of an experiment at its data.
 pub const MAX_LOOKS: usize = 8;
@@ -105,12 +105,23 @@ impl VerdictInput<'_> {
     pub(super) fn has_certain_sign(&self, mode: &FittedMode) -> bool {
         self.certainty.allows(mode.sign_error_probability())
     }
+
+    /// Whether a residue is certainly not 0: the sign of a real one, or of a part of a complex one, is certain.
+    pub(super) fn has_certain_residue(&self, mode: &FittedMode) -> bool {
+        let is_certain = |part: Estimate| {
+            let magnitude = Estimate {
+                value: part.value.abs(),
+                ..part
+            };
+            self.certainty.allows(magnitude.below_zero_probability())
+        };
+        self.has_certain_sign(mode) || mode.residue_imaginary_per_kg.is_some_and(is_certain)
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Estimate;
 
     #[test]
     fn quantile_belongs_to_the_error_probability() {

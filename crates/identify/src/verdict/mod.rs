@@ -9,6 +9,9 @@
 //! 3. the phase drop of the measured response beyond Bode's relation, compared with that of the fitted zeros over the same band
 //!    ([`PhaseDrop`]).
 //!
+//! With complex residues, of damping that is not proportional, the second one does not apply, and the zeros are computed from the complex
+//! residues ([`crate::modal::Residues`]).
+//!
 //! Only what can change the verdict is evaluated: a residue of uncertain sign prevents a verdict only if the number of CNMP pairs
 //! depends on it, and a real zero may lie on either side.
 //!
@@ -37,6 +40,7 @@ use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::FrfDatum;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit};
 use bench_base::decimal::Decimal;
 use bench_plant::zeros::ZeroKind;
@@ -49,14 +53,13 @@ const UNCONFIRMED_SIGMAS: f64 = 6.0;
 const CONFIRMED_DEG: f64 = 180.0;
 /// Relative accuracy of a fit: a zero closer to the imaginary axis is on neither side.
 const FIT_ACCURACY: f64 = 1e-4;
-/// With a larger reduced chi-square the fit does not describe the stage.
-pub const MAX_CHI2_PER_FREEDOM: f64 = 4.0;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
 
 const NO_PHASE: &str = "the response is not significant against its noise over the modes, so that its phase cannot be checked; increase the amplitude or the duration of the excitation";
 const TOO_FEW_MODES: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
 const NO_CNMP: &str = "all zeros of the fit lie left of the imaginary axis, and the phase lag is that of a minimum-phase system of this magnitude";
+const COMPLEX_RESIDUES: &str = "the residues are complex: the damping is not proportional, or there is a filter or an additional lag between input and output; the zeros are computed from the complex residues, and are those of the whole response from input to output; the rule about the signs of residues does not apply";
 const NO_OPPOSITE_NEIGHBOURS: &str = "the fit has CNMP zeros, but no two neighbouring modes with residues of opposite signs, which are necessary for them; compare response and fit in the Bode plot, and increase the amplitude or the duration of the excitation";
 
 /// Whether there are CNMP zeros.
@@ -149,7 +152,7 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
         None => match phase_drop {
-            Some(phase_drop) => evaluate(&zeros, &signs_of(input), phase_drop),
+            Some(phase_drop) => evaluate(&zeros, certain_signs(input).as_deref(), phase_drop),
             None => (Cnmp::Undecided, no_phase_drop(modes.len()).into()),
         },
     };
@@ -159,7 +162,15 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         zeros,
         phase_drop,
     };
+    let is_complex = !input.fit.parameters.has_real_residues();
+    let verdict = verdict.with(is_complex.then(|| COMPLEX_RESIDUES.into()));
     Ok(verdict.with(left_out(input.fit)))
+}
+
+/// The certain signs of real residues; complex ones have none.
+fn certain_signs(input: &VerdictInput<'_>) -> Option<Vec<f64>> {
+    let is_real = input.fit.parameters.has_real_residues();
+    is_real.then(|| signs_of(input))
 }
 
 /// The frequencies that are not fitted, as a caution.
@@ -260,8 +271,12 @@ fn is_on_axis(zero: &UncertainZero) -> bool {
     !is_off
 }
 
-/// The verdict from zeros that all have a certain side: the other two criteria must agree.
-fn evaluate(zeros: &[UncertainZero], signs: &[f64], phase_drop: PhaseDrop) -> (Cnmp, String) {
+/// The verdict from zeros that all have a certain side: the other two criteria must agree. There are no signs of complex residues.
+fn evaluate(
+    zeros: &[UncertainZero],
+    signs: Option<&[f64]>,
+    phase_drop: PhaseDrop,
+) -> (Cnmp, String) {
     let pairs = cnmp_pairs(zeros);
     let agrees = phase_drop.deviation_deg() <= MAX_PHASE_DEVIATION_DEG;
     if !agrees {
@@ -270,7 +285,7 @@ fn evaluate(zeros: &[UncertainZero], signs: &[f64], phase_drop: PhaseDrop) -> (C
         (Cnmp::Excluded, excluded(zeros))
     } else if let Some(zero) = unconfirmed(zeros, pairs, phase_drop) {
         (Cnmp::Undecided, unconfirmed_reason(zero))
-    } else if !has_opposite_neighbours(signs) {
+    } else if signs.is_some_and(|signs| !has_opposite_neighbours(signs)) {
         (Cnmp::Undecided, NO_OPPOSITE_NEIGHBOURS.into())
     } else {
         (Cnmp::Detected, detected(pairs, signs, phase_drop))
@@ -345,11 +360,14 @@ fn unconfirmed_reason(zero: &UncertainZero) -> String {
     )
 }
 
-fn detected(pairs: usize, signs: &[f64], phase_drop: PhaseDrop) -> String {
+fn detected(pairs: usize, signs: Option<&[f64]>, phase_drop: PhaseDrop) -> String {
     let plural = if pairs == 1 { "" } else { "s" };
-    let symbol = |residue: &f64| Sign::of(*residue).symbol();
-    let signs: String = signs.iter().map(symbol).collect();
-    let found = format!("{pairs} pair{plural} of CNMP zeros, residues of opposite signs ({signs})");
+    let of_signs = signs.map_or_else(String::new, |signs| {
+        let symbol = |residue: &f64| Sign::of(*residue).symbol();
+        let signs: String = signs.iter().map(symbol).collect();
+        format!(", residues of opposite signs ({signs})")
+    });
+    let found = format!("{pairs} pair{plural} of CNMP zeros{of_signs}");
     if phase_drop.predicted_deg < CONFIRMED_DEG * pairs as f64 {
         return format!(
             "{found}; the response around the zeros is noise, so that the phase does not confirm them"

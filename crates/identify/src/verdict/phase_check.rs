@@ -47,9 +47,9 @@ pub(super) fn phase_drop_over(
     Ok(Some(phase_drop(&curve, &roots(input, zeros), from, to - 1)))
 }
 
-/// The highest mode with a certain sign or pair of zeros of the verdict.
+/// The highest mode with a certain residue or pair of zeros of the verdict.
 fn last_rad_s(input: &VerdictInput<'_>, modes: &[FittedMode], zeros: &[UncertainZero]) -> f64 {
-    let certain = modes.iter().filter(|mode| input.has_certain_sign(mode));
+    let certain = modes.iter().filter(|mode| input.has_certain_residue(mode));
     let modes = certain.map(|mode| mode.omega_rad_s.value);
     let pairs = zeros.iter().filter(|zero| zero.s.im > 0.0);
     let pairs = pairs
@@ -63,7 +63,7 @@ fn curve(input: &VerdictInput<'_>) -> Result<PhaseCurve, PlantError> {
     let parameters = &input.fit.parameters;
     let used = input.fit.used_data(input.frf_data);
     let data = significant_range(merged(&used, parameters));
-    let sum = ModalSum::new(parameters.modes.clone(), parameters.remainder_m_per_n)?;
+    let sum = parameters.sum()?;
     let omega_rad_s: Vec<f64> = data.iter().map(FrfDatum::omega_rad_s).collect();
     let fitted: Vec<Complex<f64>> = omega_rad_s
         .iter()

@@ -1,7 +1,7 @@
 //! The zeros of a fit, each with its covariance.
 //!
 //! ```text
-//! G(z) = R + sum of r q,   q = 1/(z^2 + 2 zeta w z + w^2)           dz = - (dG/dtheta . dtheta) / (dG/dz)
+//! G(z) = R + sum of (r + q z)/(z^2 + 2 zeta w z + w^2)              dz = - (dG/dtheta . dtheta) / (dG/dz)
 //! ```
 //!
 //! With the rows Re and Im of -(dG/dtheta)/(dG/dz) as J, the covariance of (Re z, Im z) is J cov(theta) J^T. Where two zeros
@@ -11,9 +11,9 @@ use nalgebra::{Complex, DMatrix};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use crate::Estimate;
-use crate::modal::{ModalFit, by_denominator, mechanics_derivative};
+use crate::modal::{ModalFit, mechanics_derivative, mechanics_slope};
 use bench_plant::PlantError;
-use bench_plant::zeros::{ModalSum, ModalTerm, ZeroKind};
+use bench_plant::zeros::ZeroKind;
 
 /// A zero with its covariance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,10 +55,7 @@ impl Serialize for UncertainZero {
 /// # Errors
 /// When the zeros cannot be computed.
 pub fn zeros(fit: &ModalFit) -> Result<Vec<UncertainZero>, PlantError> {
-    let sum = ModalSum::new(
-        fit.parameters.modes.clone(),
-        fit.parameters.remainder_m_per_n,
-    )?;
+    let sum = fit.parameters.sum()?;
     let above = sum
         .damped_zeros()?
         .into_iter()
@@ -96,16 +93,11 @@ fn zero_covariance(fit: &ModalFit, s: Complex<f64>) -> [[f64; 2]; 2] {
 
 /// d(Re z)/d theta and d(Im z)/d theta, 2 x parameters.
 pub(super) fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
-    let by_z: Complex<f64> = fit
-        .parameters
-        .modes
-        .iter()
-        .map(|mode| derivative_by_z(mode, z))
-        .sum();
+    let by_z = mechanics_slope(&fit.parameters, z);
     let free = fit.parameters.free();
     let moves: Vec<Complex<f64>> = free
         .iter()
-        .map(|parameter| -mechanics_derivative(&fit.parameters.modes, *parameter, z) / by_z)
+        .map(|parameter| -mechanics_derivative(&fit.parameters, *parameter, z) / by_z)
         .collect();
     DMatrix::from_fn(2, moves.len(), |row, column| {
         if row == 0 {
@@ -114,8 +106,4 @@ pub(super) fn derivatives(fit: &ModalFit, z: Complex<f64>) -> DMatrix<f64> {
             moves[column].im
         }
     })
-}
-
-fn derivative_by_z(mode: &ModalTerm, z: Complex<f64>) -> Complex<f64> {
-    by_denominator(mode, z) * (z * 2.0 + 2.0 * mode.damping_ratio * mode.omega_rad_s)
 }

@@ -320,7 +320,8 @@ fn zeros_of_square(u: Complex<f64>) -> [Zero; 2] {
     }
 }
 
-fn damped_zero(s: Complex<f64>, undamped: &[Zero]) -> Zero {
+/// A zero with damping. In the left half plane it has the kind of the nearest zero without damping.
+pub(super) fn damped_zero(s: Complex<f64>, undamped: &[Zero]) -> Zero {
     let distance = |zero: &Zero| (zero.s - s).norm();
     let nearest = undamped
         .iter()
@@ -335,7 +336,7 @@ fn damped_zero(s: Complex<f64>, undamped: &[Zero]) -> Zero {
     Zero { s, kind }
 }
 
-fn sorted(mut zeros: Vec<Zero>) -> Vec<Zero> {
+pub(super) fn sorted(mut zeros: Vec<Zero>) -> Vec<Zero> {
     let key = |zero: &Zero| (zero.s.im.abs(), zero.s.re, zero.s.im);
     zeros.sort_by(|a, b| {
         key(a)

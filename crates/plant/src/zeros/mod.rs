@@ -11,11 +11,14 @@
 mod kinds;
 mod locus;
 mod map;
+mod rational;
 mod sum;
+mod term;
 
 pub use kinds::{
     Zero, ZeroCounts, ZeroKind, cnmp_pairs, damped_zeros, phase_drop_deg, undamped_zeros,
 };
 pub use locus::{Crossing, KindChange, Locus, LocusPlane};
 pub use map::cnmp_map;
-pub use sum::{ModalSum, ModalTerm};
+pub use sum::ModalSum;
+pub use term::ModalTerm;

@@ -2,56 +2,16 @@
 //! G(s) = R + sum of r_i/(s^2 + 2 zeta_i w_i s + w_i^2) (Eqs. 3-2, 3-6, 3-10, 3-11 with beta = 0).
 //!
 //! A mode of w = 0 is a double integrator r/s^2. The constant represents a mode far above all others.
+//!
+//! With damping that is not proportional the residues are complex: the numerators are r_i + q_i s, with the rates q_i in s/kg.
 
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::Zero;
 use super::kinds::{self, System};
-use crate::{ModalModel, Mode, PlantError, Sign};
-
-/// One mode by frequency, damping and residue.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModalTerm {
-    /// Undamped natural frequency in rad/s; 0 for a double integrator.
-    pub omega_rad_s: f64,
-    /// Damping ratio.
-    pub damping_ratio: f64,
-    /// Residue in 1/kg.
-    pub residue_per_kg: f64,
-}
-
-impl ModalTerm {
-    /// A mode without damping.
-    pub fn undamped(omega_rad_s: f64, residue_per_kg: f64) -> ModalTerm {
-        ModalTerm {
-            omega_rad_s,
-            damping_ratio: 0.0,
-            residue_per_kg,
-        }
-    }
-
-    /// 1/(s^2 + 2 zeta w s + w^2) in s^2.
-    pub fn resonance(&self, s: Complex<f64>) -> Complex<f64> {
-        let (w, zeta) = (self.omega_rad_s, self.damping_ratio);
-        (s * s + s * (2.0 * zeta * w) + w * w).inv()
-    }
-
-    /// Its contribution to the undamped G at s = j `omega_rad_s`, in m/N.
-    pub fn part(&self, omega_rad_s: f64) -> f64 {
-        let (w, omega) = (self.omega_rad_s, omega_rad_s);
-        self.residue_per_kg / ((w - omega) * (w + omega))
-    }
-}
-
-impl From<&Mode> for ModalTerm {
-    fn from(mode: &Mode) -> ModalTerm {
-        ModalTerm {
-            omega_rad_s: mode.omega_rad_s,
-            damping_ratio: mode.damping_ratio,
-            residue_per_kg: mode.residue_per_kg(),
-        }
-    }
-}
+use super::rational;
+use super::term::ModalTerm;
+use crate::{ModalModel, PlantError, Sign};
 
 /// The sum, lowest frequency first.
 ///
@@ -68,6 +28,8 @@ impl From<&Mode> for ModalTerm {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModalSum {
     terms: Vec<ModalTerm>,
+    /// q of each term in s/kg; empty if all residues are real.
+    rates_s_per_kg: Vec<f64>,
     constant_m_per_n: f64,
 }
 
@@ -81,6 +43,42 @@ impl ModalSum {
         }
         Ok(ModalSum {
             terms,
+            rates_s_per_kg: Vec::new(),
+            constant_m_per_n,
+        })
+    }
+
+    /// A sum of modes with complex residues, in any order, each with its rate q in s/kg:
+    ///
+    /// ```text
+    /// G(s) = R + sum of (r_i + q_i s)/(s^2 + 2 zeta_i w_i s + w_i^2)
+    /// ```
+    ///
+    /// # Errors
+    /// When all residues, all rates and the constant are zero.
+    ///
+    /// ```
+    /// use bench_plant::zeros::{ModalSum, ModalTerm};
+    ///
+    /// // (3 + s)/(s^2 + 4) has one zero, at s = -3.
+    /// let mode = ModalTerm::undamped(2.0, 3.0);
+    /// let zeros = ModalSum::with_rates(vec![(mode, 1.0)], 0.0)?.damped_zeros()?;
+    /// assert!(zeros.len() == 1 && (zeros[0].s.re + 3.0).abs() < 1e-14 && zeros[0].s.im == 0.0);
+    /// # Ok::<(), bench_plant::PlantError>(())
+    /// ```
+    pub fn with_rates(
+        mut terms: Vec<(ModalTerm, f64)>,
+        constant_m_per_n: f64,
+    ) -> Result<ModalSum, PlantError> {
+        terms.retain(|(term, rate)| term.residue_per_kg != 0.0 || *rate != 0.0);
+        terms.sort_by(|(a, _), (b, _)| a.omega_rad_s.total_cmp(&b.omega_rad_s));
+        if terms.is_empty() && constant_m_per_n == 0.0 {
+            return Err(PlantError::NoResponse);
+        }
+        let (terms, rates_s_per_kg) = terms.into_iter().unzip();
+        Ok(ModalSum {
+            terms,
+            rates_s_per_kg,
             constant_m_per_n,
         })
     }
@@ -121,17 +119,30 @@ impl ModalSum {
             .terms
             .iter()
             .map(|term| term.resonance(s) * term.residue_per_kg);
-        parts.sum::<Complex<f64>>() + self.constant_m_per_n
+        let rates = self.terms.iter().zip(&self.rates_s_per_kg);
+        let rates = rates.map(|(term, rate)| term.resonance(s) * s * *rate);
+        parts.chain(rates).sum::<Complex<f64>>() + self.constant_m_per_n
     }
 
-    /// Zeros without damping, lowest frequency first.
+    /// Zeros without damping, and without the rates, which damping causes, lowest frequency first.
     pub fn undamped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
         self.zeros_by(kinds::undamped)
     }
 
     /// Zeros with damping, lowest frequency first.
     pub fn damped_zeros(&self) -> Result<Vec<Zero>, PlantError> {
-        self.zeros_by(kinds::damped)
+        if self.rates_s_per_kg.iter().all(|rate| *rate == 0.0) {
+            return self.zeros_by(kinds::damped);
+        }
+        let undamped = self.undamped_zeros()?;
+        let terms: Vec<(ModalTerm, f64)> = self.terms.iter().copied().zip(self.rates()).collect();
+        let zeros = rational::zeros(&terms, self.constant_m_per_n)?;
+        let zeros = zeros.into_iter().map(|s| kinds::damped_zero(s, &undamped));
+        Ok(kinds::sorted(zeros.collect()))
+    }
+
+    fn rates(&self) -> impl Iterator<Item = f64> {
+        self.rates_s_per_kg.iter().copied()
     }
 
     /// Computes the zeros of an equivalent system: one unit mass on a spring per mode, with sqrt(|residue|) as force

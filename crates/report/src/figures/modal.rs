@@ -7,9 +7,22 @@ use bench_base::units::hz;
 use bench_identify::modal::{FittedMode, SIGMAS_95};
 use bench_identify::verdict::UncertainZero;
 
-/// The modes with their 95 % confidence intervals. A sign is `?` if the interval of the residue contains 0.
+/// What the signs and columns of complex residues mean.
+pub const COMPLEX_RESIDUES_NOTE: &str = "c: a complex residue, which has no sign; its parts are those of the numerator at the natural frequency (the damping is not proportional, or there is a filter or an additional lag between input and output)";
+
+/// Whether residues of the table are complex, so that [`COMPLEX_RESIDUES_NOTE`] belongs to it.
+pub fn has_complex_residues(modes: &[FittedMode]) -> bool {
+    let mut modes = modes.iter();
+    modes.any(|mode| mode.residue_imaginary_per_kg.is_some())
+}
+
+/// The modes with their 95 % confidence intervals. A sign is `?` if the interval of the residue contains 0, and `c` of a complex residue,
+/// whose imaginary part has a column of its own.
 /// The probability of the other sign is for pages.
 pub fn mode_table(modes: &[FittedMode], residue_unit: &str, width: Width) -> Table {
+    if has_complex_residues(modes) {
+        return complex_mode_table(modes, residue_unit);
+    }
     let residue = format!("Residue ({residue_unit})");
     let columns = ["Frequency (Hz)", "Damping ratio", &residue, "Sign"];
     let columns = columns
@@ -28,6 +41,30 @@ fn mode_row(mode: &FittedMode, width: Width) -> Vec<String> {
     ];
     cells.extend(width.page_only(percent(mode.sign_error_probability())));
     cells
+}
+
+/// The table of modes with complex residues: real and imaginary part of r + j q w.
+fn complex_mode_table(modes: &[FittedMode], residue_unit: &str) -> Table {
+    let real = format!("Residue ({residue_unit})");
+    let columns = [
+        "Frequency (Hz)",
+        "Damping ratio",
+        &real,
+        "Imaginary part",
+        "Sign",
+    ];
+    Table::new(columns).with_rows(modes.iter().map(complex_mode_row))
+}
+
+fn complex_mode_row(mode: &FittedMode) -> Vec<String> {
+    let imaginary = mode.residue_imaginary_per_kg;
+    vec![
+        interval_of(mode.frequency_hz()),
+        interval_of(mode.damping_ratio),
+        interval_of(mode.residue_per_kg),
+        imaginary.map_or_else(String::new, interval_of),
+        mode.certain_sign().to_string(),
+    ]
 }
 
 /// The zeros; of a conjugate pair the one above the real axis.
@@ -70,6 +107,7 @@ mod tests {
             omega_rad_s: estimate(184.0),
             damping_ratio: estimate(0.05),
             residue_per_kg: estimate(-0.5),
+            residue_imaginary_per_kg: None,
         };
         let [page, terminal] =
             [Width::Page, Width::Terminal].map(|w| mode_table(&[mode], "1/kg", w));
@@ -78,5 +116,28 @@ mod tests {
         assert_eq!(page.rows[0][3..], ["\u{2212}", "below 0.01 %"]);
         assert_eq!(page.columns[..4], terminal.columns);
         assert_eq!(page.rows[0][..4], terminal.rows[0]);
+    }
+
+    #[test]
+    fn complex_residue_has_two_parts_and_no_sign() {
+        let estimate = |value: f64| Estimate { value, sigma: 0.01 };
+        let mode = FittedMode {
+            omega_rad_s: estimate(184.0),
+            damping_ratio: estimate(0.05),
+            residue_per_kg: estimate(-0.5),
+            residue_imaginary_per_kg: Some(estimate(0.25)),
+        };
+        assert!(has_complex_residues(&[mode]));
+        for width in [Width::Page, Width::Terminal] {
+            let table = mode_table(&[mode], "1/kg", width);
+            assert_eq!(
+                table.columns[2..],
+                ["Residue (1/kg)", "Imaginary part", "Sign"]
+            );
+            assert_eq!(
+                table.rows[0][3..],
+                [interval_of(estimate(0.25)), "c".into()]
+            );
+        }
     }
 }

@@ -6,6 +6,7 @@ use super::page::{delay_ms, named};
 use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
+use bench_identify::modal::ModalFit;
 use bench_identify::{ExternalAnalysis, OutputKind, Unit};
 
 /// An analysed table of samples.
@@ -63,7 +64,10 @@ impl<'a> ExternalRecord<'a> {
             signs: None,
             verdict: &analysis.verdict,
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
-            evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),
+            evidence: named([(
+                "Delay by the fit",
+                fit.and_then(ModalFit::determined_delay_s).map(delay_ms),
+            )]),
             further_plots: plot.transpose()?.into_iter().collect(),
             before_plots: String::new(),
             after_plots: self.description(),

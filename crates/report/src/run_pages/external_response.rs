@@ -7,6 +7,7 @@ use crate::MagnitudeAxis;
 use crate::html::{facts, section};
 use bench_experiment::ExternalResponse;
 use bench_identify::Unit;
+use bench_identify::modal::ModalFit;
 use bench_identify::{ResponseAnalysis, scatter::SigmaSource};
 
 /// An analysed frequency response.
@@ -47,7 +48,10 @@ impl<'a> ResponseReport<'a> {
             signs: None,
             verdict: &analysis.verdict,
             judged_up_to_rad_s: analysis.judged_up_to_rad_s,
-            evidence: named([("Delay by the fit", fit.map(|fit| delay_ms(fit.delay_s())))]),
+            evidence: named([(
+                "Delay by the fit",
+                fit.and_then(ModalFit::determined_delay_s).map(delay_ms),
+            )]),
             further_plots: Vec::new(),
             before_plots: String::new(),
             after_plots: self.description(),

@@ -3,7 +3,9 @@
 use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
-use crate::figures::{interval_of, mode_table, zero_table};
+use crate::figures::{
+    COMPLEX_RESIDUES_NOTE, has_complex_residues, interval_of, mode_table, zero_table,
+};
 use crate::html::{document_with_plots, escaped, facts, note, section};
 use crate::table::{Table, Width};
 use bench_base::decimal::Decimal;
@@ -107,7 +109,11 @@ fn modes(report: &RecordReport<'_>) -> String {
         return String::new();
     };
     let table = mode_table(&fit.modes(), &report.residue_unit, Width::Page);
-    table_section("Modes", "± is the 95 % confidence interval.", &table)
+    let mut text = "± is the 95 % confidence interval.".to_string();
+    if has_complex_residues(&fit.modes()) {
+        text += &format!(" {COMPLEX_RESIDUES_NOTE}.");
+    }
+    table_section("Modes", &text, &table)
 }
 
 fn zeros(report: &RecordReport<'_>) -> String {

@@ -118,7 +118,7 @@ impl Stage {
         let parameters = ModalParameters {
             modes: modes.collect(),
             remainder_m_per_n: REMAINDER,
-            delay_s: 0.0,
+            ..ModalParameters::default()
         };
         let free = parameters.free().len();
         ModalFit {

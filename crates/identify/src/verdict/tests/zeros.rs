@@ -45,7 +45,7 @@ fn one_mode(ratio: f64) -> ModalFit {
     let parameters = ModalParameters {
         modes: vec![mode],
         remainder_m_per_n,
-        delay_s: 0.0,
+        ..ModalParameters::default()
     };
     ModalFit {
         parameters,
