@@ -13,6 +13,7 @@ use bench_base::input_file::MAX_RECORD_BYTES;
 
 use super::entry::Entry;
 use super::error::FrfTableError;
+use super::unit::{UNSTATED_INPUT, UNSTATED_OUTPUT};
 use crate::error::{ColumnsError, DataError, ExternalCsvError, Place};
 
 /// Columns of real numbers.
@@ -200,8 +201,8 @@ fn ratio(numerator: Option<&str>, denominator: Option<&str>) -> String {
         (Some(both), None) if both.contains('/') => both.into(),
         (numerator, denominator) => {
             let (output, input) = (
-                numerator.unwrap_or("output"),
-                denominator.unwrap_or("input"),
+                numerator.unwrap_or(UNSTATED_OUTPUT),
+                denominator.unwrap_or(UNSTATED_INPUT),
             );
             format!("{output}/{input}")
         }

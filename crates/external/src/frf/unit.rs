@@ -30,6 +30,11 @@ pub struct ResponseUnit {
     pub input: String,
 }
 
+/// In place of the unit of an output, where only that of the input is stated.
+pub(super) const UNSTATED_OUTPUT: &str = "output";
+/// In place of the unit of an input, where only that of the output is stated.
+pub(super) const UNSTATED_INPUT: &str = "input";
+
 /// Symbols that names of columns write in lower case.
 const SYMBOLS: [(&str, &str); 8] = [
     ("a", "A"),
@@ -68,10 +73,10 @@ impl ResponseUnit {
         })
     }
 
-    /// Whether it is metres per ampere.
+    /// Whether it is metres per ampere, as far as it is stated.
     pub(super) fn is_metres_per_ampere(&self) -> bool {
-        const METRES: [&str; 5] = ["m", "metre", "metres", "meter", "meters"];
-        const AMPERES: [&str; 5] = ["a", "amp", "amps", "ampere", "amperes"];
+        const METRES: [&str; 6] = ["m", "metre", "metres", "meter", "meters", UNSTATED_OUTPUT];
+        const AMPERES: [&str; 6] = ["a", "amp", "amps", "ampere", "amperes", UNSTATED_INPUT];
         let output = self.output.to_lowercase();
         // `displacement_m` of `mag_displacement_m_per_a`.
         let is_in_metres = output
@@ -174,6 +179,10 @@ mod tests {
             ("|G| [m/A, peak]", "", true),
             ("mag_displacement_m_per_current_a", "", true),
             ("magnitude", "m/A", true),
+            ("magnitude", "m/input", true),
+            ("magnitude", "mm/input", false),
+            ("magnitude", "output/A", true),
+            ("magnitude", "output/N", false),
             ("magnitude", "A/m", false),
             ("magnitude", "g/A", false),
             ("magnitude", "m/kN", false),
