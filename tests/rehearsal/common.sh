@@ -2,8 +2,8 @@
 # file of the host would make the machine wait, and its clock leaps while it waits.
 set -u
 out=$2
-mkdir -p /tmp/bench && cp "$1" /tmp/bench/bench && cp "$(dirname "$0")"/*.toml /tmp/bench/ && cd /tmp/bench || exit 1
-export XDG_STATE_HOME=/tmp/bench/state
+mkdir -p /run/rehearsal && cp "$1" /run/rehearsal/bench && cp "$(dirname "$0")"/*.toml /run/rehearsal/ && cd /run/rehearsal || exit 1
+export XDG_STATE_HOME=/run/rehearsal/state
 ip link add vcan0 type vcan && ip link set vcan0 up || exit 1
 
 # run NAME ARGUMENT...: a run of the bench; report, messages and exit code are stored under this name.
@@ -37,8 +37,8 @@ closed() {
 act() {
   log=$1
   shift
-  rm -f /tmp/probe # of an emulator that was killed
-  chrt --fifo 70 ./bench emulate amplifier probe --config real.toml --pty /tmp/probe --log "$log.jsonl" "$@" >"$log.out" 2>&1 &
+  rm -f /run/probe # of an emulator that was killed
+  chrt --fifo 70 ./bench emulate amplifier probe --config real.toml --pty /run/probe --log "$log.jsonl" "$@" >"$log.out" 2>&1 &
   device=$!
   sleep 1
 }

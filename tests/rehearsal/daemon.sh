@@ -2,7 +2,7 @@
 # The daemon inside the virtual machine, on vcan0 and a terminal: runs by the commands and by the HTTP interface, and each way in
 # which cable, devices or daemon can fail. See common.sh for the arguments. `curl` is that of the host.
 . "$(dirname "$0")/common.sh"
-export BENCH_SOCKET=/tmp/bench/bench.sock
+export BENCH_SOCKET=/run/rehearsal/bench.sock
 mkdir lib && cp "$(command -v curl)" lib/ && ldd lib/curl | awk '/=> \// { print $3 }' | xargs -I{} cp {} lib/ || exit 1
 
 # api METHOD PATH [ARGUMENT...]: one request to the daemon.

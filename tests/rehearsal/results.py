@@ -36,8 +36,8 @@ def journal(name):
 
 
 def stored(path):
-    """The copy of a file of the machine. A command names it in its folder, which is /tmp/bench, the daemon by its whole path."""
-    return folder / path.removeprefix("/tmp/bench/")
+    """The copy of a file of the machine. A command names it in its folder, which is /run/rehearsal, the daemon by its whole path."""
+    return folder / path.removeprefix("/run/rehearsal/")
 
 
 def recording(name):
