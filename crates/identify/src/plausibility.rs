@@ -118,8 +118,10 @@ fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
     (square > 0.0).then(|| product / square)
 }
 
+/// An output that precedes its input. The delay of modes that do not describe the response is none of the output.
 fn early(seen: &Observation<'_>) -> Option<String> {
-    let delay = seen.fit.as_ref().ok()?.determined_delay_s()?;
+    let fit = seen.fit.as_ref().ok().filter(|fit| describes(fit))?;
+    let delay = fit.determined_delay_s()?;
     let limit_s = (EARLY_SAMPLES / seen.source.rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
         format!(

@@ -45,6 +45,7 @@ pub use parameters::{ModalParameters, Parameter, Residues};
 pub use search::ModelOrder;
 
 use crate::FrfDatum;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 pub use crate::{Estimate, SIGMAS_95};
 pub use merge::merged;
 use prune::{pruned, without_least_certain};
@@ -53,6 +54,8 @@ use residual_noise::with_residual_noise;
 pub(crate) use sensitivity::{mechanics_derivative, mechanics_slope};
 use solution::{Problem, Solution};
 
+/// Modes that are left out, because the data do not determine them, must not increase chi^2 by this factor.
+const MUCH_WORSE: f64 = 1.5;
 /// Progress at the end of the search; the rest is the final fit.
 const SEARCH_PROGRESS: f64 = 0.8;
 
@@ -192,7 +195,8 @@ fn too_few(data: &[FrfDatum]) -> FitError {
     }
 }
 
-/// The fit of the needed modes, as many as the data determine with the residual as noise; without orders and band.
+/// The fit of the needed modes, as many as the data determine with the residual as noise; without orders and band. If they describe the
+/// data much worse than all of them, the modes are not determined.
 fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, FitError> {
     let data = &merged(problem.data, &start);
     if 2 * data.len() <= start.free().len() {
@@ -202,10 +206,20 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
     let mut parameters = pruned(problem, with_determined_delay(problem, start));
+    let misfit = |parameters: &ModalParameters| {
+        problem.misfit(Solution::new(problem, parameters.clone()).chi2)
+    };
+    let with_all = FitError::Undetermined {
+        modes: parameters.modes.len(),
+    };
+    let max_misfit = MAX_CHI2_PER_FREEDOM.max(MUCH_WORSE * misfit(&parameters));
     loop {
         match with_covariance(problem, parameters.clone()) {
             Err(FitError::Undetermined { modes }) if modes > 1 => {
                 parameters = without_least_certain(problem, parameters);
+                if misfit(&parameters) > max_misfit {
+                    return Err(with_all);
+                }
             }
             result => return result,
         }
