@@ -2,7 +2,11 @@
 
 use super::table::{result_table, wrap};
 use bench_experiment::outputs::ModalSummary;
-use bench_report::figures::{COMPLEX_RESIDUES_NOTE, has_complex_residues, mode_table, zero_table};
+use bench_identify::modal::FittedMode;
+use bench_report::figures::{
+    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, mode_table, outside_band_note,
+    zero_table,
+};
 use bench_report::table::Width;
 
 /// Tables of modes and zeros, and the verdict.
@@ -12,8 +16,7 @@ pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
     if summary.modes.is_empty() {
         return verdict;
     }
-    let modes = mode_table(&summary.modes, residue_unit, Width::Terminal);
-    let modes = result_table(&modes);
+    let modes = mode_tables(summary, residue_unit);
     let zeros = zero_table(&summary.zeros);
     let zeros = if zeros.is_empty() {
         "no zeros in the band of the verdict\n".into()
@@ -26,4 +29,19 @@ pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
         String::new()
     };
     format!("\n{modes}\n{zeros}\n± is the 95 % confidence interval\n{note}{verdict}")
+}
+
+/// The modes in the band, and those outside in a table of their own.
+fn mode_tables(summary: &ModalSummary, residue_unit: &str) -> String {
+    let table =
+        |modes: &[FittedMode]| result_table(&mode_table(modes, residue_unit, Width::Terminal));
+    let Some(band_hz) = summary.fit_band_hz else {
+        return table(&summary.modes);
+    };
+    let ModeLists { in_band, outside } = ModeLists::new(&summary.modes, band_hz);
+    if outside.is_empty() {
+        return table(&in_band);
+    }
+    let note = wrap(&outside_band_note(band_hz), 0);
+    format!("{}\n{note}\n{}", table(&in_band), table(&outside))
 }

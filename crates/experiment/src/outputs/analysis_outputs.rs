@@ -19,6 +19,8 @@ use bench_identify::verdict::{Cnmp, UncertainZero, Verdict};
 pub struct ModalSummary {
     /// The modes, lowest frequency first.
     pub modes: Vec<FittedMode>,
+    /// Lowest and highest fitted frequency in hertz; modes elsewhere represent what lies beyond them. `null` without modes.
+    pub fit_band_hz: Option<(f64, f64)>,
     /// `real` or `complex`; `null` without modes.
     pub residues: Option<&'static str>,
     /// Zeros of the fit, with damping, in the band of the verdict; of a conjugate pair the one above the real axis.
@@ -47,6 +49,7 @@ impl ModalSummary {
         let delay_s = fit.and_then(ModalFit::determined_delay_s);
         ModalSummary {
             modes: fit.map_or(Vec::new(), ModalFit::modes),
+            fit_band_hz: fit.map(|fit| fit.band_hz),
             residues: fit.map(|fit| fit.parameters.residues.name()),
             zeros: verdict.zeros.clone(),
             cnmp: verdict.cnmp,

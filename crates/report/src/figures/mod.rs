@@ -11,7 +11,10 @@ pub(crate) use comparison::IF_EQUAL;
 pub use comparison::{difference_table, figure_table, frequencies};
 pub use control::{control_table, predicted_sine, step, step_table, tracking_figures, whole_run};
 pub use margins::{loop_peaks, margins, measured_margins, swept_loop};
-pub use modal::{COMPLEX_RESIDUES_NOTE, has_complex_residues, mode_table, zero_table};
+pub use modal::{
+    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, mode_table, outside_band_note,
+    zero_table,
+};
 pub use stage::{stage_check_table, static_step_table};
 pub use tuning::{binding_table, frf_table, plant_table};
 

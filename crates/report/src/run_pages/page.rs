@@ -4,13 +4,14 @@ use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
 use crate::figures::{
-    COMPLEX_RESIDUES_NOTE, has_complex_residues, interval_of, mode_table, zero_table,
+    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, interval_of, mode_table,
+    outside_band_note, zero_table,
 };
 use crate::html::{document_with_plots, escaped, facts, note, section};
 use crate::table::{Table, Width};
 use bench_base::decimal::Decimal;
 use bench_experiment::certificate::SIGNS_DIFFER;
-use bench_identify::modal::Estimate;
+use bench_identify::modal::{Estimate, FittedMode};
 
 /// The page as an HTML document.
 pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
@@ -108,12 +109,18 @@ fn modes(report: &RecordReport<'_>) -> String {
     let Some(fit) = report.fit else {
         return String::new();
     };
-    let table = mode_table(&fit.modes(), &report.residue_unit, Width::Page);
+    let ModeLists { in_band, outside } = ModeLists::new(&fit.modes(), fit.band_hz);
+    let table = |modes: &[FittedMode]| mode_table(modes, &report.residue_unit, Width::Page).html();
     let mut text = "± is the 95 % confidence interval.".to_string();
     if has_complex_residues(&fit.modes()) {
         text += &format!(" {COMPLEX_RESIDUES_NOTE}.");
     }
-    table_section("Modes", &text, &table)
+    let mut content = note(&text) + &table(&in_band);
+    if !outside.is_empty() {
+        content += &note(&outside_band_note(fit.band_hz));
+        content += &table(&outside);
+    }
+    section("Modes", &content)
 }
 
 fn zeros(report: &RecordReport<'_>) -> String {
@@ -121,7 +128,7 @@ fn zeros(report: &RecordReport<'_>) -> String {
     if table.is_empty() {
         return String::new();
     }
-    let text = "Zeros of the fit up to the limit of the verdict; of a conjugate pair the one above the real axis. ± is the \
+    let text = "Zeros of the fit up to the limit of the verdict, those first that may lie right of the imaginary axis; of a conjugate pair the one above the real axis. ± is the \
                 95 % confidence interval.";
     table_section("Zeros", text, &table)
 }
