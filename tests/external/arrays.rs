@@ -1,4 +1,4 @@
-//! Files of scipy, numpy and pyuff (`tests/python/record_files.py`) give the modes of the CSV with the same numbers.
+//! Files of scipy, numpy, h5py and pyuff (`tests/python/record_files.py`) give the modes of the CSV with the same numbers.
 use serde_json::Value;
 
 use crate::external::program::{Bench, number};
@@ -7,7 +7,7 @@ use crate::external::signals::{STAGE, csv, multisine};
 
 /// File, names of its columns, and how far frequencies, dampings and residues may differ from those of the CSV: only by what the file
 /// rounds. Single times have the same rate as double ones; pyuff writes text with 12 digits.
-const FILES: [(&str, [&str; 3], f64); 16] = [
+const FILES: [(&str, [&str; 3], f64); 21] = [
     ("row.mat", NAMES, 0.0),
     ("column.mat", NAMES, 0.0),
     ("struct.mat", FIELDS, 0.0),
@@ -21,6 +21,11 @@ const FILES: [(&str, [&str; 3], f64); 16] = [
     ("big_endian.npy", NAMES, 0.0),
     ("matrix.npy", NUMBERS, 0.0),
     ("fortran.npy", NUMBERS, 0.0),
+    ("v73.mat", FIELDS, 0.0),
+    ("v73.mat", MATRIX, 0.0),
+    ("plain.h5", NAMES, 0.0),
+    ("structured.h5", FIELDS, 0.0),
+    ("matrix.h5", MATRIX, 0.0),
     ("text.uff", NODES, 1e-6),
     ("binary.uff", NODES, 0.0),
     ("uneven.uff", NODES, 0.0),
@@ -40,7 +45,7 @@ fn bench() -> Option<Bench> {
         csv(&multisine(&(5..=200).collect::<Vec<_>>(), 5, 0.0, 1e-8, 21)),
     );
     let [table, folder] = ["data.csv", ""].map(|name| bench.path(name).display().to_string());
-    let modules = "numpy, scipy.io, pyuff";
+    let modules = "numpy, scipy.io, h5py, pyuff";
     python::numbers_with(modules, "record_files.py", &[&table, &folder], "")?;
     Some(bench)
 }

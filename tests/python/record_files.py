@@ -1,4 +1,4 @@
-"""Writes a record as the files of other programs: the columns of a CSV file with scipy, numpy and pyuff.
+"""Writes a record as the files of other programs: the columns of a CSV file with scipy, numpy, h5py and pyuff.
 
 usage: record_files.py CSV FOLDER
 """
@@ -6,6 +6,7 @@ usage: record_files.py CSV FOLDER
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyuff
 from scipy.io import savemat
@@ -37,6 +38,41 @@ def numpy_files(columns, folder):
     matrix = np.column_stack(list(columns.values()))
     np.save(folder / "matrix.npy", matrix)
     np.save(folder / "fortran.npy", np.asfortranarray(matrix))
+
+
+def matlab_dataset(group, name, values):
+    """A column as `save` of MATLAB with `-v7.3` writes it: the dimensions from the last one on, packed in chunks."""
+    stored = group.create_dataset(name, data=np.atleast_2d(values), chunks=True, compression="gzip", compression_opts=3)
+    stored.attrs["MATLAB_class"] = np.bytes_("double")
+
+
+def hdf5_files(columns, folder):
+    header = b"MATLAB 7.3 MAT-file, Platform: GLNXA64, Created on: Thu Nov 26 12:40:48 2026 HDF5 schema 1.00 ."
+    with h5py.File(folder / "v73.mat", "w", userblock_size=512) as file:
+        rec = file.create_group("rec")
+        rec.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name in NAMES:
+            matlab_dataset(rec, name, columns[name])
+        matlab_dataset(file, "data", np.array(list(columns.values())))
+        text = file.create_dataset("note", data=np.array([[ord(c)] for c in "run 7"], dtype=np.uint16))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+        cell = file.create_dataset("#refs#/a", data=np.array([[1.0]]))
+        references = file.create_dataset("cell", data=np.array([[cell.ref]], dtype=h5py.ref_dtype))
+        references.attrs["MATLAB_class"] = np.bytes_("cell")
+    with open(folder / "v73.mat", "r+b") as file:
+        file.write(header.ljust(116) + bytes(8) + b"\x00\x02IM")
+    with h5py.File(folder / "plain.h5", "w", libver="latest") as file:
+        for name in NAMES:
+            file.create_dataset(name, data=columns[name], chunks=True, compression="gzip", shuffle=True, fletcher32=True)
+    with h5py.File(folder / "structured.h5", "w") as file:
+        table = np.zeros(len(columns["time_s"]), dtype=[(name, ">f8") for name in NAMES])
+        for name in NAMES:
+            table[name] = columns[name]
+        file.create_dataset("rec", data=table)
+        file["again"] = h5py.SoftLink("/rec")
+        file["round"] = file["/"]
+    with h5py.File(folder / "matrix.h5", "w") as file:
+        file.create_dataset("data", data=np.column_stack(list(columns.values())))
 
 
 def dataset(columns, name, node, binary, even):
@@ -77,6 +113,7 @@ def main():
     columns = {name: numbers[:, k] for k, name in enumerate(NAMES)}
     mat_files(columns, folder)
     numpy_files(columns, folder)
+    hdf5_files(columns, folder)
     universal_files(columns, folder)
 
 

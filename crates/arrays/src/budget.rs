@@ -33,6 +33,13 @@ impl Budget {
         Ok(())
     }
 
+    /// Takes so many unpacked bytes.
+    pub fn take_unpacked(&mut self, bytes: u64) -> Result<(), ArraysError> {
+        let left = self.unpacked.checked_sub(bytes);
+        self.unpacked = left.ok_or(ArraysError::TooLarge { limit: self.limit })?;
+        Ok(())
+    }
+
     /// All bytes of a packed part at a place in the file.
     pub fn unpack(
         &mut self,
@@ -43,8 +50,7 @@ impl Budget {
         let mut unpacked = Vec::new();
         let read = packed.take(self.unpacked + 1).read_to_end(&mut unpacked);
         read.map_err(|_| place.damaged(what))?;
-        let left = self.unpacked.checked_sub(unpacked.len() as u64);
-        self.unpacked = left.ok_or(ArraysError::TooLarge { limit: self.limit })?;
+        self.take_unpacked(unpacked.len() as u64)?;
         Ok(unpacked)
     }
 }

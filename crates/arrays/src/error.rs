@@ -16,6 +16,14 @@ pub enum ArraysError {
         /// What was expected there.
         what: &'static str,
     },
+    /// The list of the arrays of an HDF5 file cannot be read.
+    #[error(
+        "its list of arrays cannot be read ({reason}); it may be damaged, or incomplete because it was not closed"
+    )]
+    Hdf5 {
+        /// What the reader of the format reports.
+        reason: String,
+    },
     /// More numbers than the limit.
     #[error("it has more than {limit} bytes of numbers")]
     TooLarge {

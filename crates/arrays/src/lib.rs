@@ -7,6 +7,7 @@
 //! | format | written by |
 //! |---|---|
 //! | MAT-file of version 5 to 7 | `save` of MATLAB and Octave, `scipy.io.savemat` |
+//! | HDF5, as also a MAT-file of version 7.3 | `save` of MATLAB with `-v7.3`, h5py, PyTables, programs of instruments |
 //! | NPZ, NPY | `numpy.savez`, `numpy.savez_compressed`, `numpy.save` |
 //! | universal file, dataset 58 and 58b | vibration analysers, pyuff |
 //!
@@ -19,10 +20,12 @@ mod budget;
 mod bytes;
 mod contents;
 mod error;
+mod hdf5;
 mod mat;
 mod npy;
 mod npz;
 mod number;
+mod places;
 mod universal;
 mod value;
 
@@ -39,6 +42,8 @@ use budget::Budget;
 pub enum Format {
     /// MAT-file of version 5 to 7.
     Mat,
+    /// HDF5 file, as also a MAT-file of version 7.3.
+    Hdf5,
     /// Archive of NumPy arrays.
     Npz,
     /// One NumPy array.
@@ -58,6 +63,8 @@ impl Format {
     pub fn of(bytes: &[u8]) -> Option<Format> {
         if bytes.starts_with(b"MATLAB 5.0") {
             Some(Format::Mat)
+        } else if hdf5::is_one(bytes) {
+            Some(Format::Hdf5)
         } else if bytes.starts_with(b"\x93NUMPY") {
             Some(Format::Npy)
         } else if npz::is_one(bytes) {
@@ -71,6 +78,7 @@ impl Format {
     pub fn name(self) -> &'static str {
         match self {
             Format::Mat => "a MAT-file",
+            Format::Hdf5 => "an HDF5 file",
             Format::Npz => "an NPZ file",
             Format::Npy => "a NumPy file",
             Format::Universal => "a universal file",
@@ -89,6 +97,7 @@ pub fn variables(format: Format, bytes: &[u8], max_bytes: u64) -> Result<Variabl
     let mut budget = Budget::new(max_bytes);
     match format {
         Format::Mat => mat::variables(bytes, &mut budget),
+        Format::Hdf5 => hdf5::variables(bytes, &mut budget),
         Format::Npz => npz::variables(bytes, &mut budget),
         Format::Npy => Ok(vec![(String::new(), npy::array(bytes, &mut budget)?)]),
         Format::Universal => Ok(universal::records(&universal::datasets(

@@ -18,8 +18,6 @@ pub(crate) enum Content {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ForeignFormat {
-    /// HDF5, which is also the format of a MAT-file of version 7.3.
-    Hdf5,
     /// Parquet.
     Parquet,
     /// A zip archive that is no NPZ file: a workbook, or an archive of other files.
@@ -39,9 +37,7 @@ pub enum ForeignFormat {
 impl ForeignFormat {
     /// The format by the first bytes of a file; `None` for text.
     fn of(bytes: &[u8]) -> Option<ForeignFormat> {
-        const MARKS: [(&[u8], ForeignFormat); 6] = [
-            (b"MATLAB 7.3", ForeignFormat::Hdf5),
-            (b"\x89HDF", ForeignFormat::Hdf5),
+        const MARKS: [(&[u8], ForeignFormat); 4] = [
             (b"PAR1", ForeignFormat::Parquet),
             (b"PK\x03\x04", ForeignFormat::Zip),
             (b"TDSm", ForeignFormat::Tdms),
@@ -55,7 +51,6 @@ impl ForeignFormat {
     /// What it is, for a message.
     pub fn name(self) -> &'static str {
         match self {
-            ForeignFormat::Hdf5 => "an HDF5 or MATLAB 7.3 file",
             ForeignFormat::Parquet => "a Parquet file",
             ForeignFormat::Zip => "a zip archive, such as a workbook",
             ForeignFormat::Tdms => "a TDMS file of LabVIEW",
@@ -69,9 +64,6 @@ impl ForeignFormat {
     /// How to get a table of text from it.
     pub fn remedy(self) -> &'static str {
         match self {
-            ForeignFormat::Hdf5 => {
-                "save it in MATLAB with save('record.mat', 't', 'u', 'y', '-v7'), or write the columns as CSV, in Python with h5py and numpy.savetxt"
-            }
             ForeignFormat::Parquet => {
                 "write it as CSV, in Python: pandas.read_parquet(FILE).to_csv('record.csv', index=False)"
             }
@@ -183,12 +175,7 @@ mod tests {
     #[test]
     fn other_formats_are_named() {
         for (bytes, format) in [
-            (&b"\x89HDF\r\n\x1a\n"[..], ForeignFormat::Hdf5),
-            (
-                b"MATLAB 7.3 MAT-file, Platform: GLNXA64",
-                ForeignFormat::Hdf5,
-            ),
-            (b"PAR1\x15\x04", ForeignFormat::Parquet),
+            (&b"PAR1\x15\x04"[..], ForeignFormat::Parquet),
             (b"PK\x03\x04\x14", ForeignFormat::Zip),
             (b"TDSm\x0e", ForeignFormat::Tdms),
             (b"\x89MCAP0\r\n", ForeignFormat::Mcap),
@@ -204,6 +191,11 @@ mod tests {
         for (bytes, format) in [
             (&b"MATLAB 5.0 MAT-file, Platform: GLNXA64"[..], Format::Mat),
             (b"\x93NUMPY\x01\0", Format::Npy),
+            (b"\x89HDF\r\n\x1a\n", Format::Hdf5),
+            (
+                &[&[0; 512], &b"\x89HDF\r\n\x1a\n"[..]].concat(),
+                Format::Hdf5,
+            ),
             (b"    -1\n    58\n", Format::Universal),
             (b"    -1  \r\n   151\r\n", Format::Universal),
         ] {

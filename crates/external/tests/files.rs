@@ -359,11 +359,8 @@ fn rounded_times_are_regular_with_the_true_rate() {
 #[test]
 fn other_formats_are_named_and_never_printed() {
     for (bytes, name) in [
-        (
-            &b"MATLAB 7.3 MAT-file, \x1b[31m"[..],
-            "an HDF5 or MATLAB 7.3 file",
-        ),
-        (b"\x89HDF\r\n\x1a\n\0\0", "an HDF5 or MATLAB 7.3 file"),
+        (&b"MATLAB 7.3 MAT-file, \x1b[31m"[..], "an HDF5 file"),
+        (b"\x89HDF\r\n\x1a\n\0\0", "an HDF5 file"),
         (b"PAR1\x15\x04\x1b[31m", "a Parquet file"),
         (b"PK\x03\x04\x14\0", "a zip archive"),
         (b"\0\x01\x1b[31m", "not a text file"),

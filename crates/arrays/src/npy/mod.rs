@@ -9,6 +9,7 @@ mod literal;
 use crate::budget::Budget;
 use crate::bytes::{ByteOrder, Bytes};
 use crate::error::ArraysError;
+use crate::places::Places;
 use crate::value::{NumericArray, Value, entry_count, printable};
 
 use dtype::{Entry, Field, Scalar};
@@ -72,7 +73,7 @@ impl Header {
             return Err(file.damaged("the shape of the array"));
         };
         let order = Order {
-            places: places(&self.shape, self.is_fortran, count),
+            places: Places::new(&self.shape, self.is_fortran, count),
             shape: &self.shape,
         };
         match &self.entry {
@@ -132,39 +133,13 @@ impl Order<'_> {
             } => (*stored, *order, unit),
             Scalar::Other { what, .. } => return Ok(Value::Other(what.clone())),
         };
-        budget.take(self.places.count, stored.memory_bytes())?;
-        let items = self.places.iter().filter_map(move |place| {
-            let start = place.checked_mul(size)?.checked_add(start)?;
-            data.get(start..start.checked_add(stored.size)?)
-        });
+        budget.take(self.places.count(), stored.memory_bytes())?;
+        let items = self.places.items(data, size, start..start + stored.size);
         Ok(Value::Numbers(NumericArray {
             shape: self.shape.to_vec(),
             numbers: stored.numbers(order, items),
             unit: unit.clone(),
         }))
-    }
-}
-
-/// Places of the entries in the file, the first index running fastest.
-struct Places {
-    count: usize,
-    /// Rows and columns of a matrix whose rows are stored one after the other.
-    by_row: Option<[usize; 2]>,
-}
-
-fn places(shape: &[usize], is_fortran: bool, count: usize) -> Places {
-    let mut long = shape.iter().copied().filter(|size| *size != 1);
-    let by_row = match (is_fortran, long.next(), long.next(), long.next()) {
-        (false, Some(rows), Some(columns), None) if count > 0 => Some([rows, columns]),
-        _ => None,
-    };
-    Places { count, by_row }
-}
-
-impl Places {
-    fn iter(&self) -> impl Iterator<Item = usize> + Clone {
-        let [rows, columns] = self.by_row.unwrap_or([self.count, 1]);
-        (0..columns).flat_map(move |column| (0..rows).map(move |row| row * columns + column))
     }
 }
 
