@@ -18,7 +18,7 @@
 use core::ops::ControlFlow;
 
 use crate::FrfDatum;
-use crate::chi2_limits::{MAX_CHI2_PER_FREEDOM, NOISE_CHI2};
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{
     FitError, FittedMode, MeasurementChain, ModalFit, ModalParameters, Residues, fit_up_to, nearest,
 };
@@ -32,10 +32,6 @@ impl ModalFit {
     /// Whether the residual is noise, and no residues nearly cancel, as those of modes in the place of something else.
     pub(crate) fn is_sum_of_few_modes(&self) -> bool {
         self.leaves_noise() && self.cancelling_modes().is_none()
-    }
-
-    fn leaves_noise(&self) -> bool {
-        self.chi2_per_freedom <= NOISE_CHI2
     }
 
     /// Number of parameters that were fitted.

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 use nalgebra::Complex;
 
 use super::*;
+use crate::chi2_limits::NOISE_CHI2;
 use crate::modal::fit;
 use crate::verdict::{self, Cnmp};
 use crate::{Estimate, Frf, Identification, ResponseAnalysis, ResponseIdentification};

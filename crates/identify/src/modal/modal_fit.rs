@@ -9,6 +9,7 @@ use super::clusters::cancelling;
 use super::measurement_chain::NodeResponse;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
 use crate::FrfDatum;
+use crate::chi2_limits::NOISE_CHI2;
 use bench_plant::Sign;
 use bench_plant::zeros::ModalTerm;
 
@@ -135,6 +136,11 @@ pub struct UncertainPole {
 }
 
 impl ModalFit {
+    /// Whether the residual is noise.
+    pub(crate) fn leaves_noise(&self) -> bool {
+        self.chi2_per_freedom <= NOISE_CHI2
+    }
+
     /// The data that are fitted.
     pub fn used_data(&self, data: &[FrfDatum]) -> Vec<FrfDatum> {
         let is_used = |datum: &&FrfDatum| !self.left_out_hz.contains(&datum.frequency_hz);

@@ -148,7 +148,8 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
     let insufficient = insufficient_data(input, &modes)
         .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
-        .or_else(|| uncertain_side(&zeros, input.certainty));
+        .or_else(|| uncertain_side(&zeros, input.certainty))
+        .or_else(|| unconfirmed_in_a_misfit(input.fit, &zeros, phase_drop));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
         None => match phase_drop {
@@ -346,11 +347,30 @@ fn unconfirmed(
     pairs: usize,
     phase_drop: PhaseDrop,
 ) -> Option<&UncertainZero> {
-    if phase_drop.predicted_deg >= CONFIRMED_DEG * pairs as f64 {
+    if is_confirmed(pairs, phase_drop) {
         return None;
     }
     let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
     cnmp.find(|zero| zero.s.re < UNCONFIRMED_SIGMAS * zero.real_part().sigma)
+}
+
+/// Whether the phase turns as these pairs turn it, as far as it can be followed.
+fn is_confirmed(pairs: usize, phase_drop: PhaseDrop) -> bool {
+    phase_drop.predicted_deg >= CONFIRMED_DEG * pairs as f64
+}
+
+/// CNMP zeros that the phase does not confirm, of a fit that leaves more than noise: what it does not describe, as the steps of a coarse
+/// probe, may cause them.
+fn unconfirmed_in_a_misfit(
+    fit: &ModalFit,
+    zeros: &[UncertainZero],
+    phase_drop: Option<PhaseDrop>,
+) -> Option<String> {
+    if fit.leaves_noise() || is_confirmed(cnmp_pairs(zeros), phase_drop?) {
+        return None;
+    }
+    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
+    cnmp.next().map(unconfirmed_reason)
 }
 
 fn unconfirmed_reason(zero: &UncertainZero) -> String {
@@ -368,7 +388,7 @@ fn detected(pairs: usize, signs: Option<&[f64]>, phase_drop: PhaseDrop) -> Strin
         format!(", residues of opposite signs ({signs})")
     });
     let found = format!("{pairs} pair{plural} of CNMP zeros{of_signs}");
-    if phase_drop.predicted_deg < CONFIRMED_DEG * pairs as f64 {
+    if !is_confirmed(pairs, phase_drop) {
         return format!(
             "{found}; the response around the zeros is noise, so that the phase does not confirm them"
         );

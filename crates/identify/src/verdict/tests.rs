@@ -380,6 +380,19 @@ fn cnmp_zeros_in_noise_must_lie_six_standard_deviations_off_the_axis() {
         &verdict_at(5.97),
         "the fit has CNMP zeros at 16.72 Hz, where the response is noise",
     );
+    // A fit that leaves more than noise may have zeros of what it does not describe, at any distance.
+    let with_misfit = |chi2: f64| {
+        let mut case = Case::of(&stage).with_zero_at_sigmas(&stage, zero, 60.0);
+        case.fit.chi2_per_freedom = chi2;
+        case
+    };
+    let in_noise = |chi2: f64| with_misfit(chi2).with_noise_above(104.0).verdict();
+    assert_eq!(in_noise(1.49).cnmp, Cnmp::Detected);
+    assert_undecided(
+        &in_noise(1.51),
+        "the fit has CNMP zeros at 16.72 Hz, where the response is noise",
+    );
+    assert_eq!(with_misfit(1.51).verdict().cnmp, Cnmp::Detected);
     let distant = verdict_at(6.03);
     assert_eq!(distant.cnmp, Cnmp::Detected, "{}", distant.why);
     assert!(
