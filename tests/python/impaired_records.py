@@ -35,6 +35,7 @@ CAUSES = {
     "stuck": r"have the same value",
     "slow probe": r"changes only",
     "clipped": r"clipped",
+    "coarse": r"the output has steps",
     "start": r"moves at the first sample|begin the record before",
     "end": r"still moves at the last",
     "unrelated": r"not input and output of one system",
@@ -209,7 +210,7 @@ def quantised(rng):
     b = Bench(rng)
     y = b.motion()
     step = rng.uniform(0.002, 0.02) * np.max(abs(y))
-    return b.record(step * np.round(b.noisy(y) / step))
+    return b.record(step * np.round(b.noisy(y) / step), causes=["coarse"])
 
 
 @kind("clipped output")

@@ -343,6 +343,7 @@ impl Identification {
             chain,
             stated: self.output_kind,
             clear_kind: None,
+            output_step: analysis.resolution.output,
             remedies: record.remedies(),
         };
         let Some(fit) = complex_fit(&observation) else {
@@ -351,7 +352,7 @@ impl Identification {
         let up_to_rad_s = analysis.judged_up_to_rad_s;
         let is_periodic = self.repetition.is_some();
         let verdict = judged(None, frf, &fit, chain, up_to_rad_s, |verdict| {
-            hint(verdict, record, is_periodic, &fit)
+            hint(verdict, record, is_periodic, &fit, &analysis.resolution)
         })?;
         Ok(ExternalAnalysis {
             verdict: verdict.with(listed(&analysis.cautions)),
@@ -425,13 +426,14 @@ fn analyse(
         chain: &chain,
         stated,
         clear_kind,
+        output_step: resolution.output,
         remedies: record.remedies(),
     };
     let known = listed(&defects).or_else(|| known_cause(&observation));
     let is_explained = known.is_some();
     let why = known.or_else(|| implausible(&observation));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
-        hint(verdict, cleaned, repetition.is_some(), &fit)
+        hint(verdict, cleaned, repetition.is_some(), &fit, &resolution)
     })?;
     let clocks = clock_skew.map(|skew| skew.description());
     let stray_lines = stray_lines.iter().map(ToString::to_string);

@@ -187,6 +187,7 @@ impl ResponseIdentification {
             chain: &chain,
             stated: self.output_kind,
             clear_kind,
+            output_step: None,
             remedies: &OF_RESPONSE,
         };
         let known = known_cause(&observation);

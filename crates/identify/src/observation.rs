@@ -72,6 +72,8 @@ pub(super) struct Observation<'a> {
     pub(super) stated: Option<OutputKind>,
     /// The kind of an output that is clearly another one.
     pub(super) clear_kind: Option<OutputKind>,
+    /// Step of the output, if it exceeds its noise: its errors are no noise, and fewer modes of another kind may describe them by chance.
+    pub(super) output_step: Option<f64>,
     /// What to do about implausible data.
     pub(super) remedies: &'a Remedies,
 }

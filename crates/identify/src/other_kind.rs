@@ -59,6 +59,9 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
     if let Some(kind) = seen.clear_kind {
         return Some(give_kind(assumed, kind));
     }
+    if seen.output_step.is_some() {
+        return None;
+    }
     let (kind, other) = other_kind(&seen.source, &seen.frf.data, assumed)?;
     let is_simplest = !complex_residues_are_simpler(seen, &other);
     is_simplest.then(|| give_kind(assumed, kind))

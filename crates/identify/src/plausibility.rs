@@ -7,6 +7,7 @@ use crate::external_signals::ExternalSignals;
 use crate::modal::{FitError, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
 use crate::other_kind::{better_kind, explained_by_kind, swapped, vanishes_at_rest};
+use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict};
 use crate::{Frf, record_check};
 
@@ -143,9 +144,13 @@ pub(super) fn hint(
     record: ExternalSignals<'_>,
     is_periodic: bool,
     fit: &Result<ModalFit, FitError>,
+    resolution: &Resolution,
 ) -> Option<String> {
     if verdict.cnmp != Cnmp::Undecided {
         return None;
+    }
+    if let Some(step) = resolution.output {
+        return Some(coarse_steps(step));
     }
     let is_open = record.reference.is_none() && !is_periodic;
     let no_sum = not_a_sum_of_modes(fit).map(|why| {
@@ -156,6 +161,12 @@ pub(super) fn hint(
         }
     });
     no_sum.or_else(|| begins_within_excitation(record, is_periodic))
+}
+
+fn coarse_steps(step: f64) -> String {
+    format!(
+        "the output has steps of {step:.4e}, more than its noise, and their errors are no noise; increase the amplitude, or use a finer range of the probe"
+    )
 }
 
 /// A verdict that was decided from modes that are not determined, and whose residues cancel, is undecided.

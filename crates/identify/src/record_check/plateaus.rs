@@ -21,12 +21,25 @@ const FAST_SAMPLES: usize = 16;
 const MOVING_EQUAL: f64 = 0.03;
 /// Meanwhile the input moves by at least this ratio of its range.
 const ACTIVE_SPAN: f64 = 0.05;
-/// A clipped output stays at its limit for at least this many samples ...
-const MIN_CLIPPED: usize = 3;
-/// ... at least this many times.
-const MIN_CLIPPED_PEAKS: usize = 4;
+/// A clipped output stays at its limit for at least this many samples, at least this many times.
+const CLIPPED: Plateaus = Plateaus {
+    samples: 3,
+    places: 4,
+};
+/// The same with few samples in each oscillation. (The values of a steady oscillation may repeat, but all of them do.)
+const CLIPPED_FAST: Plateaus = Plateaus {
+    samples: 2,
+    places: 8,
+};
 /// A limit occurs at least this many times as often as the value next to it.
 const MIN_PILE_RATIO: usize = 5;
+
+/// How often, and for how many samples, a signal has a value in succession.
+#[derive(Clone, Copy, Debug)]
+struct Plateaus {
+    samples: usize,
+    places: usize,
+}
 
 /// The resolution of an output, and its noise.
 #[derive(Clone, Copy, Debug)]
@@ -142,10 +155,10 @@ pub(super) fn clipped(signals: &Signals) -> Option<Defect> {
         output.iter().copied().fold(first, extreme)
     });
     limits.into_iter().find_map(|value| {
-        let places = plateaus(output, value);
-        let is_clipped = places.len() >= MIN_CLIPPED_PEAKS && piles_up(output, value);
-        is_clipped.then(|| Defect::Clipped {
-            time_s: places[0] as f64 / signals.rate_hz,
+        let slow = first_plateau(output, value, CLIPPED);
+        let first = slow.or_else(|| first_plateau(output, value, CLIPPED_FAST))?;
+        piles_up(output, value).then(|| Defect::Clipped {
+            time_s: first as f64 / signals.rate_hz,
             value,
         })
     })
@@ -160,14 +173,15 @@ fn piles_up(samples: &[f64], extreme: f64) -> bool {
     nearest.is_some_and(|next| count(extreme) > MIN_PILE_RATIO * count(next))
 }
 
-/// Where a signal has a value at least [`MIN_CLIPPED`] times in succession: the first index of each place.
-fn plateaus(samples: &[f64], value: f64) -> Vec<usize> {
+/// Where a signal first has a value so many times in succession, if it has at least as many plateaus.
+fn first_plateau(samples: &[f64], value: f64, least: Plateaus) -> Option<usize> {
     let (mut places, mut length) = (Vec::new(), 0);
     for (k, sample) in samples.iter().enumerate() {
         length = if *sample == value { length + 1 } else { 0 };
-        if length == MIN_CLIPPED {
-            places.push(k + 1 - MIN_CLIPPED);
+        if length == least.samples {
+            places.push(k + 1 - length);
         }
     }
-    places
+    let is_enough = places.len() >= least.places;
+    places.first().copied().filter(|_| is_enough)
 }

@@ -299,6 +299,42 @@ fn clipped_output_is_found_with_its_limit() {
     );
 }
 
+/// Four samples in each oscillation: at most two of them, one after the other, are at the limit.
+#[test]
+fn clipped_output_is_found_with_few_samples_in_each_oscillation() {
+    let mut signals = signals();
+    let oscillation = |k: usize, limit: f64| {
+        let t = k as f64 / RATE_HZ;
+        let decaying = (-((t - 12.0) / 3.0).powi(2)).exp();
+        let y = decaying * (std::f64::consts::TAU * 0.2503 * k as f64).sin();
+        y.clamp(-limit, limit)
+    };
+    for (limit, is_clipped) in [(0.5, true), (2.0, false)] {
+        signals.output = (0..25_000).map(|k| oscillation(k, limit)).collect();
+        let found = found_in(&signals, false);
+        let value = |defect: &Defect| match defect {
+            Defect::Clipped { value, .. } => Some(*value),
+            _ => None,
+        };
+        let values: Vec<f64> = found.iter().filter_map(value).collect();
+        assert_eq!(
+            values,
+            if is_clipped { vec![limit] } else { vec![] },
+            "{found:?}"
+        );
+    }
+}
+
+/// The peaks of a steady oscillation may have two equal samples each.
+#[test]
+fn repeating_peaks_of_a_steady_oscillation_are_no_clipping() {
+    let mut signals = signals();
+    let period = [0.2, 0.6, 0.9, 1.0, 1.0, 0.9, 0.6, 0.2];
+    let sample = |k: usize| period[k % 8] * if k % 16 < 8 { 1.0 } else { -1.0 };
+    signals.output = (0..25_000).map(sample).collect();
+    assert_eq!(clipped(&signals), None);
+}
+
 #[test]
 fn record_that_begins_or_ends_in_motion_is_found() {
     let whole = signals();
