@@ -37,7 +37,7 @@ CAUSES = {
     "clipped": r"clipped",
     "coarse": r"the output has steps",
     "start": r"moves at the first sample|begin the record before",
-    "end": r"still moves at the last",
+    "end": r"still moves at the last|continue the record after",
     "unrelated": r"not input and output of one system",
     "swapped": r"swapped|exchange --input",
     "kind": r"--output-kind",

@@ -13,7 +13,9 @@ use crate::multisine_lines::useful_band::useful_limit_hz;
 use crate::observation::{Observation, Source, describes};
 use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Repetition};
-use crate::plausibility::{complex_fit, hint, implausible, known_cause, unless_undetermined};
+use crate::plausibility::{
+    complex_fit, hint, implausible_record, known_cause, unless_undetermined,
+};
 use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, FrfDatum, IdentifyError, Signals, distortion_ratio, with_distortion};
@@ -410,7 +412,7 @@ fn analyse(
     let other = modes_of_other_kind(&source, &frf.data, &chain);
     let clear_kind = other.as_ref().map(|(kind, _)| *kind);
     let fit = match (other, &periodic) {
-        (Some((_, few)), _) => Ok(few),
+        (Some((_, few)), _) => few,
         (None, Some(part)) => fit_of_periods(&frf.data, part.linearity.as_ref(), &chain),
         (None, None) => modal::fit(&frf.data, &chain),
     };
@@ -431,7 +433,7 @@ fn analyse(
     };
     let known = listed(&defects).or_else(|| known_cause(&observation));
     let is_explained = known.is_some();
-    let why = known.or_else(|| implausible(&observation));
+    let why = known.or_else(|| implausible_record(&observation, cleaned, repetition.is_some()));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
         hint(verdict, cleaned, repetition.is_some(), &fit, &resolution)
     })?;

@@ -178,7 +178,7 @@ impl ResponseIdentification {
         let chain = source.chain(output_kind, &frf.data);
         let other = modes_of_other_kind(&source, &frf.data, &chain);
         let clear_kind = other.as_ref().map(|(kind, _)| *kind);
-        let fit = other.map_or_else(|| modal::fit(&frf.data, &chain), |(_, few)| Ok(few));
+        let fit = other.map_or_else(|| modal::fit(&frf.data, &chain), |(_, few)| few);
         let judged_up_to_rad_s = rad_s(band_hz.1);
         let observation = Observation {
             source,

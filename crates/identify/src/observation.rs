@@ -20,8 +20,6 @@ pub(super) struct Source {
 const PART_DATA: usize = 400;
 /// Largest number of modes that are fitted to a part.
 pub(super) const PART_MODES: usize = 8;
-/// As many modes as show on which side of a step an acceleration was read.
-const STEP_MODES: usize = 4;
 
 impl Source {
     /// The chain of an output of this kind. An acceleration that steps with its input may have been read before the step or after it: the
@@ -42,7 +40,7 @@ impl Source {
 
 /// chi^2 and a penalty for each mode, as for a mode that is significant: modes may take the place of another chain.
 fn cost(data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
-    let Ok(fit) = modal::fit_few(data, chain, STEP_MODES) else {
+    let Ok(fit) = modal::fit_few(data, chain, PART_MODES) else {
         return f64::INFINITY;
     };
     let n = data.len() as f64;

@@ -10,7 +10,7 @@ use nalgebra::Complex;
 
 use crate::chi2_limits::NOISE_CHI2;
 use crate::complex_residues::fit_complex;
-use crate::modal::{self, MeasurementChain, ModalFit};
+use crate::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
 use crate::{Estimate, FrfDatum};
 
@@ -23,26 +23,37 @@ const STATIC_SIGMAS: f64 = 5.0;
 /// A kind of output describes the data better if its chi-square is smaller by this factor: that of a part of the data has some 700
 /// degrees of freedom and a standard deviation of 5 %, so that noise alone never reaches it.
 const CLEARLY_BETTER: f64 = 1.5;
+/// Modes of another kind leave noise with so many modes less than those of the assumed kind leave more.
+const SAVED_MODES: usize = 2;
 /// Far better: the residual is smaller by a factor of ten.
 const FAR_BETTER: f64 = 100.0;
 const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
 /// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do, or
-/// as many far better. With these few modes of the assumed kind; many more would be fitted in vain.
+/// fewer to its noise, or as many far better. With these few modes of the assumed kind; many more would be fitted in vain.
 pub(super) fn modes_of_other_kind(
     source: &Source,
     data: &[FrfDatum],
     chain: &MeasurementChain,
-) -> Option<(OutputKind, ModalFit)> {
-    let few = fit_part(&part(data), chain).ok()?;
-    if describes(&few) {
-        return None;
-    }
+) -> Option<(OutputKind, Result<ModalFit, FitError>)> {
+    let few = fit_part(&part(data), chain);
+    let few_modes = match &few {
+        Ok(fit) if describes(fit) => return None,
+        Ok(fit) => fit.parameters.modes.len(),
+        Err(FitError::Undetermined { modes }) => *modes,
+        Err(_) => return None,
+    };
     let (kind, other) = other_kind(source, data, chain.output())?;
-    let is_clear = 2 * other.parameters.modes.len() <= PART_MODES
-        || few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
-    is_clear.then_some((kind, few))
+    let other_modes = other.parameters.modes.len();
+    let is_far_better = |few: &ModalFit| few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
+    let is_clear = 2 * other_modes <= PART_MODES || few.as_ref().is_ok_and(is_far_better);
+    let is_simplest = || {
+        other.leaves_noise()
+            && other_modes + SAVED_MODES <= few_modes
+            && !complex_residues_are_simpler(data, chain, &few, &other)
+    };
+    (is_clear || is_simplest()).then_some((kind, few))
 }
 
 /// Another kind of output that describes the data in place of that of the fit.
@@ -63,20 +74,27 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
         return None;
     }
     let (kind, other) = other_kind(&seen.source, &seen.frf.data, assumed)?;
-    let is_simplest = !complex_residues_are_simpler(seen, &other);
+    let is_simplest = !complex_residues_are_simpler(&seen.frf.data, seen.chain, seen.fit, &other);
     is_simplest.then(|| give_kind(assumed, kind))
 }
 
 /// Exchanged columns: modes describe the inverse of a response that they do not describe.
 pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
     let is_described = seen.fit.as_ref().is_ok_and(describes);
-    (!is_described && inverse_fits(seen)).then(|| format!("{SWAPPED}; {}", seen.remedies.swapped))
+    let is_known = seen.output_step.is_none();
+    (!is_described && is_known && inverse_fits(seen))
+        .then(|| format!("{SWAPPED}; {}", seen.remedies.swapped))
 }
 
 /// Whether modes of the assumed kind with complex residues describe a part of the data with fewer parameters than those of another kind.
 /// (They can be those of an acceleration as well, but need more parameters for it.)
-fn complex_residues_are_simpler(seen: &Observation<'_>, other: &ModalFit) -> bool {
-    let complex = fit_complex(&part(&seen.frf.data), seen.chain, seen.fit);
+fn complex_residues_are_simpler(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    real: &Result<ModalFit, FitError>,
+    other: &ModalFit,
+) -> bool {
+    let complex = fit_complex(&part(data), chain, real);
     complex.is_some_and(|fit| {
         !vanishes(&fit) && fit.number_of_parameters() < other.number_of_parameters()
     })

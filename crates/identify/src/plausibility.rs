@@ -24,7 +24,7 @@ const EARLY_SAMPLES: f64 = 0.5;
 const CERTAIN_SIGMAS: f64 = 5.0;
 /// More modes than these that cannot be determined are no modes.
 const MANY_MODES: usize = 8;
-/// An input whose RMS value at the first samples exceeds this ratio of that of the record began before.
+/// An input whose RMS value at the first or the last samples exceeds this ratio of that of the record began before, or did not end.
 const ACTIVE_RATIO: f64 = 0.3;
 /// Noise that a controller feeds back to the input makes the response none of modes.
 const CLOSED_LOOP: &str =
@@ -49,10 +49,28 @@ fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
     what.map(|what| format!("{what}; {remedy}"))
 }
 
-/// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one.
+/// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one. (That of a plant
+/// that is not linear, or of a coarse probe, may grow as well, but modes do not describe it.)
 fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
+    let is_misfit = seen.fit.as_ref().is_ok_and(|fit| !describes(fit));
+    if is_misfit || seen.output_step.is_some() {
+        return None;
+    }
     let what = growing(seen.frf, seen.fit, seen.chain.output())?;
     better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
+}
+
+/// As [`implausible`], of a record; one that is cut within its excitation has a response that no system has.
+pub(super) fn implausible_record(
+    seen: &Observation<'_>,
+    record: ExternalSignals<'_>,
+    is_periodic: bool,
+) -> Option<String> {
+    let why = implausible(seen)?;
+    match cut_within_excitation(record, is_periodic) {
+        Some(cut) => Some(format!("{cut} (it seems that {why})")),
+        None => Some(why),
+    }
 }
 
 /// The modes with complex residues, if real ones do not describe the data, and if they are plausible as well.
@@ -160,7 +178,9 @@ pub(super) fn hint(
             why
         }
     });
-    no_sum.or_else(|| begins_within_excitation(record, is_periodic))
+    let cut = cut_within_excitation(record, is_periodic);
+    let hints: Vec<String> = cut.into_iter().chain(no_sum).collect();
+    (!hints.is_empty()).then(|| hints.join("; "))
 }
 
 fn coarse_steps(step: f64) -> String {
@@ -208,13 +228,25 @@ fn no_sum_of_modes(found: &str) -> String {
     )
 }
 
-fn begins_within_excitation(record: ExternalSignals<'_>, is_periodic: bool) -> Option<String> {
-    let ratio = record_check::input_ratio_at_start(&record.excited());
-    let excitation = record.remedies().excitation;
-    (!is_periodic && ratio > ACTIVE_RATIO).then(|| {
-        format!(
+/// A record without the rest before or after its excitation, during which the plant settles. (Periods need none.)
+fn cut_within_excitation(record: ExternalSignals<'_>, is_periodic: bool) -> Option<String> {
+    if is_periodic {
+        return None;
+    }
+    let (excited, excitation) = (record.excited(), record.remedies().excitation);
+    let at_start = record_check::input_ratio_at_start(&excited);
+    let at_end = record_check::input_ratio_at_end(&excited);
+    if at_start > ACTIVE_RATIO {
+        Some(format!(
             "at the first samples the RMS value of the {excitation} is already {:.0} % of that of the whole record; begin the record before the excitation, with the plant at rest",
-            100.0 * ratio
-        )
-    })
+            100.0 * at_start
+        ))
+    } else if at_end > ACTIVE_RATIO {
+        Some(format!(
+            "at the last samples the RMS value of the {excitation} is still {:.0} % of that of the whole record; continue the record after the excitation, until the plant rests",
+            100.0 * at_end
+        ))
+    } else {
+        None
+    }
 }

@@ -19,6 +19,16 @@ pub fn input_ratio_at_start(signals: &Signals) -> f64 {
     rms(&input[..input.len().div_ceil(PARTS)]) / rms(input)
 }
 
+/// The RMS value of the input at the end of the record, about its mean there, as a ratio of that of the whole record: a set-point may end
+/// elsewhere than it began.
+pub fn input_ratio_at_end(signals: &Signals) -> f64 {
+    let input = &signals.input;
+    let last = &input[input.len() - input.len().div_ceil(PARTS)..];
+    let mean = last.iter().sum::<f64>() / last.len() as f64;
+    let about_mean: Vec<f64> = last.iter().map(|x| x - mean).collect();
+    rms(&about_mean) / rms(input)
+}
+
 /// Motion of the output at its ends, where its noise has the given standard deviation.
 pub(super) fn motion_at_ends(signals: &Signals, noise: f64) -> Vec<Defect> {
     let output = &signals.output;

@@ -14,8 +14,8 @@ mod tests;
 
 use super::Signals;
 pub use defect::Defect;
-pub use ends::input_ratio_at_start;
 use ends::motion_at_ends;
+pub use ends::{input_ratio_at_end, input_ratio_at_start};
 use held::held;
 use plateaus::{Quantisation, clipped, repeated};
 use prediction::Prediction;

@@ -132,6 +132,9 @@ fn line_of_the_input_is_no_stray_line() {
 fn input_that_began_before_the_record_is_active_at_its_start() {
     let whole = signals();
     assert!(input_ratio_at_start(&whole) < 0.01);
+    assert!(input_ratio_at_end(&whole) < 0.01);
+    let ended = input_ratio_at_end(&whole.slice(0..10_000));
+    assert!((0.5..2.0).contains(&ended), "{ended}");
     let begun = input_ratio_at_start(&whole.slice(10_000..25_000));
     assert!((0.5..2.0).contains(&begun), "{begun}");
 }
