@@ -57,20 +57,55 @@ impl fmt::Display for StrayLine {
     }
 }
 
-/// The lines of the output, the strongest first.
+/// The lines of the output, the strongest first, then those that only its rest behind the excitation shows: among the frequencies of a
+/// mode that a sweep excites, a line is no peak of the whole record.
 pub fn stray_lines(signals: &Signals) -> Vec<StrayLine> {
     let (output, input) = (power(&signals.output), power(&signals.input));
     let first = (MIN_PERIODS * PARTS).max(AROUND.1);
-    let end = output.len().saturating_sub(AROUND.1);
-    let is_stray =
-        |k: &usize| is_line(&output, *k, LINE_POWER) && !is_line(&input, *k, INPUT_LINE_POWER);
-    let mut bins: Vec<usize> = (first..end).filter(is_stray).collect();
+    let bins = peaks(&output, first);
+    let bins = bins.filter(|bin| !is_line(&input, *bin, INPUT_LINE_POWER));
+    let mut bins: Vec<usize> = bins.collect();
     bins.sort_by(|a, b| output[*b].total_cmp(&output[*a]));
-    let lines = bins
-        .into_iter()
-        .filter_map(|bin| steady_line(signals, bin))
-        .take(MAX_LINES);
-    lines.collect()
+    let of_bins = bins.into_iter().map(|bin| bin as f64);
+    let mut lines: Vec<StrayLine> = Vec::new();
+    for bin in of_bins.chain(peaks_at_rest(signals)) {
+        let line = steady_line(signals, bin).filter(|line| !is_known(&lines, line, signals));
+        lines.extend(line);
+        if lines.len() == MAX_LINES {
+            break;
+        }
+    }
+    lines
+}
+
+/// The bins from a first one on with far more power than those around.
+fn peaks(power: &[f64], first: usize) -> impl Iterator<Item = usize> {
+    let end = power.len().saturating_sub(AROUND.1);
+    (first..end).filter(|bin| is_line(power, *bin, LINE_POWER))
+}
+
+/// The peaks of the output where the input rests at the end of the record, in bins of the whole record.
+fn peaks_at_rest(signals: &Signals) -> Vec<f64> {
+    let (input, output) = (&signals.input, &signals.output);
+    let Some(last) = input.last() else {
+        return Vec::new();
+    };
+    let active = input.iter().rposition(|u| u != last);
+    let rest = &output[active.map_or(0, |k| k + 1)..];
+    if rest.len() < output.len() / PARTS {
+        return Vec::new();
+    }
+    let bin = output.len() as f64 / rest.len() as f64;
+    let first = MIN_PERIODS.max(AROUND.1);
+    let peaks: Vec<usize> = peaks(&power(rest), first).collect();
+    peaks.into_iter().map(|k| k as f64 * bin).collect()
+}
+
+/// Whether a line is one of those that are found: they are farther apart than a bin.
+fn is_known(found: &[StrayLine], line: &StrayLine, signals: &Signals) -> bool {
+    let bin_hz = signals.rate_hz / signals.len() as f64;
+    let mut found = found.iter();
+    found.any(|other| (other.frequency_hz - line.frequency_hz).abs() < bin_hz)
 }
 
 /// The signals with an output without the lines.
@@ -116,11 +151,11 @@ fn is_line(power: &[f64], bin: usize, factor: f64) -> bool {
     is_peak && power[bin] > factor * *median
 }
 
-/// The line near a bin, if its amplitude is the same in most parts of the record.
-fn steady_line(signals: &Signals, bin: usize) -> Option<StrayLine> {
+/// The line near a place between the bins, if its amplitude is the same in most parts of the record.
+fn steady_line(signals: &Signals, bin: f64) -> Option<StrayLine> {
     let output = &signals.output;
     let length = output.len() / PARTS;
-    let mut omega = TAU * bin as f64 / output.len() as f64;
+    let mut omega = TAU * bin / output.len() as f64;
     omega += median_advance(&amplitudes(output, omega)) / length as f64;
     for _ in 0..CORRECTIONS {
         let amplitudes = amplitudes(output, omega);

@@ -114,6 +114,24 @@ fn sinusoid_of_the_whole_record_is_found_and_subtracted() {
     assert!(left.sqrt() < 2.8e-3, "{}", left.sqrt());
 }
 
+/// The mode at 30 Hz has a width of 1.2 Hz; in the whole record a line beside it is no peak.
+#[test]
+fn sinusoid_beside_a_mode_is_found_where_the_input_rests() {
+    let mut signals = signals();
+    let hz = 29.3;
+    for (n, y) in signals.output.iter_mut().enumerate() {
+        *y += 0.1 * (std::f64::consts::TAU * hz * n as f64 / RATE_HZ).cos();
+    }
+    let found = stray_lines(&signals);
+    let [line] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert!((line.frequency_hz - hz).abs() < 1e-3, "{line:?}");
+    assert!((line.amplitude.norm() - 0.1).abs() < 5e-3, "{line:?}");
+    // Without the rest it is not found.
+    assert_eq!(stray_lines(&signals.slice(0..20_500)), []);
+}
+
 #[test]
 fn line_of_the_input_is_no_stray_line() {
     let line = |n: usize| 0.2 * (std::f64::consts::TAU * 50.0 * n as f64 / RATE_HZ).cos();
