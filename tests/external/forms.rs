@@ -91,7 +91,7 @@ fn names_the_format_of_another_program() {
         (
             "a.mat",
             b"MATLAB 7.3 MAT-file, Platform: GLNXA64".as_slice(),
-            "cannot be read",
+            "an HDF5 file",
         ),
         ("a.parquet", b"PAR1\x15\x04".as_slice(), "Parquet"),
         ("a.xlsx", b"PK\x03\x04".as_slice(), "zip"),

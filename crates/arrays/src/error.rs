@@ -18,7 +18,7 @@ pub enum ArraysError {
     },
     /// The list of the arrays of an HDF5 file cannot be read.
     #[error(
-        "its list of arrays cannot be read ({reason}); it may be damaged, or incomplete because it was not closed"
+        "it is an HDF5 file whose list of arrays cannot be read ({reason}), as one that is damaged or was not closed"
     )]
     Hdf5 {
         /// What the reader of the format reports.

@@ -4,7 +4,7 @@
 //! d_k = t_k - (t + k T)            deviation from the regular times of least squares
 //! |d_k| < 0.75 last digits of t_k  regular times, rounded: the period is T, which is more exact than that of both ends
 //! larger                           irregular times, which are true: the samples are resampled
-//! a step of 1.5 median steps       a gap, refused
+//! a step of 1.5 median steps       a gap, refused, unless the next steps make up for it (jitter)
 //! ```
 
 use std::fmt;
@@ -18,6 +18,10 @@ use super::stamp::{Stamp, digits};
 
 /// Largest deviation of a step from the median step, as a ratio.
 const MAX_IRREGULARITY: f64 = 0.5;
+/// Largest deviation of a step from the usual one by jitter, as a ratio: neighbouring instants deviate by half of it each.
+const MAX_JITTER: f64 = 0.8;
+/// Number of times before and after a step whose means show whether a sample is missing.
+const JITTER_SAMPLES: usize = 8;
 /// Largest deviation of a rounded time from the line through all of them, as a ratio of its last digit: half a digit, and some more
 /// because the line has an error as well.
 const ROUNDED: f64 = 0.75;
@@ -356,8 +360,15 @@ fn check_gaps(time_s: &[f64], digit_s: f64) -> Result<(), TimeDefect> {
     };
     let limit_s = MAX_IRREGULARITY * usual_s + rounding_s;
     let difference_s = |k: &usize| (steps_s[*k] - usual_s).abs();
-    let widest = (0..steps_s.len()).max_by(|a, b| difference_s(a).total_cmp(&difference_s(b)));
-    match widest.filter(|k| difference_s(k) > limit_s) {
+    let mean_step_s = step_of_several(time_s).unwrap_or(usual_s);
+    let shift_s = |k: &usize| lasting_shift_s(time_s, *k, mean_step_s).abs();
+    let is_jitter = |k: &usize| {
+        difference_s(k) < MAX_JITTER * usual_s && shift_s(k) < MAX_IRREGULARITY * usual_s
+    };
+    let gaps = (0..steps_s.len()).filter(|k| difference_s(k) > limit_s && !is_jitter(k));
+    // Around a gap, other steps with jitter have a part of its shift.
+    let widest = gaps.max_by(|a, b| shift_s(a).total_cmp(&shift_s(b)));
+    match widest {
         Some(k) if steps_s[k] <= 0.0 => Err(not_rising(time_s, k)),
         Some(k) => Err(TimeDefect::Gap {
             at: k + 1,
@@ -366,6 +377,24 @@ fn check_gaps(time_s: &[f64], digit_s: f64) -> Result<(), TimeDefect> {
         }),
         None => Ok(()),
     }
+}
+
+/// The median step over several samples each, which jitter hardly changes; `None` of fewer.
+fn step_of_several(time_s: &[f64]) -> Option<f64> {
+    let spans = time_s.windows(JITTER_SAMPLES + 1);
+    let steps = spans.map(|times| (times[JITTER_SAMPLES] - times[0]) / JITTER_SAMPLES as f64);
+    let steps_s: Vec<f64> = steps.collect();
+    (!steps_s.is_empty()).then(|| median(&steps_s))
+}
+
+/// By how much the mean times before and after the step from time `k` are farther apart than regular ones: a whole step for a missing
+/// sample, and nearly nothing for jitter, for which the next steps make up.
+fn lasting_shift_s(time_s: &[f64], k: usize, usual_s: f64) -> f64 {
+    let before = &time_s[(k + 1).saturating_sub(JITTER_SAMPLES)..=k];
+    let after = &time_s[k + 1..time_s.len().min(k + 1 + JITTER_SAMPLES)];
+    let mean_s = |times: &[f64]| times.iter().sum::<f64>() / times.len() as f64;
+    let steps = 0.5 * (before.len() + after.len()) as f64;
+    mean_s(after) - mean_s(before) - steps * usual_s
 }
 
 fn not_rising(time_s: &[f64], k: usize) -> TimeDefect {
@@ -472,6 +501,30 @@ mod tests {
             (largest_deviation_s / 1.6634e-3 - 1.0).abs() < 3e-3,
             "{largest_deviation_s}"
         );
+    }
+
+    /// Instants that deviate by up to 0.35 steps; the same with a sample left out, or one too many.
+    #[test]
+    fn jitter_is_no_gap_and_a_missing_sample_in_it_is_one() {
+        let instant = |k: usize| 1e-3 * (k as f64 + 0.35 * (7.0 * (k * k) as f64).sin());
+        let instants: Vec<f64> = (0..500).map(instant).collect();
+        let steps = instants.windows(2).map(|pair| pair[1] - pair[0]);
+        let longest_s = steps.fold(0.0, f64::max);
+        assert!((1.6e-3..1.75e-3).contains(&longest_s), "{longest_s}");
+        let unit = Some(TimeUnit::S);
+        let cells = |times: &[f64]| times.iter().map(|t| format!("{t:.9}")).collect::<Vec<_>>();
+        assert!(times(&cells(&instants), unit).is_ok());
+        // Jitter may make the step over a missing sample as short as others.
+        let is_long = |place: &usize| instants[place + 1] - instants[place - 1] > 1.6e-3;
+        for place in (10..490).step_by(7).filter(is_long) {
+            let mut missing = instants.clone();
+            missing.remove(place);
+            let found = times(&cells(&missing), unit).err();
+            assert!(
+                matches!(found, Some(TimeDefect::Gap { at, .. }) if at.abs_diff(place) <= 2),
+                "{place}: {found:?}"
+            );
+        }
     }
 
     #[test]

@@ -304,14 +304,18 @@ const ENDS: usize = 30;
 
 #[test]
 fn irregular_times_are_true_and_both_columns_are_resampled() {
-    // The rate falls by 1 %; it changes by 7 % in the middle; times scatter by 8 % of a period.
+    // The rate falls by 1 %; it changes by 7 % in the middle; times scatter by 8 % of a period, or by 35 %, so that steps differ by 65 %.
     let drift = |k: usize| regular(k) * (1.0 + 0.005 * k as f64 / SAMPLES as f64);
     let change = |k: usize| regular(k) + 0.07 * regular(k.saturating_sub(SAMPLES / 2));
-    let jitter = |k: usize| regular(k) + 0.08 / RATE_HZ * ((7 * k * k) as f64).sin();
+    let scattered =
+        |k: usize, ratio: f64| regular(k) + ratio / RATE_HZ * ((7 * k * k) as f64).sin();
+    let jitter = |k: usize| scattered(k, 0.08);
+    let large_jitter = |k: usize| scattered(k, 0.35);
     for (what, time) in [
         ("drift", &drift as &dyn Fn(usize) -> f64),
         ("change", &change),
         ("jitter", &jitter),
+        ("large jitter", &large_jitter),
     ] {
         let rows = table(time, |k| format!("{:.9}", time(k)));
         let found = record(format!("t,u,y\n{rows}"), "t");
