@@ -472,8 +472,9 @@ pub(super) fn judged(
         return Ok(Verdict::undecided(why));
     }
     let verdict = judge(fit, &frf.data, chain, VerdictScope::up_to(up_to_rad_s))?;
-    let hint = hint(&verdict);
-    Ok(unless_undetermined(verdict.with(hint), fit))
+    let verdict = unless_undetermined(verdict, fit);
+    let hint = hint(&verdict).filter(|hint| !verdict.why.contains(hint));
+    Ok(verdict.with(hint))
 }
 
 /// Whether a few modes with real residues describe the data.
