@@ -10,7 +10,7 @@ use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{Observation, Source, describes};
+use crate::observation::{Observation, Source, describes, fit_part, part};
 use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Repetition};
 use crate::plausibility::{
@@ -414,6 +414,8 @@ fn analyse(
     let fit = match (other, &periodic) {
         (Some((_, few)), _) => few,
         (None, Some(part)) => fit_of_periods(&frf.data, part.linearity.as_ref(), &chain),
+        // Many modes would be fitted to the defect.
+        (None, None) if !defects.is_empty() => fit_part(&part(&frf.data), &chain),
         (None, None) => modal::fit(&frf.data, &chain),
     };
     let fit = match &clock_skew {
