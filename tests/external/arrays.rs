@@ -1,4 +1,4 @@
-//! Files of scipy, numpy, h5py and pyuff (`tests/python/record_files.py`) give the modes of the CSV with the same numbers.
+//! Files of scipy, numpy, h5py, pyarrow and pyuff (`tests/python/record_files.py`) give the modes of the CSV with the same numbers.
 use serde_json::Value;
 
 use crate::external::program::{Bench, number};
@@ -31,6 +31,14 @@ const FILES: [(&str, [&str; 3], f64); 21] = [
     ("uneven.uff", NODES, 0.0),
 ];
 
+/// With the feature `parquet`.
+const PARQUET: [&str; 4] = [
+    "snappy.parquet",
+    "zstd.parquet",
+    "gzip.parquet",
+    "stamps.parquet",
+];
+
 const NAMES: [&str; 3] = ["time_s", "force_n", "position_m"];
 const FIELDS: [&str; 3] = ["rec.time_s", "rec.force_n", "rec.position_m"];
 const MATRIX: [&str; 3] = ["data:1", "data:2", "data:3"];
@@ -45,7 +53,7 @@ fn bench() -> Option<Bench> {
         csv(&multisine(&(5..=200).collect::<Vec<_>>(), 5, 0.0, 1e-8, 21)),
     );
     let [table, folder] = ["data.csv", ""].map(|name| bench.path(name).display().to_string());
-    let modules = "numpy, scipy.io, h5py, pyuff";
+    let modules = "numpy, scipy.io, h5py, pyarrow, pyuff";
     python::numbers_with(modules, "record_files.py", &[&table, &folder], "")?;
     Some(bench)
 }
@@ -71,7 +79,9 @@ fn every_file_of_arrays_gives_the_modes_of_the_csv() {
     let Some(bench) = bench() else { return };
     let expected = modes(&identify(&bench, "data.csv", NAMES));
     assert_eq!(expected.len(), STAGE.len());
-    for (file, names, tolerance) in FILES {
+    let parquet = PARQUET.map(|file| (file, NAMES, 0.0));
+    let parquet = parquet.into_iter().filter(|_| cfg!(feature = "parquet"));
+    for (file, names, tolerance) in FILES.into_iter().chain(parquet) {
         let answer = identify(&bench, file, names);
         assert_eq!(number(&answer["rate_hz"]), 1000.0, "{file}");
         assert_eq!(answer["times"]["kind"], "regular", "{file}");

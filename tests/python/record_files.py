@@ -1,4 +1,4 @@
-"""Writes a record as the files of other programs: the columns of a CSV file with scipy, numpy, h5py and pyuff.
+"""Writes a record as the files of other programs: the columns of a CSV file with scipy, numpy, h5py, pyarrow and pyuff.
 
 usage: record_files.py CSV FOLDER
 """
@@ -8,6 +8,8 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import pyarrow
+import pyarrow.parquet
 import pyuff
 from scipy.io import savemat
 
@@ -75,6 +77,16 @@ def hdf5_files(columns, folder):
         file.create_dataset("data", data=np.column_stack(list(columns.values())))
 
 
+def parquet_files(columns, folder):
+    for file, compression in [("snappy.parquet", "snappy"), ("zstd.parquet", "zstd"), ("gzip.parquet", "gzip")]:
+        table = pyarrow.table(columns)
+        pyarrow.parquet.write_table(table, folder / file, compression=compression, row_group_size=1500)
+    start = np.datetime64("2026-11-28T08:26:43", "ns")
+    stamps = start + np.rint(columns["time_s"] * 1e9).astype("timedelta64[ns]")
+    table = pyarrow.table(dict(columns, time_s=stamps))
+    pyarrow.parquet.write_table(table, folder / "stamps.parquet")
+
+
 def dataset(columns, name, node, binary, even):
     return {
         "type": 58,
@@ -114,6 +126,7 @@ def main():
     mat_files(columns, folder)
     numpy_files(columns, folder)
     hdf5_files(columns, folder)
+    parquet_files(columns, folder)
     universal_files(columns, folder)
 
 

@@ -24,6 +24,12 @@ pub enum ArraysError {
         /// What the reader of the format reports.
         reason: String,
     },
+    /// A Parquet file cannot be read.
+    #[error("it is a Parquet file that cannot be read ({reason})")]
+    Parquet {
+        /// What the reader of the format reports.
+        reason: String,
+    },
     /// More numbers than the limit.
     #[error("it has more than {limit} bytes of numbers")]
     TooLarge {

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | MAT-file of version 5 to 7 | `save` of MATLAB and Octave, `scipy.io.savemat` |
 //! | HDF5, as also a MAT-file of version 7.3 | `save` of MATLAB with `-v7.3`, h5py, PyTables, programs of instruments |
+//! | Parquet (feature `parquet`) | pandas, polars, Arrow, DuckDB |
 //! | NPZ, NPY | `numpy.savez`, `numpy.savez_compressed`, `numpy.save` |
 //! | universal file, dataset 58 and 58b | vibration analysers, pyuff |
 //!
@@ -25,6 +26,8 @@ mod mat;
 mod npy;
 mod npz;
 mod number;
+#[cfg(feature = "parquet")]
+mod parquet;
 mod places;
 mod universal;
 mod value;
@@ -44,6 +47,9 @@ pub enum Format {
     Mat,
     /// HDF5 file, as also a MAT-file of version 7.3.
     Hdf5,
+    /// Parquet file.
+    #[cfg(feature = "parquet")]
+    Parquet,
     /// Archive of NumPy arrays.
     Npz,
     /// One NumPy array.
@@ -61,6 +67,10 @@ impl Format {
     /// assert_eq!(Format::of(b"t,u,y\n0,1,2\n"), None);
     /// ```
     pub fn of(bytes: &[u8]) -> Option<Format> {
+        #[cfg(feature = "parquet")]
+        if parquet::is_one(bytes) {
+            return Some(Format::Parquet);
+        }
         if bytes.starts_with(b"MATLAB 5.0") {
             Some(Format::Mat)
         } else if hdf5::is_one(bytes) {
@@ -79,6 +89,8 @@ impl Format {
         match self {
             Format::Mat => "a MAT-file",
             Format::Hdf5 => "an HDF5 file",
+            #[cfg(feature = "parquet")]
+            Format::Parquet => "a Parquet file",
             Format::Npz => "an NPZ file",
             Format::Npy => "a NumPy file",
             Format::Universal => "a universal file",
@@ -98,6 +110,8 @@ pub fn variables(format: Format, bytes: &[u8], max_bytes: u64) -> Result<Variabl
     match format {
         Format::Mat => mat::variables(bytes, &mut budget),
         Format::Hdf5 => hdf5::variables(bytes, &mut budget),
+        #[cfg(feature = "parquet")]
+        Format::Parquet => parquet::variables(bytes, &mut budget),
         Format::Npz => npz::variables(bytes, &mut budget),
         Format::Npy => Ok(vec![(String::new(), npy::array(bytes, &mut budget)?)]),
         Format::Universal => Ok(universal::records(&universal::datasets(

@@ -1,4 +1,4 @@
-//! Files that h5py wrote (`tests/python/hdf5_files.py`).
+//! Files that h5py wrote (`tests/python/array_files.py`).
 
 use num_complex::Complex;
 

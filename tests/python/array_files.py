@@ -1,13 +1,17 @@
-"""Writes the HDF5 files of the unit tests of bench-arrays, with h5py 3.16.
+"""Writes the HDF5 and Parquet files of the unit tests of bench-arrays, with h5py 3.16 and pyarrow 26.
 
-usage: hdf5_files.py crates/arrays/tests/files
+usage: array_files.py crates/arrays/tests/files
 """
 
 import sys
+from datetime import datetime, timedelta
+from decimal import Decimal
 from pathlib import Path
 
 import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet
 
 folder = Path(sys.argv[1])
 
@@ -54,3 +58,19 @@ with h5py.File(folder / "latest.h5", "w", libver="latest") as file:
 # A thousand billion numbers, none of which is stored.
 with h5py.File(folder / "huge.h5", "w") as file:
     file.create_dataset("u", shape=(10**12,), chunks=(1000,), dtype="f8")
+
+start = datetime(2026, 11, 28, 8, 26, 43)
+table = pa.table(
+    {
+        "t": pa.array([0.0, 0.5, 1.0, 1.5, 2.0]),
+        "u": pa.array([0.5, None, -1.5, 2.5, 3.5], type=pa.float32()),
+        "count": pa.array([1, 2, 3, 4, None], type=pa.int32()),
+        "on": pa.array([True, False, True, True, False]),
+        "stamp": pa.array([start + timedelta(microseconds=500 * k) for k in range(5)], type=pa.timestamp("us")),
+        "label": pa.array(["a", "b", "c", "d", "e"]),
+        "parts": pa.array([[1.0], [2.0], [], [3.0], [4.0]]),
+        "price": pa.array([Decimal("1.25")] * 5, type=pa.decimal128(7, 2)),
+        "s": pa.array([{"y": 10 + k} for k in range(5)]),
+    }
+)
+pyarrow.parquet.write_table(table, folder / "table.parquet", compression="snappy", row_group_size=3)
