@@ -51,6 +51,8 @@ use bench_plant::{PlantError, Sign};
 const UNCONFIRMED_SIGMAS: f64 = 6.0;
 /// The phase confirms pairs that turn it by at least this angle each, half of a full turn, in degrees.
 const CONFIRMED_DEG: f64 = 180.0;
+/// A zero whose distance from the imaginary axis exceeds this ratio of its frequency has another one nearer to its mirror image than that.
+const MIRROR_RATIO: f64 = 0.2;
 /// Relative accuracy of a fit: a zero closer to the imaginary axis is on neither side.
 const FIT_ACCURACY: f64 = 1e-4;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
@@ -145,15 +147,22 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     modes.retain(|mode| input.covers(mode.omega_rad_s.value));
     let phase_drop = phase_drop_over(input, &modes, &zeros)?;
     zeros.retain(|zero| input.covers(zero.s.norm()));
+    let is_complex = !input.fit.parameters.has_real_residues();
+    let of_stage = if is_complex {
+        zeros_of_the_stage(&zeros)
+    } else {
+        zeros.clone()
+    };
     let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
     let insufficient = insufficient_data(input, &modes)
         .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
         .or_else(|| uncertain_side(&zeros, input.certainty))
-        .or_else(|| unconfirmed_in_a_misfit(input.fit, &zeros, phase_drop));
+        .or_else(|| unconfirmed_in_a_misfit(input.fit, &zeros, phase_drop))
+        .or_else(|| only_of_the_chain(&zeros, &of_stage));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
         None => match phase_drop {
-            Some(phase_drop) => evaluate(&zeros, certain_signs(input).as_deref(), phase_drop),
+            Some(phase_drop) => evaluate(&of_stage, certain_signs(input).as_deref(), phase_drop),
             None => (Cnmp::Undecided, no_phase_drop(modes.len()).into()),
         },
     };
@@ -163,7 +172,6 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         zeros,
         phase_drop,
     };
-    let is_complex = !input.fit.parameters.has_real_residues();
     let verdict = verdict.with(is_complex.then(|| COMPLEX_RESIDUES.into()));
     Ok(verdict.with(left_out(input.fit)))
 }
@@ -371,6 +379,37 @@ fn unconfirmed_in_a_misfit(
     }
     let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
     cnmp.next().map(unconfirmed_reason)
+}
+
+/// The zeros that a mechanical system can have. Without damping they are symmetric about the imaginary axis, and damping moves them by
+/// little: far right of it there is only one that has another one at about its mirror image. A lag or a filter, which complex residues
+/// represent within the band only, may have one without it.
+fn zeros_of_the_stage(zeros: &[UncertainZero]) -> Vec<UncertainZero> {
+    let is_mirrored = |zero: &&UncertainZero| {
+        let mirror_image = -zero.s.conj();
+        let distance = |other: &UncertainZero| (other.s - mirror_image).norm();
+        let limit = MIRROR_RATIO * zero.s.norm();
+        zero.s.re < limit || zeros.iter().any(|other| distance(other) < limit)
+    };
+    let of_stage = zeros
+        .iter()
+        .filter(|zero| zero.s.im == 0.0 || is_mirrored(zero));
+    of_stage.copied().collect()
+}
+
+/// Why CNMP zeros of the fit decide nothing: none of them is one of the stage.
+fn only_of_the_chain(zeros: &[UncertainZero], of_stage: &[UncertainZero]) -> Option<String> {
+    if cnmp_pairs(of_stage) > 0 {
+        return None;
+    }
+    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
+    let zero = cnmp.next()?;
+    Some(format!(
+        "the zero {:.1} \u{b1} {:.1}j rad/s at {:.2} Hz lies far right of the imaginary axis without one left of it, as of a filter or a lag between input and output, and not of the stage; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)",
+        zero.s.re,
+        zero.s.im,
+        hertz(zero.s.norm())
+    ))
 }
 
 fn unconfirmed_reason(zero: &UncertainZero) -> String {

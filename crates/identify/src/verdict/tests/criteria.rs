@@ -7,7 +7,7 @@ use crate::modal::Parameter;
 use crate::verdict::sign_groups::signs_of;
 use crate::verdict::{
     Certainty, Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate,
-    uncertain_side,
+    only_of_the_chain, uncertain_side, zeros_of_the_stage,
 };
 use bench_plant::zeros::ZeroKind;
 
@@ -121,6 +121,40 @@ fn phase_confirms_pairs_that_turn_it_by_half_a_turn_each() {
         assert_eq!(cnmp_at(limit_deg), Cnmp::Detected, "{pairs}");
         assert_eq!(cnmp_at(limit_deg - 0.1), Cnmp::Undecided, "{pairs}");
     }
+}
+
+/// A lag that is not stated gave complex residues with a zero at 1136 +- 1225j rad/s, of a stage whose zeros all lie left of the axis.
+#[test]
+fn zeros_of_complex_residues_far_right_need_one_at_their_mirror_image() {
+    let at = |re: f64, im: f64, kind: ZeroKind| UncertainZero {
+        s: Complex::new(re, im),
+        kind,
+        ..cnmp_zero(0.0)
+    };
+    let lag = at(1136.0, 1225.0, ZeroKind::Cnmp);
+    // |1136 + 1225 j| is 1671: at most 334 from the mirror image, and from the axis.
+    let [near_image, far_image] = [-803.0, -801.0].map(|re| at(re, 1225.0, ZeroKind::Cmp));
+    let [near_axis, far_axis] = [0.2, 0.21].map(|re| at(re, 1.0, ZeroKind::Cnmp));
+    let real = at(1136.0, 0.0, ZeroKind::Rnmp);
+    for (zeros, kept) in [
+        (vec![lag], vec![]),
+        (vec![lag, near_image], vec![lag, near_image]),
+        (vec![lag, far_image], vec![far_image]),
+        (vec![near_axis, real], vec![near_axis, real]),
+        (vec![far_axis, left_zero()], vec![left_zero()]),
+    ] {
+        let of_stage = zeros_of_the_stage(&zeros);
+        assert_eq!(of_stage, kept, "{zeros:?}");
+        let is_pair_left = kept.iter().any(|zero| zero.kind == ZeroKind::Cnmp);
+        let why = only_of_the_chain(&zeros, &of_stage);
+        assert_eq!(why.is_none(), is_pair_left, "{why:?}");
+    }
+    let why = only_of_the_chain(&[lag], &[]).expect("a reason");
+    assert!(
+        why.starts_with("the zero 1136.0 \u{b1} 1225.0j rad/s at 265.89 Hz"),
+        "{why}"
+    );
+    assert_eq!(only_of_the_chain(&[left_zero()], &[]), None);
 }
 
 #[test]
