@@ -586,7 +586,7 @@ def intervals(record, answer):
             continue
         truth = {"frequency_hz": hz, "damping_ratio": zeta, "residue": r * record.scale}
         rows.append([abs(near[name] - value) <= 1.96 * near[name + "_sigma"] for name, value in truth.items()])
-        is_certain = abs(near["residue"]) > 1.96 * near["residue_sigma"]
+        is_certain = near["sign"] != "c" and abs(near["residue"]) > 1.96 * near["residue_sigma"]
         wrong += bool(is_certain and near["residue"] * truth["residue"] < 0 and answer["cnmp"] != "undecided")
     return rows, wrong
 

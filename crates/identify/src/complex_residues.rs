@@ -9,7 +9,8 @@
 //! 1. they leave noise as the residual, and do not nearly cancel;
 //! 2. they need no more modes than real residues that describe the data and, where those leave noise as well, fewer parameters;
 //! 3. real residues and a delay in their place, with as many modes, describe the data significantly worse;
-//! 4. they are not those of another kind of output: with r = 0 for all modes it is a velocity.
+//! 4. they are not those of another kind of output: with r = 0 for all modes it is a velocity;
+//! 5. no mode is heavily damped: such a mode takes the place of a filter, and the zeros near it are none of the stage.
 //!
 //! The delay of the result is that with the smallest imaginary parts.
 //!
@@ -25,6 +26,8 @@ use crate::modal::{
 
 /// Largest number of modes with complex residues. More are a sign of something else, and take long.
 const MAX_MODES: usize = 8;
+/// A mode of a flexure with a damper has less.
+const MAX_DAMPING_RATIO: f64 = 0.3;
 /// Beside the ln 2N of each rate (Bayesian information criterion), chi^2 must decrease by the square of 5 standard deviations.
 const CERTAIN_DECREASE: f64 = 25.0;
 
@@ -82,6 +85,7 @@ fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) 
     complex.is_sum_of_few_modes()
         && complex.undetermined_modes().is_none()
         && !complex.modes().iter().all(is_mostly_imaginary)
+        && complex.modes().iter().all(is_lightly_damped)
         && is_better_than_real(&complex.parameters, data, chain)
 }
 
@@ -89,6 +93,10 @@ fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) 
 fn is_mostly_imaginary(mode: &FittedMode) -> bool {
     let imaginary = mode.residue_imaginary_per_kg;
     imaginary.is_some_and(|part| part.value.abs() > mode.residue_per_kg.value.abs())
+}
+
+fn is_lightly_damped(mode: &FittedMode) -> bool {
+    mode.damping_ratio.value < MAX_DAMPING_RATIO
 }
 
 /// Whether chi^2 increases significantly with real residues and a free delay, near the same modes.
