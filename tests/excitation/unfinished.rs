@@ -89,6 +89,63 @@ fn analysis_states_whether_the_recording_is_complete_or_truncated() {
     assert!(text(&cut["why"]).contains("cut off"), "{}", cut["why"]);
 }
 
+/// A logarithmic sweep from 5 to 200 Hz in 20 s, after 1 s of rest, reaches 5 Hz 40^((t - 1 s)/20 s).
+fn reached_hz(time_s: f64) -> f64 {
+    5.0 * 40_f64.powf((time_s - 1.0) / 20.0)
+}
+
+fn frequency_hz(mode: &Value) -> f64 {
+    mode["frequency_hz"].as_f64().expect("a frequency")
+}
+
+#[test]
+fn response_of_a_cut_chirp_ends_where_its_sweep_ended() {
+    let bench = Bench::new();
+    let run = bench.json(
+        "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --sweep logarithmic --duration 20 --set chirp.quiet_before_s=1 \
+         --operating-point 8%",
+    );
+    let bytes = std::fs::read(bench.path(text(&run["recording"]))).expect("a recording");
+    let cut_at = |share: f64| {
+        let length = (share * bytes.len() as f64) as usize;
+        std::fs::write(bench.path("cut.mcap"), &bytes[..length]).expect("a disk");
+        bench.run("identify cut.mcap --json")
+    };
+    let whole = run["modes"].as_array().expect("modes");
+    for share in [0.55, 0.7, 0.8] {
+        let answer = cut_at(share);
+        assert_eq!(answer.code, 3, "{share}: {}", answer.err);
+        let cut = answer.json();
+        let time_s = cut["ticks"].as_f64().expect("a number") / 1e3;
+        let last_hz = cut["fit_band_hz"][1].as_f64().expect("a number");
+        // The loop is armed for less than 2 s before the run, and 16 bins of 1/T and one between two data are left out.
+        let earliest_hz = reached_hz(time_s - 2.0) - 20.0 / time_s;
+        let reached = earliest_hz..=reached_hz(time_s);
+        assert!(
+            reached.contains(&last_hz),
+            "{share}: {last_hz} Hz, {reached:?}"
+        );
+        // A longer record has smaller errors: those of both are at most sqrt(2) times those of the shorter one.
+        let modes = cut["modes"].as_array().expect("modes").iter();
+        let in_band: Vec<&Value> = modes.filter(|mode| frequency_hz(mode) < last_hz).collect();
+        assert!(!in_band.is_empty(), "{share}: {cut}");
+        for mode in in_band {
+            let sigma_hz = mode["frequency_hz_sigma"].as_f64().expect("a number");
+            let distances = whole
+                .iter()
+                .map(|of| (frequency_hz(of) - frequency_hz(mode)).abs());
+            let distance_hz = distances.fold(f64::INFINITY, f64::min);
+            assert!(
+                distance_hz < 4.5 * 1.5 * sigma_hz,
+                "{share}: {mode}, {whole:?}"
+            );
+        }
+    }
+    let answer = cut_at(0.1);
+    assert_eq!(answer.code, 1, "{}", answer.out);
+    assert!(answer.err.contains("the sweep ended at"), "{}", answer.err);
+}
+
 #[test]
 fn error_without_response_names_the_recording() {
     let bench = Bench::new();

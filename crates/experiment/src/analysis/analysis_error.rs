@@ -35,6 +35,16 @@ pub enum AnalysisError {
         "no program ran in this recording, so it contains no excitation to analyse; choose another recording"
     )]
     NothingRan,
+    /// A sweep ended before it excited a band.
+    #[error(
+        "the sweep ended at {reached_hz:.2} Hz soon after its start at {from_hz} Hz, too early for a frequency response; repeat the run"
+    )]
+    EndedTooEarly {
+        /// First frequency of the sweep.
+        from_hz: f64,
+        /// The frequency at its end.
+        reached_hz: f64,
+    },
     /// The receiver of the progress cancelled the analysis.
     #[error("the analysis was cancelled; repeat it with `bench identify`")]
     Cancelled,

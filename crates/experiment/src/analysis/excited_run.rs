@@ -7,6 +7,7 @@ use super::read_run::is_closed_loop;
 use super::response_estimate::ResponseEstimate;
 use super::run_signals::RunSignals;
 use super::segments::{Segments, segments};
+use super::swept_band::{SweptBy, swept_band_hz};
 use bench_config::Config;
 use bench_excitation::Pattern;
 use bench_identify::{Signals, response};
@@ -18,7 +19,7 @@ pub(super) struct ExcitedRun<'a> {
     config: &'a Config,
     missing: MissingTicks,
     excitation: RunExcitation,
-    /// The band of the excitation.
+    /// The band that is excited.
     band_hz: (f64, f64),
 }
 
@@ -41,12 +42,17 @@ impl<'a> ExcitedRun<'a> {
         } else {
             RunExcitation::Current(config.chosen_excitation()?.pattern())
         };
+        let swept_by = match &excitation {
+            RunExcitation::Reference => SweptBy::Reference,
+            RunExcitation::Current(pattern) => SweptBy::Current(pattern),
+        };
+        let band_hz = swept_band_hz(recording, config, &swept_by, missing.ticks)?;
         Ok(ExcitedRun {
             recording,
             config,
             missing: missing.clone(),
             excitation,
-            band_hz: config.chirp.band_hz(),
+            band_hz,
         })
     }
 

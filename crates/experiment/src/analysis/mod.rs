@@ -25,6 +25,7 @@ mod response_points;
 mod run_signals;
 mod segments;
 mod signal_builder;
+mod swept_band;
 
 pub use analysed_run::AnalysedRun;
 pub use analysis_error::{AnalysisError, ClosedLoopError};

@@ -241,7 +241,7 @@ impl AnalysisOutputs {
 
     /// The outputs of a run that did not come to its end.
     pub fn run_incomplete() -> AnalysisOutputs {
-        let why = "the run did not come to its end";
+        let why = "the run did not come to its end; `bench identify` on its recording gives the response of the band that its sweep reached";
         AnalysisOutputs::without_analysis(AnalysisStatus::RunIncomplete, why)
     }
 
