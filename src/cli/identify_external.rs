@@ -7,6 +7,7 @@ use serde::Serialize;
 use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
 use super::exit::Exit;
+use super::input_path_text::InputPathReport;
 use super::linearity_output;
 use super::modal_output;
 use super::output::print_result;
@@ -45,8 +46,8 @@ struct Report {
     /// What the output measures, as stated, or `position`.
     output_kind: OutputKind,
     /// Hold and lag of the input that were assumed; 0 without them.
-    hold_s: f64,
-    input_lag_s: f64,
+    #[serde(flatten)]
+    input_path: InputPathReport,
     /// Steps of the values of input and output; `null` if they are below the noise.
     input_resolution: Option<f64>,
     output_resolution: Option<f64>,
@@ -153,8 +154,7 @@ impl Report {
             time_unit_assumed: false,
             band_hz: analysis.band_hz,
             output_kind: analysis.output_kind,
-            hold_s: analysis.input_path.hold_s,
-            input_lag_s: analysis.input_path.lag_s,
+            input_path: InputPathReport::new(analysis.input_path, analysis.fitted_lag),
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
@@ -202,7 +202,7 @@ impl Report {
             self.clocks_text(),
             self.output_kind_text(),
             self.resolution_text(),
-            self.input_path_text()
+            self.input_path.text()
         )
     }
 
@@ -265,15 +265,6 @@ impl Report {
             text += &linearity_output::text(linearity);
         }
         Some(text)
-    }
-
-    /// The assumed hold and lag, if there are any.
-    fn input_path_text(&self) -> String {
-        if self.hold_s == 0.0 && self.input_lag_s == 0.0 {
-            return String::new();
-        }
-        let (hold_ms, lag_ms) = (1e3 * self.hold_s, 1e3 * self.input_lag_s);
-        format!("             input held for {hold_ms:.4} ms, lag {lag_ms:.4} ms\n")
     }
 }
 

@@ -8,6 +8,7 @@ use super::analysis_output::{in_folder, pages_text};
 use super::error::CliError;
 use super::exit::Exit;
 use super::figure_options::magnitude_axis;
+use super::input_path_text::InputPathReport;
 use super::measured_margins::sigma_text;
 use super::modal_output;
 use super::output::{print_result, warn};
@@ -42,8 +43,8 @@ struct Report {
     negative_text: Option<String>,
     band_hz: (f64, f64),
     /// Hold and lag of the input that were assumed; 0 without them.
-    hold_s: f64,
-    input_lag_s: f64,
+    #[serde(flatten)]
+    input_path: InputPathReport,
     /// What the output was taken as.
     output_kind: OutputKind,
     frf_csv: String,
@@ -114,8 +115,7 @@ impl Report {
             negative: response.negative.is_some(),
             negative_text: response.negative.map(|found| found.description()),
             band_hz: analysis.band_hz,
-            hold_s: analysis.input_path.hold_s,
-            input_lag_s: analysis.input_path.lag_s,
+            input_path: InputPathReport::new(analysis.input_path, analysis.fitted_lag),
             output_kind: analysis.output_kind,
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
             pages: write_page(&page.report(), results)?,
@@ -137,7 +137,7 @@ impl Report {
             self.negative_text
                 .as_ref()
                 .map_or(String::new(), |text| labelled("sign", text)),
-            self.input_path_text(),
+            self.input_path.text(),
             format!("  written    {}\n", self.frf_csv),
             format!("  fit        reduced chi-square {chi2:.3}\n"),
             pages_text(&self.pages),
@@ -179,18 +179,6 @@ impl Report {
             OutputKind::Position => String::new(),
             kind => labelled("output", kind.name()),
         }
-    }
-
-    /// The assumed hold and lag, if there are any.
-    fn input_path_text(&self) -> String {
-        if self.hold_s == 0.0 && self.input_lag_s == 0.0 {
-            return String::new();
-        }
-        let (hold_ms, lag_ms) = (1e3 * self.hold_s, 1e3 * self.input_lag_s);
-        labelled(
-            "input",
-            &format!("held for {hold_ms:.4} ms, lag {lag_ms:.4} ms"),
-        )
     }
 }
 

@@ -26,6 +26,7 @@ mod figure_options;
 mod identify;
 mod identify_external;
 mod identify_response;
+mod input_path_text;
 mod linearity;
 mod linearity_output;
 mod loop_output;

@@ -16,8 +16,9 @@ use nalgebra::Complex;
 
 use crate::external_signals::ExternalSignals;
 use crate::fft::RealFft;
-use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters};
+use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters, Nearest};
 use crate::observation::describes;
+use crate::profile::{self, NEGLIGIBLE_SIGMAS};
 use crate::resampling::Readings;
 use crate::{Estimate, FrfDatum, Signals};
 
@@ -43,17 +44,12 @@ const MIN_DATA: usize = 40;
 const HALF_WIDTH_BINS: usize = 8;
 /// In a sweep the spread of the times at a frequency is at most this ratio of their whole range, for half of the frequencies.
 const SWEEP_SPREAD: f64 = 0.1;
-/// Angle in radians of the first step of the parabolas, and largest shift in steps.
+/// Angle in radians of the first step of the parabolas.
 const FIRST_STEP_RAD: f64 = 0.1;
-const MAX_SHIFT: f64 = 4.0;
 /// Largest number of fits with the ratio of the one before.
 const MAX_REFITS: usize = 3;
-/// Largest number of steps to the best ratio.
-const MAX_REFINEMENTS: usize = 10;
 /// A ratio of fewer standard deviations is noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
-/// A change of the ratio by fewer standard deviations is negligible.
-const NEGLIGIBLE_SIGMAS: f64 = 0.1;
 /// Largest number of corrections of a record.
 const MAX_CORRECTIONS: usize = 4;
 
@@ -114,8 +110,7 @@ impl ClockSkew {
         }
     }
 
-    /// The fit of a corrected record with the error of the ratio in its covariance: that of the parameters if the ratio changes by a
-    /// standard deviation, d, adds d d'.
+    /// The fit of a corrected record with the error of the ratio in its covariance.
     pub(super) fn widened(
         &self,
         fit: ModalFit,
@@ -126,16 +121,11 @@ impl ClockSkew {
         let Some(turned) = TurnedData::new(&record.excited(), data, chain) else {
             return fit;
         };
-        let at = |ratio| {
-            let data = turned.turned_back(ratio);
-            let nearest = modal::nearest(&fit.parameters, &data, chain);
-            nearest.parameters.free_values()
+        let rest = Estimate {
+            value: 0.0,
+            sigma: self.ratio.sigma,
         };
-        let change = (at(self.ratio.sigma) - at(-self.ratio.sigma)) * 0.5;
-        ModalFit {
-            covariance: &fit.covariance + &change * change.transpose(),
-            ..fit
-        }
+        profile::with_error(fit, rest, |ratio, modes| turned.nearest(ratio, modes))
     }
 
     /// The change of the delay of the output from begin to end of the record, in seconds.
@@ -259,7 +249,8 @@ impl<'a> TurnedData<'a> {
     /// How well a few modes describe the data turned back.
     fn cost(&self, ratio: f64) -> Option<f64> {
         let data = self.turned_back(ratio);
-        modal::coarse_cost(&data, self.chain, SCANNED_MODES).ok()
+        let few = modal::coarse_fit(&data, self.chain, SCANNED_MODES).ok()?;
+        Some(few.cost)
     }
 
     /// The ratio with which a few modes describe the data, and these modes; `None` if they do not.
@@ -281,36 +272,21 @@ impl<'a> TurnedData<'a> {
         modal::fit_few(&self.turned_back(ratio), self.chain, FITTED_MODES).ok()
     }
 
-    /// The ratio of least chi^2 near one, by parabolas through three fits of the same number of modes.
-    fn refined(&self, start: &ModalParameters, near: f64) -> Option<Estimate> {
-        let (mut modes, mut ratio) = (start.clone(), near);
-        let mut step = FIRST_STEP_RAD / self.span_rad();
-        for _ in 0..MAX_REFINEMENTS {
-            let near = |ratio| modal::nearest(&modes, &self.turned_back(ratio), self.chain);
-            let [low, middle, high] = [ratio - step, ratio, ratio + step].map(near);
-            let curvature = (low.chi2 + high.chi2 - 2.0 * middle.chi2) / (step * step);
-            let slope = (high.chi2 - low.chi2) / (2.0 * step);
-            modes = middle.parameters;
-            if !curvature.is_finite() || ratio.abs() > MAX_RATIO {
-                return None;
-            }
-            if curvature <= 0.0 {
-                ratio -= step.copysign(slope);
-                continue;
-            }
-            let misfit = middle.chi2_per_freedom.max(1.0);
-            let sigma = (2.0 * misfit / curvature).sqrt();
-            let shift = (-slope / curvature).clamp(-MAX_SHIFT * step, MAX_SHIFT * step);
-            ratio += shift;
-            if shift.abs() < NEGLIGIBLE_SIGMAS * sigma {
-                return Some(Estimate {
-                    value: ratio,
-                    sigma,
-                });
-            }
-            step = step.min(shift.abs()).max(sigma);
-        }
-        None
+    /// The ratio of least chi^2 near one.
+    fn refined(&self, modes: &ModalParameters, near: f64) -> Option<Estimate> {
+        let start = profile::Start {
+            modes,
+            value: near,
+            step: FIRST_STEP_RAD / self.span_rad(),
+            limits: (-MAX_RATIO, MAX_RATIO),
+        };
+        let best = profile::best(&start, |ratio, modes| self.nearest(ratio, modes))?;
+        Some(best.value)
+    }
+
+    /// The modes of least chi^2 with a ratio, near given ones.
+    fn nearest(&self, ratio: f64, modes: &ModalParameters) -> Nearest {
+        modal::nearest(modes, &self.turned_back(ratio), self.chain)
     }
 }
 

@@ -37,6 +37,13 @@ impl ModalFit {
         self.leaves_noise() && self.cancelling_modes().is_none()
     }
 
+    /// Whether no mode has the damping of a filter.
+    pub(crate) fn is_lightly_damped(&self) -> bool {
+        let modes = self.modes();
+        let mut dampings = modes.iter().map(|mode| mode.damping_ratio.value);
+        dampings.all(|damping| damping < MAX_DAMPING_RATIO)
+    }
+
     /// Number of parameters that were fitted.
     pub(crate) fn number_of_parameters(&self) -> usize {
         self.parameters.free().len()
@@ -85,7 +92,7 @@ fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) 
     complex.is_sum_of_few_modes()
         && complex.undetermined_modes().is_none()
         && !complex.modes().iter().all(is_mostly_imaginary)
-        && complex.modes().iter().all(is_lightly_damped)
+        && complex.is_lightly_damped()
         && is_better_than_real(&complex.parameters, data, chain)
 }
 
@@ -93,10 +100,6 @@ fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) 
 fn is_mostly_imaginary(mode: &FittedMode) -> bool {
     let imaginary = mode.residue_imaginary_per_kg;
     imaginary.is_some_and(|part| part.value.abs() > mode.residue_per_kg.value.abs())
-}
-
-fn is_lightly_damped(mode: &FittedMode) -> bool {
-    mode.damping_ratio.value < MAX_DAMPING_RATIO
 }
 
 /// Whether chi^2 increases significantly with real residues and a free delay, near the same modes.

@@ -119,10 +119,24 @@ fn is_best(frfs: &[Frf], which: usize, index: usize) -> bool {
 }
 
 impl FrfDatum {
+    /// The datum with an error that is a ratio of its response added to its noise.
+    pub(crate) fn with_relative_error(&self, ratio: f64) -> FrfDatum {
+        FrfDatum {
+            variance: self.variance + ratio * ratio * self.response.norm_sqr(),
+            ..*self
+        }
+    }
+
     /// Angular frequency in rad/s.
     pub fn omega_rad_s(&self) -> f64 {
         2.0 * PI * self.frequency_hz
     }
+}
+
+/// The data with an error that is a ratio of the response added to their noise.
+pub(crate) fn with_relative_error(data: &[FrfDatum], ratio: f64) -> Vec<FrfDatum> {
+    let increased = data.iter().map(|datum| datum.with_relative_error(ratio));
+    increased.collect()
 }
 
 impl Frf {

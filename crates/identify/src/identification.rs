@@ -6,6 +6,8 @@ use serde::Serialize;
 
 use crate::ClockSkew;
 use crate::external_signals::ExternalSignals;
+use crate::fitted_lag::FittedLag;
+use crate::frf::with_relative_error;
 use crate::harmonics::{InputSignal, harmonics};
 use crate::linearity::Linearity;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
@@ -14,7 +16,7 @@ use crate::observation::{Observation, Source, describes, fit_part, part};
 use crate::other_kind::modes_of_other_kind;
 use crate::periodic::{self, Repetition};
 use crate::plausibility::{
-    complex_fit, hint, implausible_record, known_cause, unless_undetermined,
+    OtherModel, hint, implausible_record, known_cause, other_model, unless_undetermined,
 };
 use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
@@ -35,8 +37,10 @@ pub struct ExternalAnalysis {
     pub fit: Result<ModalFit, FitError>,
     /// The verdict on CNMP zeros.
     pub verdict: Verdict,
-    /// The hold and the lag of the input that were assumed.
+    /// The hold of the input, and its lag, which are stated or fitted.
     pub input_path: InputPath,
+    /// The lag of the input, if it was fitted.
+    pub fitted_lag: Option<FittedLag>,
     /// What the output measures: as stated, or a position. The modes and zeros are those of the position.
     pub output_kind: OutputKind,
     /// The chain from the input to the force that follows from them.
@@ -187,6 +191,7 @@ pub struct Identification {
     band_hz: Option<(f64, f64)>,
     repetition: Option<Repetition>,
     input_path: InputPath,
+    has_stated_lag: bool,
     output_kind: Option<OutputKind>,
 }
 
@@ -199,6 +204,7 @@ impl Identification {
             band_hz: None,
             repetition: None,
             input_path: InputPath::default(),
+            has_stated_lag: false,
             output_kind: None,
         }
     }
@@ -224,10 +230,12 @@ impl Identification {
         self
     }
 
-    /// A first-order lag lies between the input and the force, for example a current loop.
+    /// A first-order lag lies between the input and the force, for example a current loop; 0: none does. Unless stated, a lag is fitted
+    /// if modes do not describe the response without one.
     #[must_use]
     pub fn lag_s(mut self, lag_s: f64) -> Identification {
         self.input_path.lag_s = lag_s;
+        self.has_stated_lag = true;
         self
     }
 
@@ -299,7 +307,7 @@ impl Identification {
         };
         let analysis = analyse(record, *self, None)?;
         let analysis = self.with_one_clock(record, analysis)?;
-        self.with_complex_residues(record, analysis)
+        self.with_other_model(record, analysis)
     }
 
     /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
@@ -328,8 +336,9 @@ impl Identification {
         Ok(if is_better { corrected } else { analysis })
     }
 
-    /// The analysis with complex residues, if modes with real ones do not describe the response, and nothing else explains that.
-    fn with_complex_residues(
+    /// The analysis with a lag that is not stated, or with complex residues, if modes with real ones do not describe the response, and
+    /// nothing else explains that.
+    fn with_other_model(
         &self,
         record: ExternalSignals<'_>,
         analysis: ExternalAnalysis,
@@ -348,17 +357,22 @@ impl Identification {
             output_step: analysis.resolution.output,
             remedies: record.remedies(),
         };
-        let Some(fit) = complex_fit(&observation) else {
+        let Some(OtherModel { fit, chain, lag }) = other_model(&observation) else {
             return Ok(analysis);
         };
         let up_to_rad_s = analysis.judged_up_to_rad_s;
         let is_periodic = self.repetition.is_some();
-        let verdict = judged(None, frf, &fit, chain, up_to_rad_s, |verdict| {
+        let verdict = judged(None, frf, &fit, &chain, up_to_rad_s, |verdict| {
             hint(verdict, record, is_periodic, &fit, &analysis.resolution)
         })?;
+        let path = self.input_path;
+        let verdict = verdict.with(lag.map(|lag| lag.description()));
         Ok(ExternalAnalysis {
             verdict: verdict.with(listed(&analysis.cautions)),
             fit,
+            chain,
+            input_path: lag.map_or(path, |lag| lag.in_path(path)),
+            fitted_lag: lag,
             ..analysis
         })
     }
@@ -368,6 +382,7 @@ impl Identification {
         Source {
             rate_hz: self.rate_hz,
             input_path: self.input_path,
+            has_stated_lag: self.has_stated_lag,
         }
     }
 }
@@ -448,6 +463,7 @@ fn analyse(
         fit,
         verdict,
         input_path,
+        fitted_lag: None,
         output_kind,
         chain,
         band_hz,
@@ -547,7 +563,7 @@ fn fit_of_periods(
     }
     let smooth = fit_with_errors(&with_distortion(data), data, chain);
     // Of lines farther apart than the modes, the response is not smooth and the distortion is overestimated.
-    let proportional = with_relative_error(data);
+    let proportional = with_relative_error(data, RELATIVE_ERROR);
     let relative = fit_with_errors(&proportional, data, chain);
     match (smooth, relative) {
         (Ok(smooth), Ok(relative))
@@ -569,15 +585,6 @@ fn fit_with_errors(
     let mut fit = modal::fit(increased, chain)?;
     fit.chi2_per_freedom = chi2_per_freedom(&fit, data, chain);
     Ok(fit)
-}
-
-/// The data with an error that is a ratio of the response.
-fn with_relative_error(data: &[FrfDatum]) -> Vec<FrfDatum> {
-    let increased = data.iter().map(|datum| FrfDatum {
-        variance: datum.variance + (RELATIVE_ERROR * datum.response.norm()).powi(2),
-        ..*datum
-    });
-    increased.collect()
 }
 
 /// Reduced chi-square of the fitted data with the noise alone.

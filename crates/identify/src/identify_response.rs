@@ -5,12 +5,13 @@ use bench_plant::{OutputKind, PlantError};
 
 use crate::Frf;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
+use crate::fitted_lag::FittedLag;
 use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, Source};
 use crate::other_kind::modes_of_other_kind;
-use crate::plausibility::{complex_fit, implausible, known_cause, response_hint};
+use crate::plausibility::{OtherModel, implausible, known_cause, other_model, response_hint};
 use crate::remedies::OF_RESPONSE;
 use crate::scatter::Scatter;
 use crate::verdict::{Cnmp, Verdict};
@@ -31,8 +32,10 @@ pub struct ResponseAnalysis {
     pub fit: Result<ModalFit, FitError>,
     /// The verdict on CNMP zeros.
     pub verdict: Verdict,
-    /// The hold and the lag of the input that were assumed.
+    /// The hold of the input, and its lag, which are stated or fitted.
     pub input_path: InputPath,
+    /// The lag of the input, if it was fitted.
+    pub fitted_lag: Option<FittedLag>,
     /// The kind of the output that was assumed.
     pub output_kind: OutputKind,
     /// The chain from the input to the force that follows from them.
@@ -122,7 +125,7 @@ pub enum ResponseError {
 pub struct ResponseIdentification {
     band_hz: Option<(f64, f64)>,
     held_at_hz: Option<f64>,
-    lag_s: f64,
+    stated_lag_s: Option<f64>,
     output_kind: Option<OutputKind>,
 }
 
@@ -147,10 +150,11 @@ impl ResponseIdentification {
         self
     }
 
-    /// A first-order lag lies between the input and the force, for example a current loop.
+    /// A first-order lag lies between the input and the force, for example a current loop; 0: none does. Unless stated, a lag is fitted
+    /// if modes do not describe the response without one.
     #[must_use]
     pub fn lag_s(mut self, lag_s: f64) -> ResponseIdentification {
-        self.lag_s = lag_s;
+        self.stated_lag_s = Some(lag_s);
         self
     }
 
@@ -173,6 +177,7 @@ impl ResponseIdentification {
         let source = Source {
             rate_hz: self.held_at_hz.unwrap_or(ANALYSER_RATIO * band_hz.1),
             input_path,
+            has_stated_lag: self.stated_lag_s.is_some(),
         };
         let output_kind = self.output_kind.unwrap_or_default();
         let chain = source.chain(output_kind, &frf.data);
@@ -191,24 +196,31 @@ impl ResponseIdentification {
             remedies: &OF_RESPONSE,
         };
         let known = known_cause(&observation);
-        let complex = match known {
+        let other = match known {
             Some(_) => None,
-            None => complex_fit(&observation),
+            None => other_model(&observation),
         };
-        let why = match complex {
+        let why = match other {
             Some(_) => None,
             None => known.or_else(|| implausible(&observation)),
         };
-        let fit = complex.unwrap_or(fit);
+        let OtherModel { fit, chain, lag } = other.unwrap_or(OtherModel {
+            fit,
+            chain,
+            lag: None,
+        });
         let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
             response_hint(verdict, &fit)
         })?;
         let too_small = small_sigmas(&verdict, &fit, &frf);
         Ok(ResponseAnalysis {
-            verdict: verdict.with(too_small),
+            verdict: verdict
+                .with(lag.map(|lag| lag.description()))
+                .with(too_small),
             frf,
             fit,
-            input_path,
+            input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
+            fitted_lag: lag,
             output_kind,
             chain,
             band_hz,
@@ -219,7 +231,7 @@ impl ResponseIdentification {
     fn input_path(&self) -> InputPath {
         InputPath {
             hold_s: self.held_at_hz.map_or(0.0, |rate_hz| 1.0 / rate_hz),
-            lag_s: self.lag_s,
+            lag_s: self.stated_lag_s.unwrap_or(0.0),
         }
     }
 

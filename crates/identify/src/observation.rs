@@ -14,6 +14,8 @@ pub(super) struct Source {
     pub(super) rate_hz: f64,
     /// What lies between the samples of the input and the force.
     pub(super) input_path: InputPath,
+    /// Whether the lag of the input is stated, also that there is none.
+    pub(super) has_stated_lag: bool,
 }
 
 /// Number of data of a part.

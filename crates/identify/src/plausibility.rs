@@ -4,7 +4,8 @@ use bench_plant::OutputKind;
 
 use crate::complex_residues::fit_complex;
 use crate::external_signals::ExternalSignals;
-use crate::modal::{FitError, ModalFit, ModeGroup};
+use crate::fitted_lag::{FitThroughLag, FittedLag, fit_through_lag};
+use crate::modal::{FitError, MeasurementChain, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
 use crate::other_kind::{better_kind, explained_by_kind, swapped, vanishes_at_rest};
 use crate::record_check::Resolution;
@@ -73,12 +74,43 @@ pub(super) fn implausible_record(
     }
 }
 
-/// The modes with complex residues, if real ones do not describe the data, and if they are plausible as well.
-pub(super) fn complex_fit(seen: &Observation<'_>) -> Option<Result<ModalFit, FitError>> {
-    let fit = Ok(fit_complex(&seen.frf.data, seen.chain, seen.fit)?);
-    let with_complex = Observation { fit: &fit, ..*seen };
-    let is_plausible = implausible(&with_complex).is_none();
-    is_plausible.then_some(fit)
+/// What describes a response that modes with real residues do not.
+pub(super) struct OtherModel {
+    pub(super) fit: Result<ModalFit, FitError>,
+    pub(super) chain: MeasurementChain,
+    /// A lag that was fitted.
+    pub(super) lag: Option<FittedLag>,
+}
+
+/// Modes with a lag that is not stated, or with complex residues, if modes with real ones do not describe the data, and if they are
+/// plausible as well.
+pub(super) fn other_model(seen: &Observation<'_>) -> Option<OtherModel> {
+    with_lag(seen).or_else(|| with_complex_residues(seen))
+}
+
+fn with_lag(seen: &Observation<'_>) -> Option<OtherModel> {
+    let FitThroughLag { lag, chain, fit } = fit_through_lag(seen)?;
+    plausible(seen, Ok(fit), chain, Some(lag))
+}
+
+fn with_complex_residues(seen: &Observation<'_>) -> Option<OtherModel> {
+    let fit = fit_complex(&seen.frf.data, seen.chain, seen.fit)?;
+    plausible(seen, Ok(fit), seen.chain.clone(), None)
+}
+
+fn plausible(
+    seen: &Observation<'_>,
+    fit: Result<ModalFit, FitError>,
+    chain: MeasurementChain,
+    lag: Option<FittedLag>,
+) -> Option<OtherModel> {
+    let with_fit = Observation {
+        fit: &fit,
+        chain: &chain,
+        ..*seen
+    };
+    let is_plausible = implausible(&with_fit).is_none();
+    is_plausible.then_some(OtherModel { fit, chain, lag })
 }
 
 /// Modes that describe the response may lie in less than half of the band.

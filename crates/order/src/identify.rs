@@ -12,7 +12,6 @@ use super::response_options::ResponseOptions;
 use bench_base::quantity::{Dimension, Frequency, Time};
 use bench_experiment::{AnalysisError, ExperimentError};
 use bench_external::{Columns, ExternalCsvError, Sampling, TimeUnit};
-use bench_identify::modal::InputPath;
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
 use bench_identify::{Identification, IdentificationError, IdentifyError, Signals};
@@ -113,7 +112,8 @@ pub struct ExternalOptions {
     /// How the input is held between its samples: `zoh` if a command is constant over each sampling period, `none` for a measured input
     #[arg(long, value_name = "HOLD", requires = "data", value_enum, default_value_t = Hold::None)]
     pub hold: Hold,
-    /// Time constant of a first-order lag between the recorded input and the force, as of a current loop (0.16ms)
+    /// Time constant of a first-order lag between the recorded input and the force, as of a current loop (0.16ms) [default: none, or the
+    /// one that is fitted if modes do not describe the response without one; 0s: none]
     #[arg(long, value_name = "S", requires = "data", allow_hyphen_values = true)]
     pub input_lag: Option<Time>,
     /// Frequency band to analyse: 11Hz:250Hz, or 11:250 in hertz [default: the band that the input excites; with --frf, all its frequencies]
@@ -222,8 +222,13 @@ impl ExternalOptions {
         if let Some(kind) = self.output_kind {
             identification = identification.output_kind(kind);
         }
-        let InputPath { hold_s, lag_s } = self.input_path(signals.rate_hz)?;
-        Ok(identification.held_s(hold_s).lag_s(lag_s))
+        if let Some(lag_s) = self.lag_s()? {
+            identification = identification.lag_s(lag_s);
+        }
+        Ok(match self.hold {
+            Hold::Zoh => identification.held_s(1.0 / signals.rate_hz),
+            Hold::None => identification,
+        })
     }
 
     /// The error of an analysis: wrong usage, if an option is the cause.
@@ -245,8 +250,11 @@ impl ExternalOptions {
         }
     }
 
-    pub(crate) fn lag_s(&self) -> Result<f64, ExperimentError> {
-        let lag_s = self.input_lag.as_ref().map_or(0.0, Time::si);
+    /// The stated lag of the input.
+    pub(crate) fn lag_s(&self) -> Result<Option<f64>, ExperimentError> {
+        let Some(lag_s) = self.input_lag.as_ref().map(Time::si) else {
+            return Ok(None);
+        };
         if !LAG_S.contains(&lag_s) {
             let lag = Dimension::Time.display(lag_s);
             let (min, max) = (LAG_S.start(), LAG_S.end());
@@ -254,16 +262,7 @@ impl ExternalOptions {
                 "--input-lag is {lag}; give a time from {min} to {max} s"
             )));
         }
-        Ok(lag_s)
-    }
-
-    fn input_path(&self, rate_hz: f64) -> Result<InputPath, ExperimentError> {
-        let lag_s = self.lag_s()?;
-        let hold_s = match self.hold {
-            Hold::Zoh => 1.0 / rate_hz,
-            Hold::None => 0.0,
-        };
-        Ok(InputPath { hold_s, lag_s })
+        Ok(Some(lag_s))
     }
 
     fn repetition(&self, signals: &Signals) -> Result<Option<Repetition>, ExperimentError> {

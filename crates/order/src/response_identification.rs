@@ -10,7 +10,10 @@ impl ExternalOptions {
     /// # Errors
     /// When an option is refused. The hold follows from the rate, so that they are given together.
     pub fn response_identification(&self) -> Result<ResponseIdentification, ExperimentError> {
-        let mut identification = ResponseIdentification::new().lag_s(self.lag_s()?);
+        let mut identification = ResponseIdentification::new();
+        if let Some(lag_s) = self.lag_s()? {
+            identification = identification.lag_s(lag_s);
+        }
         if let Some((low_hz, high_hz)) = self.band_hz()? {
             identification = identification.band_hz(low_hz, high_hz);
         }

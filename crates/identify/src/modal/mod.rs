@@ -42,6 +42,7 @@ use lone_lines::{UsedData, lone_data};
 pub use measurement_chain::{InputPath, MeasurementChain};
 pub use modal_fit::{COMPLEX_SIGN, FittedMode, ModalFit, ModeGroup, UncertainPole};
 pub use parameters::{ModalParameters, Parameter, Residues};
+pub(crate) use search::CoarseFit;
 pub use search::ModelOrder;
 
 use crate::FrfDatum;
@@ -153,15 +154,15 @@ fn no_mode((low_hz, high_hz): (f64, f64)) -> FitError {
     FitError::NoMode { low_hz, high_hz }
 }
 
-/// How well at most `max_modes` modes describe the data, for a comparison of similar data: chi^2 with a relative error of some per cent
-/// beside the noise, and a penalty for each mode.
-pub(crate) fn coarse_cost(
+/// At most `max_modes` modes with a relative error of some per cent beside the noise, and how well they describe the data, for a
+/// comparison of similar data.
+pub(crate) fn coarse_fit(
     data: &[FrfDatum],
     chain: &MeasurementChain,
     max_modes: usize,
-) -> Result<f64, FitError> {
+) -> Result<CoarseFit, FitError> {
     let nodes = &chain.nodes(data, 0.0);
-    search::coarse_cost(Problem { chain, data, nodes }, max_modes)
+    search::coarse(Problem { chain, data, nodes }, max_modes)
 }
 
 /// The parameters of least chi^2 near given ones.

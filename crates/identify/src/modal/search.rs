@@ -115,9 +115,9 @@ pub(super) fn orders(
     Ok(search.orders)
 }
 
-/// chi^2 of at most `max_modes` modes with the errors of the coarse pass, and the smallest significant decrease for each of them: how
-/// well a few modes describe the data, at little cost.
-pub(super) fn coarse_cost(problem: Problem<'_>, max_modes: usize) -> Result<f64, FitError> {
+/// At most `max_modes` modes by the coarse pass, with chi^2 and the smallest significant decrease for each of them: how well a few modes
+/// describe the data, at little cost.
+pub(super) fn coarse(problem: Problem<'_>, max_modes: usize) -> Result<CoarseFit, FitError> {
     let mut search = Search {
         residues: &Residues::Real,
         max_modes,
@@ -126,7 +126,18 @@ pub(super) fn coarse_cost(problem: Problem<'_>, max_modes: usize) -> Result<f64,
         done: 0.0,
         progress: &mut |_| ControlFlow::Continue(()),
     };
-    search.run_from_best_start(&PASSES[0], problem)
+    let cost = search.run_from_best_start(&PASSES[0], problem)?;
+    Ok(CoarseFit {
+        cost,
+        parameters: search.parameters,
+    })
+}
+
+/// A few modes, fitted with a relative error of some per cent beside the noise.
+pub(crate) struct CoarseFit {
+    /// chi^2 with this error, and a penalty for each mode.
+    pub(crate) cost: f64,
+    pub(crate) parameters: ModalParameters,
 }
 
 /// The state of the search between two passes.
@@ -268,17 +279,8 @@ impl Pass {
         let every = self.every.min(data.len() / MIN_DATA).max(1);
         data.iter()
             .step_by(every)
-            .map(|datum| self.with_error(datum))
+            .map(|datum| datum.with_relative_error(self.relative_error))
             .collect()
-    }
-
-    /// The datum with the relative model error of this pass added to its variance.
-    fn with_error(&self, datum: &FrfDatum) -> FrfDatum {
-        let square = self.relative_error * self.relative_error;
-        FrfDatum {
-            variance: datum.variance + square * datum.response.norm_sqr(),
-            ..*datum
-        }
     }
 }
 

@@ -6,8 +6,8 @@ use super::page::{delay_ms, named};
 use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
-use bench_identify::modal::ModalFit;
-use bench_identify::{ExternalAnalysis, OutputKind, Unit};
+use bench_identify::modal::{InputPath, ModalFit};
+use bench_identify::{ExternalAnalysis, FittedLag, OutputKind, Unit};
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
@@ -111,7 +111,7 @@ impl<'a> ExternalRecord<'a> {
             ),
             (
                 "Lag of the input",
-                milliseconds(self.analysis.input_path.lag_s),
+                lag_text(self.analysis.input_path, self.analysis.fitted_lag),
             ),
             (
                 "Periods averaged",
@@ -130,6 +130,17 @@ impl<'a> ExternalRecord<'a> {
         ]);
         section("The record", &facts(&pairs))
     }
+}
+
+/// The lag of an input, with its interval if it was fitted; `None` without one.
+pub(super) fn lag_text(path: InputPath, fitted: Option<FittedLag>) -> Option<String> {
+    let text = milliseconds(path.lag_s)?;
+    Some(match fitted {
+        None => text,
+        Some(FittedLag { lag_s }) => {
+            format!("{text}, fitted, ± {:.4} ms", 1e3 * lag_s.half_width_95())
+        }
+    })
 }
 
 /// A time in milliseconds; `None` if it is 0.

@@ -1,7 +1,7 @@
 //! The report of a frequency response of another program: without samples, model and loop.
 
 use super::RecordReport;
-use super::external::milliseconds;
+use super::external::{lag_text, milliseconds};
 use super::page::{delay_ms, named};
 use crate::MagnitudeAxis;
 use crate::html::{facts, section};
@@ -83,7 +83,10 @@ impl<'a> ResponseReport<'a> {
                 "Hold of the input",
                 milliseconds(analysis.input_path.hold_s),
             ),
-            ("Lag of the input", milliseconds(analysis.input_path.lag_s)),
+            (
+                "Lag of the input",
+                lag_text(analysis.input_path, analysis.fitted_lag),
+            ),
         ]);
         section("The response", &facts(&pairs))
     }
