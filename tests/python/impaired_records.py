@@ -152,14 +152,18 @@ def delay(rng):
 def known_lag(rng):
     b = Bench(rng)
     tau = float(rng.uniform(0.2, 2.0)) / b.rate
+    return b.record(b.noisy(through_lag(b, tau)), options=["--hold", "zoh", "--input-lag", f"{tau:.9g}s"])
+
+
+def through_lag(b, tau):
+    """The response of the stage to a held command behind a lag."""
     y, at_pole = np.zeros(len(b.u)), 0.0
     for w, zeta, r in b.modes:
         damped = w * np.sqrt(1 - zeta * zeta)
         pole = complex(-zeta * w, damped)
         y += 2 * np.real(r / (2j * damped) / (1 + tau * pole) * state(pole, b.u, 1 / b.rate))
         at_pole += r / (1 / tau**2 - 2 * zeta * w / tau + w * w) / tau
-    y += at_pole * np.real(state(-1 / tau, b.u, 1 / b.rate))
-    return b.record(b.noisy(y), options=["--hold", "zoh", "--input-lag", f"{tau:.9g}s"])
+    return y + at_pole * np.real(state(-1 / tau, b.u, 1 / b.rate))
 
 
 @kind("slow noise of the floor")
@@ -456,8 +460,8 @@ def averaged(rng):
     return b.record(b.noisy(lfilter(np.ones(8) / 8, 1, b.motion())), causes=["misfit", "complex"], model_holds=False)
 
 
-@kind("lag that is not given")
-def unknown_lag(rng):
+@kind("digital filter of first order that is not given")
+def digital_filter(rng):
     b = Bench(rng)
     pole = np.exp(-2 * np.pi * rng.uniform(0.5, 3) * b.high / b.rate)
     y = lfilter([1 - pole], [1, -pole], b.motion())
@@ -543,6 +547,13 @@ def moving(rng):
     part = np.arange(len(b.u)) / len(b.u)
     y = (1 - part) * b.motion() + part * b.motion(modes=changed)
     return b.record(b.noisy(y), causes=["misfit", "complex", "nonlinear"], model_holds=False)
+
+
+@kind("lag of the drive that is not given")
+def lag_of_drive(rng):
+    b = Bench(rng)
+    tau = 1 / (2 * np.pi * rng.uniform(0.3, 4) * b.high)
+    return b.record(b.noisy(through_lag(b, tau)), causes=["misfit", "complex"])
 
 
 # What is done with a record.
