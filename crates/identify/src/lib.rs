@@ -56,6 +56,7 @@ mod multisine_lines;
 mod noise_parts;
 mod observation;
 mod other_kind;
+mod periodic_part;
 mod plausibility;
 mod profile;
 pub mod record_check;
@@ -76,15 +77,13 @@ pub use excited_band::excited_band_hz;
 pub use fitted_lag::FittedLag;
 pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wrapped_phase_rad};
 pub use growing::{GrowingPoint, GrowingResponse};
-pub use identification::{
-    Distortion, DistortionSource, ExternalAnalysis, Identification, IdentificationError,
-    PeriodicPart,
-};
+pub use identification::{ExternalAnalysis, Identification, IdentificationError};
 pub use identify_response::{ResponseAnalysis, ResponseError, ResponseIdentification};
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
 pub(crate) use noise_parts::{NoiseParts, PowerDatum};
+pub use periodic_part::{Distortion, DistortionSource, PeriodicPart};
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};
