@@ -2,9 +2,9 @@
 
 use super::table::{result_table, wrap};
 use bench_experiment::outputs::ModalSummary;
-use bench_identify::modal::FittedMode;
+use bench_identify::modal::{FittedMode, ModeLists};
 use bench_report::figures::{
-    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, mode_table, outside_band_note,
+    COMPLEX_RESIDUES_NOTE, NO_MODES_IN_BAND, has_complex_residues, mode_table, outside_band_note,
     zero_table,
 };
 use bench_report::table::Width;
@@ -43,5 +43,10 @@ fn mode_tables(summary: &ModalSummary, residue_unit: &str) -> String {
         return table(&in_band);
     }
     let note = wrap(&outside_band_note(band_hz), 0);
-    format!("{}\n{note}\n{}", table(&in_band), table(&outside))
+    let in_band = if in_band.is_empty() {
+        format!("{NO_MODES_IN_BAND}\n")
+    } else {
+        table(&in_band)
+    };
+    format!("{in_band}\n{note}\n{}", table(&outside))
 }

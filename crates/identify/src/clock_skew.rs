@@ -16,7 +16,7 @@ use nalgebra::Complex;
 
 use crate::external_signals::ExternalSignals;
 use crate::fft::RealFft;
-use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters, Nearest};
+use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues};
 use crate::observation::describes;
 use crate::profile::{self, NEGLIGIBLE_SIGMAS};
 use crate::resampling::Readings;
@@ -269,7 +269,8 @@ impl<'a> TurnedData<'a> {
     }
 
     fn few_modes(&self, ratio: f64) -> Option<ModalFit> {
-        modal::fit_few(&self.turned_back(ratio), self.chain, FITTED_MODES).ok()
+        let data = self.turned_back(ratio);
+        modal::fit_few(&data, self.chain, &Residues::Real, FITTED_MODES).ok()
     }
 
     /// The ratio of least chi^2 near one.

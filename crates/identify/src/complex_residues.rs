@@ -16,12 +16,10 @@
 //!
 //! An acceleration has no derivative that is observed, and is not tested.
 
-use core::ops::ControlFlow;
-
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{
-    FitError, FittedMode, MeasurementChain, ModalFit, ModalParameters, Residues, fit_up_to, nearest,
+    FitError, FittedMode, MeasurementChain, ModalFit, ModalParameters, Residues, fit_few, nearest,
 };
 
 /// Largest number of modes with complex residues. More are a sign of something else, and take long.
@@ -64,7 +62,8 @@ pub(crate) fn fit_complex(
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
-    let complex = fit_up_to_modes(data, chain, max_modes.min(MAX_MODES)).ok()?;
+    let max_modes = max_modes.min(MAX_MODES);
+    let complex = fit_few(data, chain, &Residues::complex(), max_modes).ok()?;
     (is_simpler(&complex, real) && is_accepted(&complex, data, chain)).then_some(complex)
 }
 
@@ -76,15 +75,6 @@ fn is_simpler(complex: &ModalFit, real: &Result<ModalFit, FitError>) -> bool {
         }
         _ => true,
     }
-}
-
-fn fit_up_to_modes(
-    data: &[FrfDatum],
-    chain: &MeasurementChain,
-    max_modes: usize,
-) -> Result<ModalFit, FitError> {
-    let progress = &mut |_| ControlFlow::Continue(());
-    fit_up_to(data, chain, &Residues::complex(), max_modes, progress)
 }
 
 /// Whether the modes describe the data, and real residues do not.

@@ -20,7 +20,7 @@ use std::f64::consts::TAU;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::frf::with_relative_error;
 use crate::modal::{
-    self, FitError, InputPath, MeasurementChain, ModalFit, ModalParameters, Nearest,
+    self, FitError, InputPath, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues,
 };
 use crate::observation::{Observation, PART_MODES, Source, fit_part, part};
 use crate::profile;
@@ -97,7 +97,7 @@ pub(crate) fn fit_through_lag(seen: &Observation<'_>) -> Option<FitThroughLag> {
     let near = unknown.described(&part(data))?;
     let LagWithModes { lag_s: lag, .. } = unknown.refined(data, &near)?;
     let chain = unknown.chain(lag.value, data);
-    let fit = modal::fit_few(data, &chain, max_modes).ok()?;
+    let fit = modal::fit_few(data, &chain, &Residues::Real, max_modes).ok()?;
     let of_logarithm = Estimate {
         value: lag.value.ln(),
         sigma: lag.sigma / lag.value,

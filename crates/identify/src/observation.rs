@@ -3,7 +3,7 @@
 use bench_plant::OutputKind;
 
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
-use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
+use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit, Residues};
 use crate::remedies::Remedies;
 use crate::{Frf, FrfDatum};
 
@@ -42,7 +42,7 @@ impl Source {
 
 /// chi^2 and a penalty for each mode, as for a mode that is significant: modes may take the place of another chain.
 fn cost(data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
-    let Ok(fit) = modal::fit_few(data, chain, PART_MODES) else {
+    let Ok(fit) = fit_part(data, chain) else {
         return f64::INFINITY;
     };
     let n = data.len() as f64;
@@ -51,7 +51,7 @@ fn cost(data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
 
 /// A few modes of some data.
 pub(super) fn fit_part(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
-    modal::fit_few(data, chain, PART_MODES)
+    modal::fit_few(data, chain, &Residues::Real, PART_MODES)
 }
 
 /// Some of the data: many modes are fitted to what is no sum of modes, and a part shows that at less cost.

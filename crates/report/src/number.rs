@@ -45,11 +45,14 @@ pub fn angular_frequency(omega_rad_s: f64) -> String {
     format!("{omega_rad_s:.2} rad/s ({:.3} Hz)", omega_rad_s / TAU)
 }
 
+/// Smaller probabilities, and those as close to 1, are given as a bound.
+pub(crate) const NEGLIGIBLE_PROBABILITY: f64 = 1e-4;
+
 /// A probability in percent. Close to 0 and 1 it is given as a bound, as the tails of the distribution are not known exactly.
 pub fn percent(probability: f64) -> String {
     match probability {
-        p if p < 1e-4 => "below 0.01 %".into(),
-        p if p > 1.0 - 1e-4 => "above 99.99 %".into(),
+        p if p < NEGLIGIBLE_PROBABILITY => "below 0.01 %".into(),
+        p if p > 1.0 - NEGLIGIBLE_PROBABILITY => "above 99.99 %".into(),
         p => format!("{:.2} %", 100.0 * p),
     }
 }

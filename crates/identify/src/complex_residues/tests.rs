@@ -27,7 +27,7 @@ fn with_complex(data: &[FrfDatum]) -> ModalFit {
 }
 
 fn with_complex_through(data: &[FrfDatum], chain: &MeasurementChain) -> ModalFit {
-    fit_up_to_modes(data, chain, MAX_MODES).expect("modes")
+    fit_few(data, chain, &Residues::complex(), MAX_MODES).expect("modes")
 }
 
 /// The response as an external program gives it.

@@ -23,6 +23,7 @@ mod lone_lines;
 mod measurement_chain;
 mod merge;
 mod modal_fit;
+mod mode_lists;
 mod normal_equations;
 mod parameters;
 mod peaks;
@@ -41,6 +42,7 @@ pub use error::{FitError, Progress};
 use lone_lines::{UsedData, lone_data};
 pub use measurement_chain::{InputPath, MeasurementChain};
 pub use modal_fit::{COMPLEX_SIGN, FittedMode, ModalFit, ModeGroup, UncertainPole};
+pub use mode_lists::ModeLists;
 pub use parameters::{ModalParameters, Parameter, Residues};
 pub(crate) use search::CoarseFit;
 pub use search::ModelOrder;
@@ -94,18 +96,19 @@ pub fn fit_with_progress(
     fit_up_to(data, chain, &Residues::Real, search::MAX_MODES, progress)
 }
 
-/// As [`fit`], with at most `max_modes` modes: enough to see whether modes describe data.
+/// As [`fit`], with residues of this kind and at most `max_modes` modes: enough to see whether modes describe data.
 pub(crate) fn fit_few(
     data: &[FrfDatum],
     chain: &MeasurementChain,
+    residues: &Residues,
     max_modes: usize,
 ) -> Result<ModalFit, FitError> {
     let progress = &mut |_| ControlFlow::Continue(());
-    fit_up_to(data, chain, &Residues::Real, max_modes, progress)
+    fit_up_to(data, chain, residues, max_modes, progress)
 }
 
 /// As [`fit_with_progress`], with residues of this kind and at most `max_modes` modes.
-pub(crate) fn fit_up_to(
+fn fit_up_to(
     data: &[FrfDatum],
     chain: &MeasurementChain,
     residues: &Residues,
@@ -207,24 +210,26 @@ fn final_fit(problem: Problem<'_>, start: ModalParameters) -> Result<ModalFit, F
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
     let mut parameters = pruned(problem, with_determined_delay(problem, start));
-    let misfit = |parameters: &ModalParameters| {
-        problem.misfit(Solution::new(problem, parameters.clone()).chi2)
-    };
     let with_all = FitError::Undetermined {
         modes: parameters.modes.len(),
     };
-    let max_misfit = MAX_CHI2_PER_FREEDOM.max(MUCH_WORSE * misfit(&parameters));
+    let max_misfit = MAX_CHI2_PER_FREEDOM.max(MUCH_WORSE * misfit_of(problem, &parameters));
     loop {
         match with_covariance(problem, parameters.clone()) {
             Err(FitError::Undetermined { modes }) if modes > 1 => {
                 parameters = without_least_certain(problem, parameters);
-                if misfit(&parameters) > max_misfit {
+                if misfit_of(problem, &parameters) > max_misfit {
                     return Err(with_all);
                 }
             }
             result => return result,
         }
     }
+}
+
+/// The misfit of parameters as they are.
+fn misfit_of(problem: Problem<'_>, parameters: &ModalParameters) -> f64 {
+    problem.misfit(Solution::new(problem, parameters.clone()).chi2)
 }
 
 /// The fit of given modes with its covariance; the residual counts as noise.

@@ -6,7 +6,6 @@ use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::clusters::cancelling;
-use super::measurement_chain::NodeResponse;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
 use crate::FrfDatum;
 use crate::chi2_limits::NOISE_CHI2;
@@ -262,16 +261,12 @@ impl ModalFit {
         let mut sum = nodes.constant(&delays);
         sum.iter_mut()
             .for_each(|h| *h *= self.parameters.remainder_m_per_n);
-        let mut add = |response: &NodeResponse, factor: f64| {
-            let mean = nodes.mean(response, &delays);
-            sum.iter_mut()
-                .zip(mean)
-                .for_each(|(h, mode)| *h += mode * factor);
-        };
         for (k, term) in self.parameters.modes.iter().enumerate() {
-            add(&nodes.mode(term), term.residue_per_kg);
+            let of_mode = nodes.mean(&nodes.mode(term), &delays);
+            add_scaled(&mut sum, &of_mode, term.residue_per_kg);
             if !self.parameters.has_real_residues() {
-                add(&nodes.mode_rate(term), self.parameters.rate_s_per_kg(k));
+                let of_rate = nodes.mean(&nodes.mode_rate(term), &delays);
+                add_scaled(&mut sum, &of_rate, self.parameters.rate_s_per_kg(k));
             }
         }
         sum
@@ -314,6 +309,13 @@ impl ModalFit {
         let at = [omega, damping];
         let covariance = at.map(|i| at.map(|j| self.covariance[(i, j)]));
         derivatives.map(|a| derivatives.map(|b| quadratic_form(a, covariance, b)))
+    }
+}
+
+/// Adds a multiple of a response to a sum.
+fn add_scaled(sum: &mut [Complex<f64>], response: &[Complex<f64>], factor: f64) {
+    for (sum, response) in sum.iter_mut().zip(response) {
+        *sum += response * factor;
     }
 }
 

@@ -12,7 +12,7 @@ pub use comparison::{difference_table, figure_table, frequencies};
 pub use control::{control_table, predicted_sine, step, step_table, tracking_figures, whole_run};
 pub use margins::{loop_peaks, margins, measured_margins, swept_loop};
 pub use modal::{
-    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, mode_table, outside_band_note,
+    COMPLEX_RESIDUES_NOTE, NO_MODES_IN_BAND, has_complex_residues, mode_table, outside_band_note,
     zero_table,
 };
 pub use stage::{stage_check_table, static_step_table};

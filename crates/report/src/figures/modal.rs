@@ -1,7 +1,7 @@
 //! Modes and zeros of a fit.
 
 use super::interval_of;
-use crate::number::{interval, percent, significant};
+use crate::number::{NEGLIGIBLE_PROBABILITY, interval, percent, significant};
 use crate::table::{Table, Width};
 use bench_base::units::hz;
 use bench_identify::modal::{FittedMode, SIGMAS_95};
@@ -9,9 +9,6 @@ use bench_identify::verdict::UncertainZero;
 
 /// What the signs and columns of complex residues mean.
 pub const COMPLEX_RESIDUES_NOTE: &str = "c: a complex residue, which has no sign; its parts are those of the numerator at the natural frequency (the damping is not proportional, or there is a filter or an additional lag between input and output)";
-
-/// A zero lies left of the imaginary axis with certainty if the probability of the other side is less.
-const CERTAIN: f64 = 1e-4;
 
 /// Whether residues of the table are complex, so that [`COMPLEX_RESIDUES_NOTE`] belongs to it.
 pub fn has_complex_residues(modes: &[FittedMode]) -> bool {
@@ -34,26 +31,8 @@ pub fn mode_table(modes: &[FittedMode], residue_unit: &str, width: Width) -> Tab
     Table::new(columns).with_rows(modes.iter().map(|mode| mode_row(mode, width)))
 }
 
-/// The modes of a fit, apart those that lie in its band and those beyond it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ModeLists {
-    /// Between the lowest and the highest fitted frequency, and a free body.
-    pub in_band: Vec<FittedMode>,
-    /// Elsewhere: they stand for all that lies beyond the band.
-    pub outside: Vec<FittedMode>,
-}
-
-impl ModeLists {
-    /// The modes of a fit between two frequencies in hertz, in their order.
-    pub fn new(modes: &[FittedMode], (low_hz, high_hz): (f64, f64)) -> ModeLists {
-        let is_in_band = |mode: &FittedMode| {
-            let frequency_hz = mode.frequency_hz().value;
-            frequency_hz == 0.0 || (low_hz..=high_hz).contains(&frequency_hz)
-        };
-        let (in_band, outside) = modes.iter().copied().partition(is_in_band);
-        ModeLists { in_band, outside }
-    }
-}
+/// In place of a table, if all modes lie outside the band of their fit.
+pub const NO_MODES_IN_BAND: &str = "No mode lies in the analysed band.";
 
 /// What modes outside the band of a fit are.
 pub fn outside_band_note((low_hz, high_hz): (f64, f64)) -> String {
@@ -112,7 +91,7 @@ pub fn zero_table(zeros: &[UncertainZero]) -> Table {
     ];
     let (right, left): (Vec<&UncertainZero>, Vec<&UncertainZero>) = zeros
         .iter()
-        .partition(|zero| zero.rhp_probability >= CERTAIN);
+        .partition(|zero| zero.rhp_probability >= NEGLIGIBLE_PROBABILITY);
     Table::new(columns).with_rows(right.into_iter().chain(left).map(zero_row))
 }
 
@@ -155,26 +134,8 @@ mod tests {
         assert_eq!(page.rows[0][..4], terminal.rows[0]);
     }
 
-    fn mode_at(frequency_hz: f64) -> FittedMode {
-        let estimate = |value: f64| Estimate { value, sigma: 0.01 };
-        FittedMode {
-            omega_rad_s: estimate(std::f64::consts::TAU * frequency_hz),
-            damping_ratio: estimate(0.05),
-            residue_per_kg: estimate(-0.5),
-            residue_imaginary_per_kg: None,
-        }
-    }
-
     #[test]
-    fn modes_beyond_the_band_are_listed_apart_and_a_free_body_is_not() {
-        let modes = [0.0, 4.9, 5.1, 99.0, 101.0, 1700.0].map(mode_at);
-        let lists = ModeLists::new(&modes, (5.0, 100.0));
-        let hz = |modes: &[FittedMode]| -> Vec<f64> {
-            let frequencies = modes.iter().map(|mode| mode.frequency_hz().value);
-            frequencies.map(|hz| (10.0 * hz).round() / 10.0).collect()
-        };
-        assert_eq!(hz(&lists.in_band), [0.0, 5.1, 99.0]);
-        assert_eq!(hz(&lists.outside), [4.9, 101.0, 1700.0]);
+    fn note_of_modes_outside_states_the_band() {
         let note = outside_band_note((5.0, 100.0));
         assert!(note.contains("band, 5.000 to 100.0 Hz:"), "{note}");
     }

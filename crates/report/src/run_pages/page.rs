@@ -4,14 +4,14 @@ use std::f64::consts::TAU;
 
 use super::{Plot, RecordReport};
 use crate::figures::{
-    COMPLEX_RESIDUES_NOTE, ModeLists, has_complex_residues, interval_of, mode_table,
+    COMPLEX_RESIDUES_NOTE, NO_MODES_IN_BAND, has_complex_residues, interval_of, mode_table,
     outside_band_note, zero_table,
 };
 use crate::html::{document_with_plots, escaped, facts, note, section};
 use crate::table::{Table, Width};
 use bench_base::decimal::Decimal;
 use bench_experiment::certificate::SIGNS_DIFFER;
-use bench_identify::modal::{Estimate, FittedMode};
+use bench_identify::modal::{Estimate, FittedMode, ModeLists};
 
 /// The page as an HTML document.
 pub fn page(report: &RecordReport<'_>, plots: &[Plot]) -> String {
@@ -115,7 +115,11 @@ fn modes(report: &RecordReport<'_>) -> String {
     if has_complex_residues(&fit.modes()) {
         text += &format!(" {COMPLEX_RESIDUES_NOTE}.");
     }
-    let mut content = note(&text) + &table(&in_band);
+    let mut content = if in_band.is_empty() {
+        note(NO_MODES_IN_BAND)
+    } else {
+        note(&text) + &table(&in_band)
+    };
     if !outside.is_empty() {
         content += &note(&outside_band_note(fit.band_hz));
         content += &table(&outside);
