@@ -125,21 +125,20 @@ fn response_of_a_cut_chirp_ends_where_its_sweep_ended() {
             reached.contains(&last_hz),
             "{share}: {last_hz} Hz, {reached:?}"
         );
-        // A longer record has smaller errors: those of both are at most sqrt(2) times those of the shorter one.
-        let modes = cut["modes"].as_array().expect("modes").iter();
-        let in_band: Vec<&Value> = modes.filter(|mode| frequency_hz(mode) < last_hz).collect();
-        assert!(!in_band.is_empty(), "{share}: {cut}");
-        for mode in in_band {
-            let sigma_hz = mode["frequency_hz_sigma"].as_f64().expect("a number");
-            let distances = whole
-                .iter()
-                .map(|of| (frequency_hz(of) - frequency_hz(mode)).abs());
+        // The stage still moves at the end of a cut record, which changes the response there; the modes further below are those of the run.
+        let modes = cut["modes"].as_array().expect("modes");
+        let below = whole
+            .iter()
+            .map(frequency_hz)
+            .filter(|hz| *hz < 0.7 * last_hz);
+        let mut compared = 0;
+        for hz in below {
+            let distances = modes.iter().map(|mode| (frequency_hz(mode) - hz).abs());
             let distance_hz = distances.fold(f64::INFINITY, f64::min);
-            assert!(
-                distance_hz < 4.5 * 1.5 * sigma_hz,
-                "{share}: {mode}, {whole:?}"
-            );
+            assert!(distance_hz < 1e-3 * hz, "{share}: {hz} Hz, {modes:?}");
+            compared += 1;
         }
+        assert!(compared > 0, "{share}: {cut}");
     }
     let answer = cut_at(0.1);
     assert_eq!(answer.code, 1, "{}", answer.out);

@@ -113,9 +113,14 @@ pub(crate) fn fit_through_lag(seen: &Observation<'_>) -> Option<FitThroughLag> {
     })
 }
 
+/// Whether a lag is looked for: it is not stated, and modes without one do not describe the response as those of a stage.
+pub(crate) fn is_looked_for(seen: &Observation<'_>) -> bool {
+    max_modes(seen).is_some()
+}
+
 /// Largest number of modes through a lag; `None` if no lag is looked for.
 fn max_modes(seen: &Observation<'_>) -> Option<usize> {
-    if seen.source.has_stated_lag {
+    if !seen.source.fits_lag {
         return None;
     }
     match seen.fit {

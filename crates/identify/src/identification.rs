@@ -4,15 +4,16 @@ use std::borrow::Cow;
 
 use crate::ClockSkew;
 use crate::external_signals::ExternalSignals;
+use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
 use crate::observation::{Observation, Source, fit_part, part};
-use crate::other_kind::modes_of_other_kind;
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::{
-    OtherModel, hint, implausible_record, known_cause, other_model, unless_undetermined,
+    OtherModel, complex_model, hint, implausible_record, known_cause, lag_model,
+    unless_undetermined,
 };
 use crate::record_check::Resolution;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
@@ -46,6 +47,8 @@ pub struct ExternalAnalysis {
     pub resolution: Resolution,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
+    /// Where the signals come from.
+    source: Source,
     /// Whether defects of the record, or its kind of output, explain an undecided verdict.
     has_known_cause: bool,
     /// Whether it is known why modes do not describe the response: a defect, or another kind of output.
@@ -235,8 +238,9 @@ impl Identification {
             reference,
         };
         let analysis = analyse(record, *self, None)?;
+        let analysis = self.with_other_model(record, analysis, lag_model)?;
         let analysis = self.with_one_clock(record, analysis)?;
-        self.with_other_model(record, analysis)
+        self.with_other_model(record, analysis, complex_model)
     }
 
     /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
@@ -247,7 +251,8 @@ impl Identification {
         analysis: ExternalAnalysis,
     ) -> Result<ExternalAnalysis, IdentificationError> {
         let is_decided = analysis.verdict.cnmp != Cnmp::Undecided;
-        if self.repetition.is_some() || analysis.has_known_cause || is_decided {
+        let is_known = analysis.has_known_cause || analysis.fitted_lag.is_some();
+        if self.repetition.is_some() || is_known || is_decided {
             return Ok(analysis);
         }
         let Some(skew) = ClockSkew::find(record, analysis.band_hz, &analysis.chain) else {
@@ -265,19 +270,20 @@ impl Identification {
         Ok(if is_better { corrected } else { analysis })
     }
 
-    /// The analysis with a lag that is not stated, or with complex residues, if modes with real ones do not describe the response, and
-    /// nothing else explains that.
+    /// The analysis with a lag that is not stated, or with complex residues, as `model` finds them, if modes with real ones do not describe
+    /// the response, and nothing else explains that.
     fn with_other_model(
         &self,
         record: ExternalSignals<'_>,
         analysis: ExternalAnalysis,
+        model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        if analysis.is_explained {
+        if analysis.is_explained || analysis.fitted_lag.is_some() {
             return Ok(analysis);
         }
         let ExternalAnalysis { frf, chain, .. } = &analysis;
         let observation = Observation {
-            source: self.source(),
+            source: analysis.source,
             frf,
             fit: &analysis.fit,
             chain,
@@ -286,7 +292,7 @@ impl Identification {
             output_step: analysis.resolution.output,
             remedies: record.remedies(),
         };
-        let Some(OtherModel { fit, chain, lag }) = other_model(&observation) else {
+        let Some(OtherModel { fit, chain, lag }) = model(&observation) else {
             return Ok(analysis);
         };
         let up_to_rad_s = analysis.judged_up_to_rad_s;
@@ -311,7 +317,7 @@ impl Identification {
         Source {
             rate_hz: self.rate_hz,
             input_path: self.input_path,
-            has_stated_lag: self.has_stated_lag,
+            fits_lag: !self.has_stated_lag,
         }
     }
 }
@@ -352,16 +358,30 @@ fn analyse(
     let stated = identification.output_kind;
     let output_kind = stated.unwrap_or_default();
     let source = identification.source();
-    let chain = source.chain(output_kind, &frf.data);
-    let other = modes_of_other_kind(&source, &frf.data, &chain);
-    let clear_kind = other.as_ref().map(|(kind, _)| *kind);
-    let fit = match (other, &periodic) {
-        (Some((_, few)), _) => few,
-        (None, Some(part)) => fit_of_periods(&frf.data, part.linearity.as_ref(), &chain),
-        // Many modes would be fitted to the defect.
-        (None, None) if !defects.is_empty() => fit_part(&part(&frf.data), &chain),
-        (None, None) => modal::fit(&frf.data, &chain),
+    let assumed = source.chain(output_kind, &frf.data);
+    let few = fit_part(&part(&frf.data), &assumed);
+    let with_few = Observation {
+        source,
+        frf: &frf,
+        fit: &few,
+        chain: &assumed,
+        stated,
+        clear_kind: None,
+        output_step: resolution.output,
+        remedies: record.remedies(),
     };
+    let FirstFit {
+        fit,
+        chain,
+        lag,
+        clear_kind,
+        source,
+    } = FirstFit::of(&with_few, defects.is_empty(), || match &periodic {
+        Some(part) => fit_of_periods(&frf.data, part.linearity.as_ref(), &assumed),
+        // Many modes would be fitted to the defect.
+        None if !defects.is_empty() => few.clone(),
+        None => modal::fit(&frf.data, &assumed),
+    });
     let fit = match &clock_skew {
         Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
         None => fit,
@@ -369,13 +389,10 @@ fn analyse(
     let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
     let observation = Observation {
         source,
-        frf: &frf,
         fit: &fit,
         chain: &chain,
-        stated,
         clear_kind,
-        output_step: resolution.output,
-        remedies: record.remedies(),
+        ..with_few
     };
     let known = listed(&defects).or_else(|| known_cause(&observation));
     let is_explained = known.is_some();
@@ -385,14 +402,16 @@ fn analyse(
     })?;
     let clocks = clock_skew.map(|skew| skew.description());
     let stray_lines = stray_lines.iter().map(ToString::to_string);
-    let cautions: Vec<String> = stray_lines.chain(clocks).collect();
+    let lag_text = lag.map(|lag| lag.description());
+    let cautions: Vec<String> = stray_lines.chain(clocks).chain(lag_text).collect();
     let verdict = verdict.with(listed(&cautions));
     Ok(ExternalAnalysis {
         frf,
         fit,
         verdict,
-        input_path,
-        fitted_lag: None,
+        input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
+        fitted_lag: lag,
+        source,
         output_kind,
         chain,
         band_hz,

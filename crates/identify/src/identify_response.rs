@@ -5,13 +5,15 @@ use bench_plant::{OutputKind, PlantError};
 
 use crate::Frf;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
+use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
 use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::observation::{Observation, Source};
-use crate::other_kind::modes_of_other_kind;
-use crate::plausibility::{OtherModel, implausible, known_cause, other_model, response_hint};
+use crate::observation::{Observation, Source, fit_part, part};
+use crate::plausibility::{
+    OtherModel, complex_model, implausible, known_cause, lag_model, response_hint,
+};
 use crate::remedies::OF_RESPONSE;
 use crate::scatter::Scatter;
 use crate::verdict::{Cnmp, Verdict};
@@ -177,28 +179,40 @@ impl ResponseIdentification {
         let source = Source {
             rate_hz: self.held_at_hz.unwrap_or(ANALYSER_RATIO * band_hz.1),
             input_path,
-            has_stated_lag: self.stated_lag_s.is_some(),
+            fits_lag: self.stated_lag_s.is_none(),
         };
         let output_kind = self.output_kind.unwrap_or_default();
-        let chain = source.chain(output_kind, &frf.data);
-        let other = modes_of_other_kind(&source, &frf.data, &chain);
-        let clear_kind = other.as_ref().map(|(kind, _)| *kind);
-        let fit = other.map_or_else(|| modal::fit(&frf.data, &chain), |(_, few)| few);
-        let judged_up_to_rad_s = rad_s(band_hz.1);
-        let observation = Observation {
+        let assumed = source.chain(output_kind, &frf.data);
+        let few = fit_part(&part(&frf.data), &assumed);
+        let with_few = Observation {
             source,
             frf: &frf,
-            fit: &fit,
-            chain: &chain,
+            fit: &few,
+            chain: &assumed,
             stated: self.output_kind,
-            clear_kind,
+            clear_kind: None,
             output_step: None,
             remedies: &OF_RESPONSE,
         };
+        let FirstFit {
+            fit,
+            chain,
+            lag: first_lag,
+            clear_kind,
+            source,
+        } = FirstFit::of(&with_few, true, || modal::fit(&frf.data, &assumed));
+        let judged_up_to_rad_s = rad_s(band_hz.1);
+        let observation = Observation {
+            source,
+            fit: &fit,
+            chain: &chain,
+            clear_kind,
+            ..with_few
+        };
         let known = known_cause(&observation);
-        let other = match known {
-            Some(_) => None,
-            None => other_model(&observation),
+        let other = match (&known, first_lag) {
+            (None, None) => lag_model(&observation).or_else(|| complex_model(&observation)),
+            _ => None,
         };
         let why = match other {
             Some(_) => None,
@@ -207,7 +221,7 @@ impl ResponseIdentification {
         let OtherModel { fit, chain, lag } = other.unwrap_or(OtherModel {
             fit,
             chain,
-            lag: None,
+            lag: first_lag,
         });
         let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
             response_hint(verdict, &fit)

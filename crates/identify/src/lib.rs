@@ -41,6 +41,7 @@ mod estimator;
 mod excited_band;
 mod external_signals;
 mod fft;
+mod first_fit;
 mod fitted_lag;
 mod frf;
 pub mod frf_csv;

@@ -8,14 +8,14 @@ use crate::remedies::Remedies;
 use crate::{Frf, FrfDatum};
 
 /// Where signals come from, apart from the kind of the output.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Source {
     /// Samples per second.
     pub(super) rate_hz: f64,
     /// What lies between the samples of the input and the force.
     pub(super) input_path: InputPath,
-    /// Whether the lag of the input is stated, also that there is none.
-    pub(super) has_stated_lag: bool,
+    /// Whether a lag may be fitted: none is stated.
+    pub(super) fits_lag: bool,
 }
 
 /// Number of data of a part.

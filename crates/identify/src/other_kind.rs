@@ -31,27 +31,24 @@ const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
 /// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do, or
-/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not with fewer parameters. With these few modes of the assumed kind; many more would be fitted in vain.
-pub(super) fn modes_of_other_kind(
-    source: &Source,
-    data: &[FrfDatum],
-    chain: &MeasurementChain,
-) -> Option<(OutputKind, Result<ModalFit, FitError>)> {
-    let few = fit_part(&part(data), chain);
-    let few_modes = match &few {
+/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not with fewer parameters. `seen` with few modes
+/// of a part of the data.
+pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
+    let (few, data) = (seen.fit, &seen.frf.data);
+    let few_modes = match few {
         Ok(fit) if describes(fit) => return None,
         Ok(fit) => fit.parameters.modes.len(),
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
-    let (kind, other) = other_kind(source, data, chain.output())?;
+    let (kind, other) = other_kind(&seen.source, data, seen.chain.output())?;
     let other_modes = other.parameters.modes.len();
     let is_far_better = |few: &ModalFit| few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
     let is_clear = 2 * other_modes <= PART_MODES
         || few.as_ref().is_ok_and(is_far_better)
         || (other.leaves_noise() && other_modes + SAVED_MODES <= few_modes);
-    let is_simplest = is_clear && !complex_residues_are_simpler(data, chain, &few, &other);
-    is_simplest.then_some((kind, few))
+    let is_simplest = is_clear && !complex_residues_are_simpler(data, seen.chain, few, &other);
+    is_simplest.then_some(kind)
 }
 
 /// Another kind of output that describes the data in place of that of the fit.

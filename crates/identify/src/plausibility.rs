@@ -82,18 +82,14 @@ pub(super) struct OtherModel {
     pub(super) lag: Option<FittedLag>,
 }
 
-/// Modes with a lag that is not stated, or with complex residues, if modes with real ones do not describe the data, and if they are
-/// plausible as well.
-pub(super) fn other_model(seen: &Observation<'_>) -> Option<OtherModel> {
-    with_lag(seen).or_else(|| with_complex_residues(seen))
-}
-
-fn with_lag(seen: &Observation<'_>) -> Option<OtherModel> {
+/// Modes with a lag that is not stated, if they describe the data, and are plausible.
+pub(super) fn lag_model(seen: &Observation<'_>) -> Option<OtherModel> {
     let FitThroughLag { lag, chain, fit } = fit_through_lag(seen)?;
     plausible(seen, Ok(fit), chain, Some(lag))
 }
 
-fn with_complex_residues(seen: &Observation<'_>) -> Option<OtherModel> {
+/// Modes with complex residues, if modes with real ones do not describe the data, and if they are plausible.
+pub(super) fn complex_model(seen: &Observation<'_>) -> Option<OtherModel> {
     let fit = fit_complex(&seen.frf.data, seen.chain, seen.fit)?;
     plausible(seen, Ok(fit), seen.chain.clone(), None)
 }

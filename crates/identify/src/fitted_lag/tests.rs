@@ -120,7 +120,7 @@ fn through_unknown_lag(frf: &Frf) -> FitThroughLag {
     let source = Source {
         rate_hz: 1e3,
         input_path: InputPath::default(),
-        has_stated_lag: false,
+        fits_lag: true,
     };
     let seen = Observation {
         source,
