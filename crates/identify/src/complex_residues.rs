@@ -1,7 +1,7 @@
 //! Modes with complex residues, where real ones do not describe the data.
 //!
 //! ```text
-//! real residues --not the noise, or cancelling--> search and fit with complex residues --accepted?--> modes with r + q s
+//! real residues --not the noise, cancelling, or a heavily damped mode--> search and fit with complex residues --accepted?--> modes with r + q s
 //! ```
 //!
 //! Every sum of modes with real residues is one with complex residues, so that the data decide. Complex residues are accepted if
@@ -35,8 +35,15 @@ impl ModalFit {
         self.leaves_noise() && self.cancelling_modes().is_none()
     }
 
+    /// Whether the modes describe the data, are determined, and none takes the place of something else.
+    pub(crate) fn is_of_a_stage(&self) -> bool {
+        self.is_sum_of_few_modes()
+            && self.undetermined_modes().is_none()
+            && self.is_lightly_damped()
+    }
+
     /// Whether no mode has the damping of a filter.
-    pub(crate) fn is_lightly_damped(&self) -> bool {
+    fn is_lightly_damped(&self) -> bool {
         let modes = self.modes();
         let mut dampings = modes.iter().map(|mode| mode.damping_ratio.value);
         dampings.all(|damping| damping < MAX_DAMPING_RATIO)
@@ -56,7 +63,7 @@ pub(crate) fn fit_complex(
 ) -> Option<ModalFit> {
     chain.derivative()?;
     let max_modes = match real {
-        Ok(fit) if fit.is_sum_of_few_modes() && fit.undetermined_modes().is_none() => return None,
+        Ok(fit) if fit.is_of_a_stage() => return None,
         Ok(fit) if fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM => fit.parameters.modes.len(),
         Ok(_) => MAX_MODES,
         Err(FitError::Undetermined { modes }) => *modes,
@@ -79,10 +86,8 @@ fn is_simpler(complex: &ModalFit, real: &Result<ModalFit, FitError>) -> bool {
 
 /// Whether the modes describe the data, and real residues do not.
 fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> bool {
-    complex.is_sum_of_few_modes()
-        && complex.undetermined_modes().is_none()
+    complex.is_of_a_stage()
         && !complex.modes().iter().all(is_mostly_imaginary)
-        && complex.is_lightly_damped()
         && is_better_than_real(&complex.parameters, data, chain)
 }
 

@@ -106,7 +106,7 @@ pub(crate) fn fit_through_lag(seen: &Observation<'_>) -> Option<FitThroughLag> {
         unknown.nearest(data, ln_lag, modes)
     });
     let lag_is_certain = lag.value > CERTAIN_SIGMAS * lag.sigma;
-    (lag_is_certain && is_accepted(&fit) && is_simpler(&fit, seen.fit)).then_some(FitThroughLag {
+    (lag_is_certain && fit.is_of_a_stage() && is_simpler(&fit, seen.fit)).then_some(FitThroughLag {
         lag: FittedLag { lag_s: lag },
         chain,
         fit,
@@ -124,17 +124,13 @@ fn max_modes(seen: &Observation<'_>) -> Option<usize> {
         return None;
     }
     match seen.fit {
-        Ok(fit) if is_accepted(fit) => None,
+        Ok(fit) if fit.is_of_a_stage() => None,
         Ok(fit) if fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM => {
             Some(fit.parameters.modes.len().min(PART_MODES))
         }
         Ok(_) | Err(FitError::Undetermined { .. }) => Some(PART_MODES),
         Err(_) => None,
     }
-}
-
-fn is_accepted(fit: &ModalFit) -> bool {
-    fit.is_sum_of_few_modes() && fit.undetermined_modes().is_none() && fit.is_lightly_damped()
 }
 
 /// Whether modes and lag have fewer parameters than modes without it that leave noise as well.

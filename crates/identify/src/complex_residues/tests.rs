@@ -251,6 +251,33 @@ fn complex_residues_need_fewer_parameters_than_real_ones_that_leave_noise() {
     assert!(is_simpler(&complex, &undetermined));
 }
 
+/// Real modes in the place of complex residues describe the data if one of them is heavily damped.
+#[test]
+fn heavily_damped_real_modes_are_compared_with_complex_residues() {
+    let data = data(&CNMP, 8);
+    let of_others = fit(&data_of_real_modes(), &MeasurementChain::Direct).expect("modes");
+    assert_eq!(of_others.parameters.modes.len(), 4);
+    for (damping_ratio, is_compared) in
+        [(0.5 * MAX_DAMPING_RATIO, false), (MAX_DAMPING_RATIO, true)]
+    {
+        let mut real = of_others.clone();
+        real.parameters.modes[0].damping_ratio = damping_ratio;
+        let found = fit_complex(&data, &MeasurementChain::Direct, &Ok(real));
+        assert_eq!(found.is_some(), is_compared, "{damping_ratio}");
+    }
+}
+
+/// Four modes far apart.
+fn data_of_real_modes() -> Vec<FrfDatum> {
+    let mut data = data(&CMP.without_damper(), 9);
+    for datum in &mut data {
+        let s = Complex::new(0.0, TAU * datum.frequency_hz);
+        let w = TAU * 100.0;
+        datum.response += (s * s + s * (0.02 * w) + w * w).inv();
+    }
+    data
+}
+
 const RATE_HZ: f64 = 500.0;
 
 /// Rest of 0.5 s, a logarithmic sweep from 4 to 130 Hz in 20 s, and rest until the stage has settled.
