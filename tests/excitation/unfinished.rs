@@ -118,14 +118,14 @@ fn response_of_a_cut_chirp_ends_where_its_sweep_ended() {
         let cut = answer.json();
         let time_s = cut["ticks"].as_f64().expect("a number") / 1e3;
         let last_hz = cut["fit_band_hz"][1].as_f64().expect("a number");
-        // The loop is armed for less than 2 s before the run, and 16 bins of 1/T and one between two data are left out.
-        let earliest_hz = reached_hz(time_s - 2.0) - 20.0 / time_s;
-        let reached = earliest_hz..=reached_hz(time_s);
+        // The loop is armed for less than 2 s before the run, and the last 5 % are faded out; data are one bin of 1/T or 0.05 % apart.
+        let latest_hz = reached_hz(0.95 * time_s);
+        let earliest_hz = 0.999 * reached_hz(0.95 * time_s - 2.0) - 2.0 / time_s;
+        let reached = earliest_hz..=latest_hz;
         assert!(
             reached.contains(&last_hz),
             "{share}: {last_hz} Hz, {reached:?}"
         );
-        // The stage still moves at the end of a cut record, which changes the response there; the modes further below are those of the run.
         let modes = cut["modes"].as_array().expect("modes");
         let below = whole
             .iter()
@@ -139,10 +139,39 @@ fn response_of_a_cut_chirp_ends_where_its_sweep_ended() {
             compared += 1;
         }
         assert!(compared > 0, "{share}: {cut}");
+        // The end of the record is no mode: each mode of the band whose sign is certain is one of the run.
+        for mode in modes.iter().filter(|mode| mode["sign"] != "?") {
+            let hz = frequency_hz(mode);
+            if hz > last_hz {
+                continue;
+            }
+            let is_of_run = |of_run: &Value| {
+                (frequency_hz(of_run) - hz).abs() < 0.02 * hz && of_run["sign"] == mode["sign"]
+            };
+            assert!(whole.iter().any(is_of_run), "{share}: {mode}, {whole:?}");
+        }
     }
     let answer = cut_at(0.1);
     assert_eq!(answer.code, 1, "{}", answer.out);
     assert!(answer.err.contains("the sweep ended at"), "{}", answer.err);
+}
+
+/// The sweep came to its end: the whole band is excited, and nothing is faded out.
+#[test]
+fn chirp_that_is_cut_after_its_sweep_has_the_whole_band() {
+    let bench = Bench::new();
+    let run = bench.json(
+        "chirp --set loop.rate_hz=1000 --start 5 --stop 200 --duration 20 --set chirp.quiet_after_s=20 --operating-point 8%",
+    );
+    let bytes = std::fs::read(bench.path(text(&run["recording"]))).expect("a recording");
+    std::fs::write(bench.path("cut.mcap"), &bytes[..bytes.len() * 9 / 10]).expect("a disk");
+    let answer = bench.run("identify cut.mcap --json");
+    assert_eq!(answer.code, 3, "{}", answer.err);
+    let cut = answer.json();
+    assert_eq!(cut["outcome"], "cut_off");
+    // Data are one bin apart, of 1/45 s and 1/40 s; the others are at most 0.05 % wide.
+    let [whole, cut] = [&run, &cut].map(|of| of["fit_band_hz"][1].as_f64().expect("a number"));
+    assert!((whole - cut).abs() < 0.2, "{whole} and {cut} Hz");
 }
 
 #[test]

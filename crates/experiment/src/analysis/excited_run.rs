@@ -7,11 +7,13 @@ use super::read_run::is_closed_loop;
 use super::response_estimate::ResponseEstimate;
 use super::run_signals::RunSignals;
 use super::segments::{Segments, segments};
-use super::swept_band::{SweptBy, swept_band_hz};
+use super::swept_band::{SweptBand, SweptBy, swept_band};
 use bench_config::Config;
 use bench_excitation::Pattern;
+use bench_identify::joint::LoopSignals;
 use bench_identify::{Signals, response};
 use bench_recording::Recording;
+use std::borrow::Cow;
 
 /// A recorded run with its excitation.
 pub(super) struct ExcitedRun<'a> {
@@ -19,8 +21,7 @@ pub(super) struct ExcitedRun<'a> {
     config: &'a Config,
     missing: MissingTicks,
     excitation: RunExcitation,
-    /// The band that is excited.
-    band_hz: (f64, f64),
+    swept: SweptBand,
 }
 
 /// How a run was excited.
@@ -46,13 +47,13 @@ impl<'a> ExcitedRun<'a> {
             RunExcitation::Reference => SweptBy::Reference,
             RunExcitation::Current(pattern) => SweptBy::Current(pattern),
         };
-        let band_hz = swept_band_hz(recording, config, &swept_by, missing.ticks)?;
+        let swept = swept_band(recording, config, &swept_by, missing.ticks)?;
         Ok(ExcitedRun {
             recording,
             config,
             missing: missing.clone(),
             excitation,
-            band_hz,
+            swept,
         })
     }
 
@@ -83,7 +84,7 @@ impl<'a> ExcitedRun<'a> {
         let record_s = self.missing.ticks as f64 * self.config.servo.period_s();
         // Without the rest at both ends, and not more than was recorded.
         let duration_s = record_s.min(self.config.chirp.duration_s);
-        let window = shortest_window(self.config, self.band_hz, duration_s);
+        let window = shortest_window(self.config, self.swept.band_hz, duration_s);
         self.missing.variance_factor(window)
     }
 
@@ -97,10 +98,10 @@ impl<'a> ExcitedRun<'a> {
 
     /// The responses by the signals of the run.
     pub(super) fn estimate(&self, signals: &RunSignals) -> Result<ResponseEstimate, AnalysisError> {
-        let signals = &signals.loop_signals;
+        let signals = &self.faded(&signals.loop_signals);
         match &self.excitation {
             RunExcitation::Reference => {
-                estimate_loop(signals, self.band_hz, self.recording, self.config)
+                estimate_loop(signals, self.swept.band_hz, self.recording, self.config)
             }
             // Repetitions with missing ticks are not equal: they are estimated as one record.
             RunExcitation::Current(Pattern::Repeated { .. }) if !self.missing.is_empty() => {
@@ -110,15 +111,27 @@ impl<'a> ExcitedRun<'a> {
         }
     }
 
+    /// The signals, faded out if their sweep ended early.
+    fn faded<'s>(&self, signals: &'s LoopSignals) -> Cow<'s, LoopSignals> {
+        let Some(fade_out) = &self.swept.fade_out else {
+            return Cow::Borrowed(signals);
+        };
+        let excitation = match self.excitation {
+            RunExcitation::Reference => &signals.reference_m,
+            RunExcitation::Current(_) => &signals.signals.input,
+        };
+        Cow::Owned(fade_out.applied(signals, excitation))
+    }
+
     fn open_loop(
         &self,
         signals: Signals,
         pattern: &Pattern,
     ) -> Result<ResponseEstimate, AnalysisError> {
         let settings = &self.config.identify;
-        let (frf, linearity) = match segments(signals, pattern, self.band_hz)? {
+        let (frf, linearity) = match segments(signals, pattern, self.swept.band_hz)? {
             Segments::Lines(frf, linearity) => (frf, linearity.map(|boxed| *boxed)),
-            Segments::Record(signals) => (response(&signals, self.band_hz, settings)?, None),
+            Segments::Record(signals) => (response(&signals, self.swept.band_hz, settings)?, None),
         };
         Ok(ResponseEstimate {
             frf,

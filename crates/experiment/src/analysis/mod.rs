@@ -14,6 +14,7 @@ mod conventions;
 mod ending;
 mod excited_run;
 mod external_response;
+mod fade_out;
 mod frf_checks;
 mod measured_frf;
 mod missing_ticks;
