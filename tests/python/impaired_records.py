@@ -434,7 +434,7 @@ def closed_loop(rng):
 def operating(rng):
     b = Bench(rng)
     b.u = 0.03 * lfilter(*butter(2, min(0.9, 2 * b.high / b.rate)), rng.standard_normal(int(30 * b.rate)))
-    return b.record(b.noisy(b.motion()), causes=["start", "end"], model_holds=False)
+    return b.record(b.noisy(b.motion()), causes=["start", "end"])
 
 
 @kind("too short for its modes")

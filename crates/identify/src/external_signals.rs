@@ -2,11 +2,16 @@
 
 use std::borrow::Cow;
 
-use crate::record_check::{self, Defect, Resolution, StrayLine};
+use crate::periodic::Repetition;
+use crate::record_check::{self, Defect, Ends, Resolution, StrayLine};
 use crate::remedies::{OF_LOOP, OF_SIGNALS, Remedies};
+use crate::steady_input::is_steady;
 use crate::{
     EstimatorSettings, Frf, IdentifyError, IdentifySettings, Signals, excited_band_hz, joint,
 };
+
+/// An input whose RMS value at the first or the last samples exceeds this ratio of that of the record began before, or did not end.
+pub(super) const ACTIVE_RATIO: f64 = 0.3;
 
 /// Input and output, and what excites them.
 #[derive(Clone, Copy, Debug)]
@@ -14,9 +19,28 @@ pub(super) struct ExternalSignals<'a> {
     pub(super) signals: &'a Signals,
     /// The reference of a closed loop, which is independent of the noise; in open loop the input is.
     pub(super) reference: Option<&'a [f64]>,
+    /// How the record begins and ends.
+    pub(super) ends: Ends,
 }
 
 impl<'a> ExternalSignals<'a> {
+    pub(super) fn new(
+        signals: &'a Signals,
+        reference: Option<&'a [f64]>,
+        repetition: Option<Repetition>,
+    ) -> Self {
+        let ends = match (repetition, reference) {
+            (Some(_), _) => Ends::Periods,
+            (None, None) if goes_on(signals) => Ends::Motion,
+            (None, _) => Ends::Rest,
+        };
+        ExternalSignals {
+            signals,
+            reference,
+            ends,
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), IdentifyError> {
         self.signals.check()?;
         match self.reference {
@@ -61,7 +85,10 @@ impl<'a> ExternalSignals<'a> {
 
     /// The response from input to output; in closed loop with the reference as the instrument.
     pub(super) fn response(&self, band_hz: (f64, f64)) -> Result<Frf, IdentifyError> {
-        let settings = EstimatorSettings::default();
+        let settings = EstimatorSettings {
+            transient: self.ends == Ends::Motion,
+            ..EstimatorSettings::default()
+        };
         match self.reference {
             None => crate::response(self.signals, band_hz, &IdentifySettings::Local(settings)),
             Some(reference) => joint::plant(self.signals, reference, band_hz, &settings),
@@ -77,8 +104,8 @@ impl<'a> ExternalSignals<'a> {
     }
 
     /// The first defect of each kind; `cleaned` is the record without its stray lines.
-    pub(super) fn defects(&self, cleaned: &ExternalSignals<'_>, is_periodic: bool) -> Vec<Defect> {
-        record_check::defects(&self.excited(), &cleaned.excited(), is_periodic)
+    pub(super) fn defects(&self, cleaned: &ExternalSignals<'_>) -> Vec<Defect> {
+        record_check::defects(&self.excited(), &cleaned.excited(), self.ends)
     }
 
     /// The signals without sinusoids that do not come from the excitation, and those of the output. A loop feeds them back, so that the
@@ -98,6 +125,13 @@ impl<'a> ExternalSignals<'a> {
         };
         (Cow::Owned(cleaned), lines)
     }
+}
+
+/// Whether the excitation goes on at one of the ends or both, and excites each frequency all the time.
+fn goes_on(signals: &Signals) -> bool {
+    let is_active = record_check::input_ratio_at_start(signals) > ACTIVE_RATIO
+        || record_check::input_ratio_at_end(signals) > ACTIVE_RATIO;
+    is_active && is_steady(signals)
 }
 
 /// The input without the sinusoids that the reference does not have.

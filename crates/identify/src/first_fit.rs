@@ -27,7 +27,7 @@ pub(super) struct FirstFit {
 }
 
 impl FirstFit {
-    /// The fit of a response that is seen with few modes of a part of its data. A record with a defect (`is_sound` is false) has no lag.
+    /// The fit of a response that is seen with few modes of a part of its data. A record that has a defect or is cut (`is_sound` is false) has no lag.
     /// `all_modes` fits as many modes as are significant.
     pub(super) fn of(
         seen: &Observation<'_>,

@@ -12,13 +12,16 @@ use crate::observation::{Observation, Source, fit_part, part};
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::{
-    OtherModel, complex_model, hint, implausible_record, known_cause, lag_model,
-    unless_undetermined,
+    OtherModel, complex_model, cut_within_excitation, hint, implausible_record,
+    known_cause_of_record, lag_model, unless_undetermined,
 };
-use crate::record_check::Resolution;
+use crate::record_check::{Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{OutputKind, PlantError};
+
+/// The caution of a verdict from a record in motion.
+const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
 
 /// The analysis of external signals.
 #[derive(Clone, Debug)]
@@ -49,7 +52,7 @@ pub struct ExternalAnalysis {
     pub clock_skew: Option<ClockSkew>,
     /// Where the signals come from.
     source: Source,
-    /// Whether defects of the record, or its kind of output, explain an undecided verdict.
+    /// Whether defects of the record, its ends, or its kind of output, explain an undecided verdict.
     has_known_cause: bool,
     /// Whether it is known why modes do not describe the response: a defect, or another kind of output.
     is_explained: bool,
@@ -129,7 +132,7 @@ pub struct Identification {
 
 impl Identification {
     /// Signals with a constant number of samples per second. Without further settings the band is the one that the input excites, the
-    /// record begins and ends at rest, the input is the force itself, and the output is a position.
+    /// record begins and ends at rest or is excited by noise all the time, the input is the force itself, and the output is a position.
     pub fn new(rate_hz: f64) -> Identification {
         Identification {
             rate_hz,
@@ -233,10 +236,7 @@ impl Identification {
             input: input.to_vec(),
             output: output.to_vec(),
         };
-        let record = ExternalSignals {
-            signals: &signals,
-            reference,
-        };
+        let record = ExternalSignals::new(&signals, reference, self.repetition);
         let analysis = analyse(record, *self, None)?;
         let analysis = self.with_other_model(record, analysis, lag_model)?;
         let analysis = self.with_one_clock(record, analysis)?;
@@ -278,7 +278,9 @@ impl Identification {
         analysis: ExternalAnalysis,
         model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        if analysis.is_explained || analysis.fitted_lag.is_some() {
+        // What is missing of a record that is cut is easily taken for another model.
+        let is_cut = cut_within_excitation(record).is_some();
+        if analysis.is_explained || is_cut || analysis.fitted_lag.is_some() {
             return Ok(analysis);
         }
         let ExternalAnalysis { frf, chain, .. } = &analysis;
@@ -296,9 +298,8 @@ impl Identification {
             return Ok(analysis);
         };
         let up_to_rad_s = analysis.judged_up_to_rad_s;
-        let is_periodic = self.repetition.is_some();
         let verdict = judged(None, frf, &fit, &chain, up_to_rad_s, |verdict| {
-            hint(verdict, record, is_periodic, &fit, &analysis.resolution)
+            hint(verdict, record, &fit, &analysis.resolution)
         })?;
         let path = self.input_path;
         let verdict = verdict.with(lag.map(|lag| lag.description()));
@@ -346,7 +347,7 @@ fn analyse(
         ..record
     };
     let resolution = record.resolution();
-    let defects = record.defects(&cleaned, repetition.is_some());
+    let defects = record.defects(&cleaned);
     let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(cleaned, repetition));
     let (frf, periodic) = response(cleaned, requested_hz, repetition)?;
     // Beyond the outermost excited lines nothing is known.
@@ -370,13 +371,14 @@ fn analyse(
         output_step: resolution.output,
         remedies: record.remedies(),
     };
+    let is_sound = defects.is_empty() && cut_within_excitation(cleaned).is_none();
     let FirstFit {
         fit,
         chain,
         lag,
         clear_kind,
         source,
-    } = FirstFit::of(&with_few, defects.is_empty(), || match &periodic {
+    } = FirstFit::of(&with_few, is_sound, || match &periodic {
         Some(part) => fit_of_periods(&frf.data, part.linearity.as_ref(), &assumed),
         // Many modes would be fitted to the defect.
         None if !defects.is_empty() => few.clone(),
@@ -394,16 +396,21 @@ fn analyse(
         clear_kind,
         ..with_few
     };
-    let known = listed(&defects).or_else(|| known_cause(&observation));
+    let known = listed(&defects).or_else(|| known_cause_of_record(&observation, cleaned));
     let is_explained = known.is_some();
-    let why = known.or_else(|| implausible_record(&observation, cleaned, repetition.is_some()));
+    let why = known.or_else(|| implausible_record(&observation, cleaned));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
-        hint(verdict, cleaned, repetition.is_some(), &fit, &resolution)
+        hint(verdict, cleaned, &fit, &resolution)
     })?;
     let clocks = clock_skew.map(|skew| skew.description());
+    let motion = (record.ends == Ends::Motion).then(|| IN_MOTION.to_owned());
     let stray_lines = stray_lines.iter().map(ToString::to_string);
     let lag_text = lag.map(|lag| lag.description());
-    let cautions: Vec<String> = stray_lines.chain(clocks).chain(lag_text).collect();
+    let cautions: Vec<String> = stray_lines
+        .chain(motion)
+        .chain(clocks)
+        .chain(lag_text)
+        .collect();
     let verdict = verdict.with(listed(&cautions));
     Ok(ExternalAnalysis {
         frf,
@@ -419,7 +426,7 @@ fn analyse(
         periodic,
         resolution,
         clock_skew,
-        has_known_cause: !defects.is_empty() || clear_kind.is_some(),
+        has_known_cause: !is_sound || clear_kind.is_some(),
         is_explained,
         cautions,
     })

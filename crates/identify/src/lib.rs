@@ -66,6 +66,7 @@ pub mod repeated;
 pub mod scatter;
 mod settings;
 mod signals;
+mod steady_input;
 mod timing;
 pub mod verdict;
 pub mod welch;

@@ -3,12 +3,12 @@
 use bench_plant::OutputKind;
 
 use crate::complex_residues::fit_complex;
-use crate::external_signals::ExternalSignals;
+use crate::external_signals::{ACTIVE_RATIO, ExternalSignals};
 use crate::fitted_lag::{FitThroughLag, FittedLag, fit_through_lag};
 use crate::modal::{FitError, MeasurementChain, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
 use crate::other_kind::{better_kind, explained_by_kind, swapped, vanishes_at_rest};
-use crate::record_check::Resolution;
+use crate::record_check::{Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict};
 use crate::{Frf, record_check};
 
@@ -25,8 +25,6 @@ const EARLY_SAMPLES: f64 = 0.5;
 const CERTAIN_SIGMAS: f64 = 5.0;
 /// More modes than these that cannot be determined are no modes.
 const MANY_MODES: usize = 8;
-/// An input whose RMS value at the first or the last samples exceeds this ratio of that of the record began before, or did not end.
-const ACTIVE_RATIO: f64 = 0.3;
 /// Noise that a controller feeds back to the input makes the response none of modes.
 const CLOSED_LOOP: &str =
     "if the record was taken in closed loop, give the column of its reference (--reference)";
@@ -65,12 +63,24 @@ fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
 pub(super) fn implausible_record(
     seen: &Observation<'_>,
     record: ExternalSignals<'_>,
-    is_periodic: bool,
 ) -> Option<String> {
-    let why = implausible(seen)?;
-    match cut_within_excitation(record, is_periodic) {
-        Some(cut) => Some(format!("{cut} (it seems that {why})")),
-        None => Some(why),
+    with_cut(record, implausible(seen))
+}
+
+/// As [`known_cause`], of a record.
+pub(super) fn known_cause_of_record(
+    seen: &Observation<'_>,
+    record: ExternalSignals<'_>,
+) -> Option<String> {
+    with_cut(record, known_cause(seen))
+}
+
+/// A record that is cut within its excitation explains what seems to be something else.
+fn with_cut(record: ExternalSignals<'_>, seems: Option<String>) -> Option<String> {
+    let seems = seems?;
+    match cut_within_excitation(record) {
+        Some(cut) => Some(format!("{cut} (it seems that {seems})")),
+        None => Some(seems),
     }
 }
 
@@ -188,7 +198,6 @@ pub(super) fn response_hint(verdict: &Verdict, fit: &Result<ModalFit, FitError>)
 pub(super) fn hint(
     verdict: &Verdict,
     record: ExternalSignals<'_>,
-    is_periodic: bool,
     fit: &Result<ModalFit, FitError>,
     resolution: &Resolution,
 ) -> Option<String> {
@@ -198,7 +207,7 @@ pub(super) fn hint(
     if let Some(step) = resolution.output {
         return Some(coarse_steps(step));
     }
-    let is_open = record.reference.is_none() && !is_periodic;
+    let is_open = record.reference.is_none() && record.ends != Ends::Periods;
     let no_sum = not_a_sum_of_modes(fit).map(|why| {
         if is_open {
             format!("{why}; {CLOSED_LOOP}")
@@ -206,7 +215,7 @@ pub(super) fn hint(
             why
         }
     });
-    let cut = cut_within_excitation(record, is_periodic);
+    let cut = cut_within_excitation(record);
     let hints: Vec<String> = cut.into_iter().chain(no_sum).collect();
     (!hints.is_empty()).then(|| hints.join("; "))
 }
@@ -256,9 +265,9 @@ fn no_sum_of_modes(found: &str) -> String {
     )
 }
 
-/// A record without the rest before or after its excitation, during which the plant settles. (Periods need none.)
-fn cut_within_excitation(record: ExternalSignals<'_>, is_periodic: bool) -> Option<String> {
-    if is_periodic {
+/// A record without the rest before or after its excitation, during which the plant settles. (Periods and noise that goes on need none.)
+pub(super) fn cut_within_excitation(record: ExternalSignals<'_>) -> Option<String> {
+    if record.ends != Ends::Rest {
         return None;
     }
     let (excited, excitation) = (record.excited(), record.remedies().excitation);

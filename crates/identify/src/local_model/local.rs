@@ -38,6 +38,7 @@ use super::frf_data;
 use super::noise_floor::NoiseFloor;
 use super::record_spectra::RecordSpectra;
 use super::spectra::{Place, Spectra};
+use super::transient;
 use crate::estimator::{hv, inverse};
 use crate::{
     Estimator, EstimatorSettings, Frf, FrfPoint, IdentifyError, LocalModel, Signals, band,
@@ -45,8 +46,13 @@ use crate::{
 
 /// The response is estimated with the pole of one mode at most.
 const ONE_POLE: usize = 1;
+/// Half-widths beyond the band whose bins are used: two of the noise, and twice that of a model.
+const MARGIN: f64 = 4.0;
 
-/// The FRF of a record that begins and ends at rest, at the frequencies of `band_hz` that have input, with its data for a fit.
+/// The FRF of a record, at the frequencies of `band_hz` that have input, with its data for a fit.
+///
+/// The record begins and ends at rest; or it begins or ends in motion, if `settings.transient` is set. The transient in its spectrum is
+/// then subtracted first.
 ///
 /// The coherence is the ratio of the output's power that the model explains; for a constant it is |sum w Y conj(U)|^2/(sum w
 /// |U|^2 sum w |Y|^2). See the module for standard deviations and bias.
@@ -74,12 +80,20 @@ pub fn estimate(
     settings.check()?;
     signals.check()?;
     let bins = band::bins(band_hz, signals.rate_hz, signals.len())?;
-    of_spectra(
-        &RecordSpectra::of_signals(signals),
-        &bins,
-        band_hz,
-        settings,
-    )
+    let spectra = RecordSpectra::of_signals(signals);
+    if !settings.transient {
+        return of_spectra(&spectra, &bins, band_hz, settings);
+    }
+    let settings = EstimatorSettings {
+        transient: false,
+        ..settings.clone()
+    };
+    let first = *bins.start() as f64;
+    let last = *bins.end() as f64;
+    let reach = |position: f64| MARGIN * settings.half_width(position, spectra.bin_hz());
+    let used = (first - reach(first), last + reach(last));
+    let spectra = transient::subtracted(&spectra, used);
+    of_spectra(&spectra, &bins, band_hz, &settings)
 }
 
 fn of_spectra(

@@ -4,6 +4,7 @@
 //! ```text
 //! RecordSpectra (bins of U, Y) --Window--> model (least squares) --NoiseFloor--> local: response with standard deviations
 //!                                                                           '--> frf_data: the same without smoothing
+//! transient: the spectra of a record in motion without its transient
 //! joint: the same for a stage in closed loop, by ratios of two models
 //! ```
 
@@ -17,4 +18,5 @@ mod rational;
 mod record_spectra;
 mod settings;
 mod spectra;
+mod transient;
 mod window;

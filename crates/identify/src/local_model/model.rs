@@ -20,7 +20,7 @@
 use nalgebra::Complex;
 
 use super::least_squares;
-use super::rational::{self, Order};
+use super::rational::{self, Order, combination};
 use super::window::{FittedModel, Window};
 use crate::{EstimatorSettings, LocalModel};
 
@@ -62,9 +62,15 @@ fn polynomial(window: &Window, degree: usize, transient: bool) -> Option<FittedM
         .zip(&window.root_weight)
         .map(|(y, root)| y * root)
         .collect();
+    let of_transient = columns.get(degree + 1..).unwrap_or_default().to_vec();
     let linear = least_squares::solve(columns, right)?;
+    let transient = combination(
+        &of_transient,
+        linear.solution.get(degree + 1..).unwrap_or_default(),
+    );
     Some(FittedModel {
         fit: window.local_fit(&linear),
         linear,
+        transient,
     })
 }

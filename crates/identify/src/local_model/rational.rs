@@ -103,7 +103,12 @@ fn gauss_newton(
                 response: coefficients.numerator[0],
                 ..window.local_fit(&linear)
             };
-            return Some(FittedModel { fit, linear });
+            let transient = transient(window, order, &coefficients)?;
+            return Some(FittedModel {
+                fit,
+                linear,
+                transient,
+            });
         }
     }
     None
@@ -131,6 +136,24 @@ fn linearized(window: &Window, order: Order, coefficients: &Coefficients) -> Opt
     let over_denominator = (0..model.len()).map(|j| -model[j] * inverse[j]);
     columns.extend(times_powers(window, order, over_denominator));
     least_squares::solve(columns, weighted_error(window, &model))
+}
+
+/// The transient T/A, weighted; empty without one.
+fn transient(
+    window: &Window,
+    order: Order,
+    coefficients: &Coefficients,
+) -> Option<Vec<Complex<f64>>> {
+    if !order.transient {
+        return Some(Vec::new());
+    }
+    let inverse = inverse_denominator(window, &coefficients.denominator)?;
+    let columns = numerators(window, order, &inverse);
+    let of_response = order.numerator_degree() + 1;
+    Some(combination(
+        &columns[of_response..],
+        &coefficients.numerator[of_response..],
+    ))
 }
 
 /// Y - B U/A, weighted.
@@ -171,7 +194,7 @@ fn times_powers(
 }
 
 /// sum over i of `column_i` b_i.
-fn combination(columns: &[Vec<Complex<f64>>], b: &[Complex<f64>]) -> Vec<Complex<f64>> {
+pub(super) fn combination(columns: &[Vec<Complex<f64>>], b: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let rows = columns.first().map_or(0, Vec::len);
     (0..rows)
         .map(|j| columns.iter().zip(b).map(|(column, b)| column[j] * b).sum())

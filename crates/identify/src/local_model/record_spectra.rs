@@ -49,6 +49,18 @@ impl RecordSpectra {
         }
     }
 
+    /// These spectra with a part of the output subtracted: that of each bin from `first` on.
+    pub(super) fn minus(&self, first: usize, part: &[Complex<f64>]) -> Self {
+        let mut output = self.output.clone();
+        let bins = output.iter_mut().skip(first);
+        bins.zip(part).for_each(|(y, part)| *y -= part);
+        Self {
+            input: self.input.clone(),
+            output,
+            bin_hz: self.bin_hz,
+        }
+    }
+
     /// The spectra from output to input, at the bins that have input.
     pub(super) fn swapped(&self) -> Self {
         let bins = self.input.iter().zip(&self.output);

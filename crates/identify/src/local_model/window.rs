@@ -40,6 +40,8 @@ pub(super) struct FittedModel {
     pub(super) fit: LocalFit,
     /// The last linear step; the residual is that of the model.
     pub(super) linear: LeastSquares,
+    /// The transient of each bin times the root of its weight; empty for a model without one.
+    pub(super) transient: Vec<Complex<f64>>,
 }
 
 impl LocalFit {

@@ -1,7 +1,18 @@
-//! Motion of the output at the first and at the last sample of a record.
+//! Rest and motion at the ends of a record.
 
 use super::defect::Defect;
 use crate::Signals;
+
+/// How a record begins and ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// At rest.
+    Rest,
+    /// Within periods, which are averaged.
+    Periods,
+    /// In motion, within an excitation that goes on all the time: the transient is estimated.
+    Motion,
+}
 
 /// Samples at each end from which its velocity is determined, and number of such intervals.
 const END_SAMPLES: usize = 16;

@@ -15,7 +15,7 @@ mod tests;
 use super::Signals;
 pub use defect::Defect;
 use ends::motion_at_ends;
-pub use ends::{input_ratio_at_end, input_ratio_at_start};
+pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};
 use held::held;
 use plateaus::{Quantisation, clipped, repeated};
 use prediction::Prediction;
@@ -25,9 +25,9 @@ pub use stray_lines::{StrayLine, stray_lines, without};
 /// An output whose step is below this ratio of its noise has as few equal neighbours as one without a step.
 const MIN_STEP_RATIO: f64 = 0.1;
 
-/// The first defect of each kind. `cleaned` is the record without its stray lines; its values are no multiples of a step any more. A
-/// periodic record does not begin and end at rest.
-pub fn defects(recorded: &Signals, cleaned: &Signals, is_periodic: bool) -> Vec<Defect> {
+/// The first defect of each kind. `cleaned` is the record without its stray lines; its values are no multiples of a step any more.
+/// Motion is a defect of a record that must begin and end at rest.
+pub fn defects(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Vec<Defect> {
     let step = resolution::step(&recorded.output).unwrap_or(0.0);
     let prediction = Prediction::new(cleaned, step);
     let noise = prediction.as_ref().map_or(0.0, Prediction::noise);
@@ -35,14 +35,15 @@ pub fn defects(recorded: &Signals, cleaned: &Signals, is_periodic: bool) -> Vec<
     let lasting = held(recorded, step)
         .or_else(|| clipped(recorded))
         .or_else(|| repeated(recorded, quantisation));
-    if lasting.is_some() || is_periodic {
+    if lasting.is_some() || ends == Ends::Periods {
         return lasting.into_iter().collect();
     }
     let Some(prediction) = prediction else {
         return Vec::new();
     };
-    let jumps = prediction.jumps().into_iter();
-    jumps
-        .chain(motion_at_ends(cleaned, prediction.median_sigma()))
-        .collect()
+    let mut found = prediction.jumps();
+    if ends == Ends::Rest {
+        found.extend(motion_at_ends(cleaned, prediction.median_sigma()));
+    }
+    found
 }

@@ -38,20 +38,20 @@ fn signals() -> Signals {
     }
 }
 
-fn found_in(signals: &Signals, is_periodic: bool) -> Vec<Defect> {
-    defects(signals, signals, is_periodic)
+fn found_in(signals: &Signals, ends: Ends) -> Vec<Defect> {
+    defects(signals, signals, ends)
 }
 
 fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
     let mut signals = signals();
     let output = signals.output.iter().enumerate();
     signals.output = output.map(|(k, y)| change(k, *y)).collect();
-    found_in(&signals, false)
+    found_in(&signals, Ends::Rest)
 }
 
 #[test]
 fn sound_record_has_no_defect() {
-    assert_eq!(found_in(&signals(), false), []);
+    assert_eq!(found_in(&signals(), Ends::Rest), []);
 }
 
 #[test]
@@ -74,9 +74,9 @@ fn spike_is_found_in_a_record_that_rests_for_longer_than_it_is_excited() {
     // The noise of the rest before the excitation.
     let noise: Vec<f64> = signals.output[..900].to_vec();
     signals.output.extend(at_rest.map(|k| noise[k * 7 % 900]));
-    assert_eq!(found_in(&signals, false), []);
+    assert_eq!(found_in(&signals, Ends::Rest), []);
     signals.output[12_000] += 3.0;
-    let found = found_in(&signals, false);
+    let found = found_in(&signals, Ends::Rest);
     assert!(matches!(found[..], [Defect::Spike { .. }]), "{found:?}");
 }
 
@@ -176,7 +176,7 @@ fn repeated_samples_are_found_with_their_number() {
 fn command_in_the_place_of_the_output_is_named() {
     let mut signals = signals();
     std::mem::swap(&mut signals.input, &mut signals.output);
-    let found = found_in(&signals, false);
+    let found = found_in(&signals, Ends::Rest);
     let [Defect::Constant { time_s, samples }] = found[..] else {
         panic!("{found:?}");
     };
@@ -203,8 +203,8 @@ fn rounded_to(steps: f64, mut signals: Signals) -> Signals {
 #[test]
 fn rounded_output_at_rest_and_at_its_peaks_has_no_defect() {
     let signals = rounded(signals());
-    assert_eq!(found_in(&signals, false), []);
-    assert_eq!(found_in(&signals, true), []);
+    assert_eq!(found_in(&signals, Ends::Rest), []);
+    assert_eq!(found_in(&signals, Ends::Periods), []);
 }
 
 #[test]
@@ -215,7 +215,7 @@ fn stuck_probe_with_a_coarse_step_is_found() {
     let start = (10_000..10_040).find(is_crossing).expect("a crossing");
     let value = signals.output[start];
     signals.output[start..start + 17].fill(value);
-    let found = found_in(&signals, true);
+    let found = found_in(&signals, Ends::Periods);
     let [Defect::Repeated { time_s, samples }] = found[..] else {
         panic!("{found:?}")
     };
@@ -228,7 +228,7 @@ fn probe_with_a_coarse_step_that_fails_for_good_is_found() {
     let mut signals = rounded(signals());
     let value = signals.output[10_000];
     signals.output[10_000..].fill(value);
-    let found = found_in(&signals, true);
+    let found = found_in(&signals, Ends::Periods);
     let [Defect::Repeated { time_s, .. }] = found[..] else {
         panic!("{found:?}")
     };
@@ -256,7 +256,7 @@ fn probe_slower_than_the_log_is_found_with_its_rate() {
     let slips = [3_001, 8_000, 12_345, 15_002, 20_000];
     for period in [1.28, 4.0, 4.096, 12.5] {
         for signals in [signals(), rounded_to(500.0, signals())] {
-            let found = found_in(&slow_probe(&signals, period, &slips), false);
+            let found = found_in(&slow_probe(&signals, period, &slips), Ends::Rest);
             let [Defect::Held { samples, probe_hz }] = found[..] else {
                 panic!("{period}: {found:?}")
             };
@@ -273,7 +273,7 @@ fn ramp_of_an_encoder_is_no_slow_probe() {
     // 1 step in 4 samples, up and down.
     let ramp = |k: usize| (k % 8_000).min(8_000 - k % 8_000) / 4;
     signals.output = (0..25_000).map(|k| ramp(k) as f64).collect();
-    let found = found_in(&signals, true);
+    let found = found_in(&signals, Ends::Periods);
     assert!(
         !found.iter().any(|d| matches!(d, Defect::Held { .. })),
         "{found:?}"
@@ -301,7 +301,7 @@ fn spike_below_one_step_is_no_defect_and_one_of_many_steps_is() {
     let with_spike = |steps: f64| {
         let mut signals = sound.clone();
         signals.output[23_000] += steps * levels;
-        found_in(&signals, false)
+        found_in(&signals, Ends::Rest)
     };
     assert_eq!(with_spike(1.0), []);
     let found = with_spike(40.0);
@@ -332,7 +332,7 @@ fn clipped_output_is_found_with_few_samples_in_each_oscillation() {
     };
     for (limit, is_clipped) in [(0.5, true), (2.0, false)] {
         signals.output = (0..25_000).map(|k| oscillation(k, limit)).collect();
-        let found = found_in(&signals, false);
+        let found = found_in(&signals, Ends::Rest);
         let value = |defect: &Defect| match defect {
             Defect::Clipped { value, .. } => Some(*value),
             _ => None,
@@ -361,7 +361,7 @@ fn record_that_begins_or_ends_in_motion_is_found() {
     let whole = signals();
     let cases = [(10_000..25_000, true), (0..10_000, false)];
     for (range, at_start) in cases {
-        let found = found_in(&whole.slice(range), false);
+        let found = found_in(&whole.slice(range), Ends::Rest);
         let expected = |defect: &Defect| match defect {
             Defect::MovingAtStart { .. } => at_start,
             Defect::MovingAtEnd { .. } => !at_start,
@@ -385,7 +385,7 @@ fn impulse_of_the_input_is_no_defect() {
         }
     };
     signals.output = (0..25_000).map(response).collect();
-    assert_eq!(found_in(&signals, false), []);
+    assert_eq!(found_in(&signals, Ends::Rest), []);
 }
 
 /// A sine of 30 Hz at 1 kHz with steps of a fortieth of its amplitude stays at its largest value for 3 or 4 samples a period.
@@ -396,7 +396,7 @@ fn flat_peaks_of_a_coarse_quantisation_are_no_clipping() {
     signals.output = (0..25_000)
         .map(|k| (40.0 * sine(k)).round() / 40.0)
         .collect();
-    let found = found_in(&signals, true);
+    let found = found_in(&signals, Ends::Periods);
     assert!(
         !found.iter().any(|d| matches!(d, Defect::Clipped { .. })),
         "{found:?}"
