@@ -30,12 +30,11 @@ pub struct StopSignals {
 impl StopSignals {
     /// Installs process-wide handlers. Must be called within a tokio runtime.
     pub fn listen() -> std::io::Result<StopSignals> {
-        let listener = Listener::begin()?;
         let kinds = stop_signals().map(SignalKind::from_raw);
         let signals: std::io::Result<_> = kinds.map(signal).collect();
         Ok(StopSignals {
             signals: signals?,
-            _listener: listener,
+            _listener: Listener::begin()?,
         })
     }
 
@@ -55,9 +54,13 @@ impl StopSignals {
 
 /// Sets the stop flags of a loop in the signal handler itself, until it is dropped.
 pub(super) struct SignalFlags {
-    actions: Vec<SigId>,
+    // Dropped in this order.
+    _actions: Actions,
     _listener: Listener,
 }
+
+/// Actions of signal handlers, until they are dropped.
+struct Actions(Vec<SigId>);
 
 impl SignalFlags {
     /// Each stop signal sets a flag of its own.
@@ -65,26 +68,28 @@ impl SignalFlags {
     /// # Errors
     /// When the system refuses a handler.
     pub(super) fn set(flags: &StopFlags) -> std::io::Result<SignalFlags> {
-        let mut installed = SignalFlags {
-            actions: Vec::new(),
-            _listener: Listener::begin()?,
-        };
+        let mut actions = Actions(Vec::new());
         for (number, flag) in stop_signals().zip(flags.flags()) {
-            installed.actions.push(register(number, Arc::clone(flag))?);
+            actions.0.push(register(number, Arc::clone(flag))?);
         }
-        Ok(installed)
+        Ok(SignalFlags {
+            _actions: actions,
+            _listener: Listener::begin()?,
+        })
     }
 }
 
-impl Drop for SignalFlags {
+impl Drop for Actions {
     fn drop(&mut self) {
-        for action in self.actions.drain(..) {
+        for action in self.0.drain(..) {
             unregister(action);
         }
     }
 }
 
 /// Part of the program that waits for a stop signal. Without one, a stop signal ends the process as it does without handlers.
+///
+/// It begins when its handlers are installed: a signal that arrives before ends the process. In the other order it would be lost.
 struct Listener;
 
 /// Whether nothing in the program waits for a stop signal.
