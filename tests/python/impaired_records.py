@@ -2,7 +2,7 @@
 """Records with the difficulties of real laboratories, of random stages with known modes and zeros, without any line of bench.
 
     impaired_records.py SEED COUNT FOLDER BENCH [KIND ...]   COUNT records of each kind (default: all), identified by `BENCH identify`;
-                                                             prints a line for each record and a table of the kinds
+                                                             prints a line for each record and a table of the kinds, with processor times
     impaired_records.py SEED COUNT FOLDER numbers BENCH [KIND ...]
                                                              prints for each record: 1 if the verdict is right, 0 if there is none, -1 if it is
                                                              wrong; 1 if the stated cause is true or none is needed, 0 other, -1 wrong; wrong signs
@@ -17,9 +17,9 @@ band counts as either. Of an undecided verdict or a refusal the stated cause is 
 import json
 import pathlib
 import re
+import resource
 import subprocess
 import sys
-import time
 
 import numpy as np
 import scipy.linalg as la
@@ -562,9 +562,9 @@ def lag_of_drive(rng):
 def identify(bench, path, record, folder):
     names = list(record.columns)
     command = [bench, "identify", path, "--time", names[0], "--input", names[1], "--output", names[2]]
-    begin = time.time()
+    begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     out = subprocess.run([*command, *record.options, "--json", "--out", folder], capture_output=True, text=True, timeout=600)
-    return out, time.time() - begin
+    return out, resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin
 
 
 def cnmp(record, band_hz, widened):

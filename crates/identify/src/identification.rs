@@ -8,12 +8,12 @@ use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{Observation, Source, fit_part, part};
+use crate::observation::{Observation, Source, describes, fit_part, part};
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::{
-    OtherModel, complex_model, cut_within_excitation, hint, implausible_record,
-    known_cause_of_record, lag_model, unless_undetermined,
+    OtherModel, complex_model, cut_within_excitation, due_to_cut, hint, implausible, known_cause,
+    lag_model, unless_undetermined,
 };
 use crate::record_check::{Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
@@ -371,7 +371,8 @@ fn analyse(
         output_step: resolution.output,
         remedies: record.remedies(),
     };
-    let is_sound = defects.is_empty() && cut_within_excitation(cleaned).is_none();
+    let cut = cut_within_excitation(cleaned);
+    let is_sound = defects.is_empty() && cut.is_none();
     let FirstFit {
         fit,
         chain,
@@ -380,8 +381,9 @@ fn analyse(
         source,
     } = FirstFit::of(&with_few, is_sound, || match &periodic {
         Some(part) => fit_of_periods(&frf.data, part.linearity.as_ref(), &assumed),
-        // Many modes would be fitted to the defect.
+        // Many modes would be fitted to a defect or a missing end.
         None if !defects.is_empty() => few.clone(),
+        None if cut.is_some() && !few.as_ref().is_ok_and(describes) => few.clone(),
         None => modal::fit(&frf.data, &assumed),
     });
     let fit = match &clock_skew {
@@ -396,12 +398,13 @@ fn analyse(
         clear_kind,
         ..with_few
     };
-    let known = listed(&defects).or_else(|| known_cause_of_record(&observation, cleaned));
+    let known = listed(&defects).or_else(|| known_cause(&observation));
     let is_explained = known.is_some();
-    let why = known.or_else(|| implausible_record(&observation, cleaned));
+    let why = known.or_else(|| implausible(&observation));
     let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
         hint(verdict, cleaned, &fit, &resolution)
     })?;
+    let verdict = due_to_cut(verdict, cut.filter(|_| defects.is_empty()));
     let clocks = clock_skew.map(|skew| skew.description());
     let motion = (record.ends == Ends::Motion).then(|| IN_MOTION.to_owned());
     let stray_lines = stray_lines.iter().map(ToString::to_string);

@@ -59,28 +59,14 @@ fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
     better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
 }
 
-/// As [`implausible`], of a record; one that is cut within its excitation has a response that no system has.
-pub(super) fn implausible_record(
-    seen: &Observation<'_>,
-    record: ExternalSignals<'_>,
-) -> Option<String> {
-    with_cut(record, implausible(seen))
-}
-
-/// As [`known_cause`], of a record.
-pub(super) fn known_cause_of_record(
-    seen: &Observation<'_>,
-    record: ExternalSignals<'_>,
-) -> Option<String> {
-    with_cut(record, known_cause(seen))
-}
-
-/// A record that is cut within its excitation explains what seems to be something else.
-fn with_cut(record: ExternalSignals<'_>, seems: Option<String>) -> Option<String> {
-    let seems = seems?;
-    match cut_within_excitation(record) {
-        Some(cut) => Some(format!("{cut} (it seems that {seems})")),
-        None => Some(seems),
+/// An undecided verdict of a record that is cut within its excitation is due to that.
+pub(super) fn due_to_cut(verdict: Verdict, cut: Option<String>) -> Verdict {
+    match cut {
+        Some(cut) if verdict.cnmp == Cnmp::Undecided => Verdict {
+            why: format!("{cut} (it seems that {})", verdict.why),
+            ..verdict
+        },
+        _ => verdict,
     }
 }
 
@@ -208,16 +194,13 @@ pub(super) fn hint(
         return Some(coarse_steps(step));
     }
     let is_open = record.reference.is_none() && record.ends != Ends::Periods;
-    let no_sum = not_a_sum_of_modes(fit).map(|why| {
+    not_a_sum_of_modes(fit).map(|why| {
         if is_open {
             format!("{why}; {CLOSED_LOOP}")
         } else {
             why
         }
-    });
-    let cut = cut_within_excitation(record);
-    let hints: Vec<String> = cut.into_iter().chain(no_sum).collect();
-    (!hints.is_empty()).then(|| hints.join("; "))
+    })
 }
 
 fn coarse_steps(step: f64) -> String {
