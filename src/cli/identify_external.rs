@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::analysis_output::{in_folder, pages_text, response_text};
 use super::error::CliError;
 use super::exit::Exit;
-use super::input_path_text::InputPathReport;
+use super::input_path_text::{InputPathReport, input_kind_text};
 use super::linearity_output;
 use super::modal_output;
 use super::output::print_result;
@@ -17,7 +17,7 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::Resolution;
-use bench_identify::{ClockSkew, Distortion, DistortionSource, OutputKind};
+use bench_identify::{ClockSkew, Distortion, DistortionSource, InputKind, OutputKind};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -43,6 +43,8 @@ struct Report {
     /// Whether the times are taken as seconds only because the file does not state their unit.
     time_unit_assumed: bool,
     band_hz: (f64, f64),
+    /// What the input is, as stated; `null` if it is not.
+    input_kind: Option<InputKind>,
     /// What the output measures, as stated, or `position`.
     output_kind: OutputKind,
     /// Hold and lag of the input that were assumed; 0 without them.
@@ -153,6 +155,7 @@ impl Report {
             times: record.times,
             time_unit_assumed: false,
             band_hz: analysis.band_hz,
+            input_kind: analysis.input_kind,
             output_kind: analysis.output_kind,
             input_path: InputPathReport::new(analysis.input_path, analysis.fitted_lag),
             input_resolution: analysis.resolution.input,
@@ -191,7 +194,7 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
@@ -200,6 +203,7 @@ impl Report {
             self.reference_text(),
             self.times_text(),
             self.clocks_text(),
+            input_kind_text(self.input_kind),
             self.output_kind_text(),
             self.resolution_text(),
             self.input_path.text()

@@ -8,7 +8,7 @@ use super::analysis_output::{in_folder, pages_text};
 use super::error::CliError;
 use super::exit::Exit;
 use super::figure_options::magnitude_axis;
-use super::input_path_text::InputPathReport;
+use super::input_path_text::{InputPathReport, input_kind_text};
 use super::measured_margins::sigma_text;
 use super::modal_output;
 use super::output::{print_result, warn};
@@ -18,7 +18,7 @@ use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFil
 use bench_external::frf::OutputStated;
 use bench_identify::frf_csv;
 use bench_identify::scatter::SigmaSource;
-use bench_identify::{OutputKind, ResponseAnalysis};
+use bench_identify::{InputKind, OutputKind, ResponseAnalysis};
 use bench_order::IdentifyOrder;
 use bench_report::run_pages::{ResponseReport, write_page};
 
@@ -45,6 +45,8 @@ struct Report {
     /// Hold and lag of the input that were assumed; 0 without them.
     #[serde(flatten)]
     input_path: InputPathReport,
+    /// What the input is, as stated; `null` if it is not.
+    input_kind: Option<InputKind>,
     /// What the output was taken as.
     output_kind: OutputKind,
     frf_csv: String,
@@ -116,6 +118,7 @@ impl Report {
             negative_text: response.negative.map(|found| found.description()),
             band_hz: analysis.band_hz,
             input_path: InputPathReport::new(analysis.input_path, analysis.fitted_lag),
+            input_kind: analysis.input_kind,
             output_kind: analysis.output_kind,
             frf_csv: results.write_frf("frf", &analysis.frf, &magnitude)?,
             pages: write_page(&page.report(), results)?,
@@ -132,6 +135,7 @@ impl Report {
             format!("  response   {}\n", self.recording),
             self.points_text(),
             self.unit_text(),
+            input_kind_text(self.input_kind),
             self.output_kind_text(),
             sigma_text(self.sigma).map_or(String::new(), |text| labelled("sigma", text)),
             self.negative_text

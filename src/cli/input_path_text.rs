@@ -1,10 +1,15 @@
 //! Hold and lag of an input, as they are printed.
 
-use bench_identify::FittedLag;
 use bench_identify::modal::InputPath;
+use bench_identify::{FittedLag, InputKind};
 use serde::Serialize;
 
 use super::table::labelled;
+
+/// A line with what the input is, if that is stated.
+pub(super) fn input_kind_text(kind: Option<InputKind>) -> String {
+    kind.map_or_else(String::new, |kind| labelled("input is", kind.name()))
+}
 
 /// Hold and lag of the input of an external record or response, as JSON has them.
 #[derive(Debug, Serialize)]

@@ -49,6 +49,13 @@ impl ModalFit {
         dampings.all(|damping| damping < MAX_DAMPING_RATIO)
     }
 
+    /// The parameters without the modes that have the damping of a filter.
+    pub(crate) fn lightly_damped_modes(&self) -> ModalParameters {
+        let is_light = |k: &usize| self.parameters.modes[*k].damping_ratio < MAX_DAMPING_RATIO;
+        let light: Vec<usize> = (0..self.parameters.modes.len()).filter(is_light).collect();
+        self.parameters.selected(&light)
+    }
+
     /// Number of parameters that were fitted.
     pub(crate) fn number_of_parameters(&self) -> usize {
         self.parameters.free().len()
@@ -85,7 +92,7 @@ fn is_simpler(complex: &ModalFit, real: &Result<ModalFit, FitError>) -> bool {
 }
 
 /// Whether the modes describe the data, and real residues do not.
-fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> bool {
+pub(crate) fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> bool {
     complex.is_of_a_stage()
         && !complex.modes().iter().all(is_mostly_imaginary)
         && is_better_than_real(&complex.parameters, data, chain)

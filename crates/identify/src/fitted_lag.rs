@@ -13,19 +13,23 @@
 //! 3. tau differs from 0 by more than its noise;
 //! 4. no mode is heavily damped: such a mode takes the place of another filter.
 //!
+//! With the voltage of a coil as the input, modes with complex residues are tried behind modes with real ones: the induced voltage damps
+//! the stage at the coil alone. Complex residues must then be significantly better than real ones with the same lag.
+//!
 //! The error of tau is included in those of modes and zeros, as the standard deviations say how far tau and they are coupled.
 
 use std::f64::consts::TAU;
 
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
+use crate::complex_residues;
 use crate::frf::with_relative_error;
 use crate::modal::{
     self, FitError, InputPath, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues,
 };
-use crate::observation::{Observation, PART_MODES, Source, fit_part, part};
+use crate::observation::{Observation, PART_MODES, Source, part};
 use crate::profile;
 use crate::{Estimate, FrfDatum};
-use bench_plant::OutputKind;
+use bench_plant::{InputKind, OutputKind};
 
 /// The scan begins at a lag that turns the response by this angle in radians at the end of the band ...
 const LEAST_ANGLE_RAD: f64 = 0.02;
@@ -47,7 +51,7 @@ const FIRST_STEP: f64 = 0.1;
 /// The lag may differ from the scanned ones by this factor.
 const BEYOND_SCAN: f64 = 4.0;
 /// Largest number of fits with the lag of the one before.
-const MAX_REFITS: usize = 3;
+const MAX_REFITS: usize = 6;
 /// A lag of fewer standard deviations is noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
 
@@ -86,18 +90,34 @@ pub(crate) struct FitThroughLag {
     pub(crate) fit: ModalFit,
 }
 
-/// The fit with a lag, if it describes the data and a fit without one does not.
+/// The fit with a lag, if it describes the data and a fit without one does not. With the voltage of a coil as the input, complex residues
+/// are tried as well.
 pub(crate) fn fit_through_lag(seen: &Observation<'_>) -> Option<FitThroughLag> {
     let max_modes = max_modes(seen)?;
+    let is_voltage = seen.source.input_kind == Some(InputKind::Voltage);
+    fit_with(seen, Residues::Real, max_modes).or_else(|| {
+        is_voltage
+            .then(|| fit_with(seen, Residues::complex(), max_modes))
+            .flatten()
+    })
+}
+
+fn fit_with(seen: &Observation<'_>, residues: Residues, max_modes: usize) -> Option<FitThroughLag> {
     let unknown = UnknownLag {
         source: seen.source,
         kind: seen.chain.output(),
+        residues,
     };
     let data = &seen.frf.data;
     let near = unknown.described(&part(data))?;
-    let LagWithModes { lag_s: lag, .. } = unknown.refined(data, &near)?;
+    let LagWithModes { lag_s: lag, modes } = unknown.refined(data, &near)?;
+    let max_modes = match unknown.residues {
+        Residues::Real => max_modes,
+        // A further one takes the place of what is left of the lag.
+        Residues::Complex(_) => modes.modes.len(),
+    };
     let chain = unknown.chain(lag.value, data);
-    let fit = modal::fit_few(data, &chain, &Residues::Real, max_modes).ok()?;
+    let fit = modal::fit_few(data, &chain, &unknown.residues, max_modes).ok()?;
     let of_logarithm = Estimate {
         value: lag.value.ln(),
         sigma: lag.sigma / lag.value,
@@ -106,7 +126,11 @@ pub(crate) fn fit_through_lag(seen: &Observation<'_>) -> Option<FitThroughLag> {
         unknown.nearest(data, ln_lag, modes)
     });
     let lag_is_certain = lag.value > CERTAIN_SIGMAS * lag.sigma;
-    (lag_is_certain && fit.is_of_a_stage() && is_simpler(&fit, seen.fit)).then_some(FitThroughLag {
+    let is_accepted = match unknown.residues {
+        Residues::Real => fit.is_of_a_stage(),
+        Residues::Complex(_) => complex_residues::is_accepted(&fit, data, &chain),
+    };
+    (lag_is_certain && is_accepted && is_simpler(&fit, seen.fit)).then_some(FitThroughLag {
         lag: FittedLag { lag_s: lag },
         chain,
         fit,
@@ -147,6 +171,7 @@ fn is_simpler(fit: &ModalFit, without: &Result<ModalFit, FitError>) -> bool {
 struct UnknownLag {
     source: Source,
     kind: OutputKind,
+    residues: Residues,
 }
 
 impl UnknownLag {
@@ -171,15 +196,27 @@ impl UnknownLag {
         }
         // Without the error the data show smaller modes. Those of a lag that is not exact are too many: the next ones are fewer.
         for _ in 0..MAX_REFITS {
-            let fit = fit_part(data, &self.chain(found.lag_s.value, data)).ok()?;
-            let is_sum = fit.is_sum_of_few_modes();
-            found.modes = fit.parameters;
+            let chain = self.chain(found.lag_s.value, data);
+            let fit = modal::fit_few(data, &chain, &self.residues, PART_MODES).ok()?;
+            let is_complete = match self.residues {
+                Residues::Real => fit.is_sum_of_few_modes(),
+                Residues::Complex(_) => fit.is_of_a_stage(),
+            };
+            found.modes = self.of_the_stage(&fit);
             found = self.refined(data, &found)?;
-            if is_sum {
+            if is_complete {
                 return Some(found);
             }
         }
         None
+    }
+
+    /// The modes of a fit; of complex residues those without the damping of a filter, which take the place of a part of the lag.
+    fn of_the_stage(&self, fit: &ModalFit) -> ModalParameters {
+        match self.residues {
+            Residues::Real => fit.parameters.clone(),
+            Residues::Complex(_) => fit.lightly_damped_modes(),
+        }
     }
 
     /// The scanned lag with which a few modes describe the data best: first in large, then in small steps.

@@ -18,7 +18,7 @@ use crate::plausibility::{
 use crate::record_check::{Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
-use bench_plant::{OutputKind, PlantError};
+use bench_plant::{InputKind, OutputKind, PlantError};
 
 /// The caution of a verdict from a record in motion.
 const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
@@ -36,6 +36,8 @@ pub struct ExternalAnalysis {
     pub input_path: InputPath,
     /// The lag of the input, if it was fitted.
     pub fitted_lag: Option<FittedLag>,
+    /// What the input is, if that is stated.
+    pub input_kind: Option<InputKind>,
     /// What the output measures: as stated, or a position. The modes and zeros are those of the position.
     pub output_kind: OutputKind,
     /// The chain from the input to the force that follows from them.
@@ -127,6 +129,7 @@ pub struct Identification {
     repetition: Option<Repetition>,
     input_path: InputPath,
     has_stated_lag: bool,
+    input_kind: Option<InputKind>,
     output_kind: Option<OutputKind>,
 }
 
@@ -140,6 +143,7 @@ impl Identification {
             repetition: None,
             input_path: InputPath::default(),
             has_stated_lag: false,
+            input_kind: None,
             output_kind: None,
         }
     }
@@ -171,6 +175,14 @@ impl Identification {
     pub fn lag_s(mut self, lag_s: f64) -> Identification {
         self.input_path.lag_s = lag_s;
         self.has_stated_lag = true;
+        self
+    }
+
+    /// What the input is. Of a voltage, a lag that is not stated is fitted together with complex residues, if real ones do not describe the
+    /// response; the modes and their damping are those with the voltage source. Otherwise the kind is only kept in the result.
+    #[must_use]
+    pub fn input_kind(mut self, kind: InputKind) -> Identification {
+        self.input_kind = Some(kind);
         self
     }
 
@@ -318,6 +330,7 @@ impl Identification {
         Source {
             rate_hz: self.rate_hz,
             input_path: self.input_path,
+            input_kind: self.input_kind,
             fits_lag: !self.has_stated_lag,
         }
     }
@@ -422,6 +435,7 @@ fn analyse(
         input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
         fitted_lag: lag,
         source,
+        input_kind: identification.input_kind,
         output_kind,
         chain,
         band_hz,

@@ -1,7 +1,7 @@
 //! From a response that another program has computed to modes and verdict, without a model of the stage.
 
 use bench_base::units::rad_s;
-use bench_plant::{OutputKind, PlantError};
+use bench_plant::{InputKind, OutputKind, PlantError};
 
 use crate::Frf;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -38,6 +38,8 @@ pub struct ResponseAnalysis {
     pub input_path: InputPath,
     /// The lag of the input, if it was fitted.
     pub fitted_lag: Option<FittedLag>,
+    /// What the input is, if that is stated.
+    pub input_kind: Option<InputKind>,
     /// The kind of the output that was assumed.
     pub output_kind: OutputKind,
     /// The chain from the input to the force that follows from them.
@@ -128,6 +130,7 @@ pub struct ResponseIdentification {
     band_hz: Option<(f64, f64)>,
     held_at_hz: Option<f64>,
     stated_lag_s: Option<f64>,
+    input_kind: Option<InputKind>,
     output_kind: Option<OutputKind>,
 }
 
@@ -160,6 +163,13 @@ impl ResponseIdentification {
         self
     }
 
+    /// What the input is; see [`Identification::input_kind`](crate::Identification::input_kind).
+    #[must_use]
+    pub fn input_kind(mut self, kind: InputKind) -> ResponseIdentification {
+        self.input_kind = Some(kind);
+        self
+    }
+
     /// The output is the position, the velocity or the acceleration of the stage. Without this, it is the position.
     #[must_use]
     pub fn output_kind(mut self, kind: OutputKind) -> ResponseIdentification {
@@ -179,6 +189,7 @@ impl ResponseIdentification {
         let source = Source {
             rate_hz: self.held_at_hz.unwrap_or(ANALYSER_RATIO * band_hz.1),
             input_path,
+            input_kind: self.input_kind,
             fits_lag: self.stated_lag_s.is_none(),
         };
         let output_kind = self.output_kind.unwrap_or_default();
@@ -235,6 +246,7 @@ impl ResponseIdentification {
             fit,
             input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
             fitted_lag: lag,
+            input_kind: self.input_kind,
             output_kind,
             chain,
             band_hz,

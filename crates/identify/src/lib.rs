@@ -72,7 +72,7 @@ pub mod verdict;
 pub mod welch;
 
 pub use bench_base::estimate::{Estimate, SIGMAS_95};
-pub use bench_plant::OutputKind;
+pub use bench_plant::{InputKind, OutputKind};
 pub use clock_skew::ClockSkew;
 pub use error::{BandError, IdentifyError, Signal, SignalsError};
 pub use excited_band::excited_band_hz;

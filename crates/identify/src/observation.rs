@@ -1,6 +1,6 @@
 //! A response with the modes that were fitted to it, and how it was observed.
 
-use bench_plant::OutputKind;
+use bench_plant::{InputKind, OutputKind};
 
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit, Residues};
@@ -14,6 +14,8 @@ pub(super) struct Source {
     pub(super) rate_hz: f64,
     /// What lies between the samples of the input and the force.
     pub(super) input_path: InputPath,
+    /// What the input is, if that is stated.
+    pub(super) input_kind: Option<InputKind>,
     /// Whether a lag may be fitted: none is stated.
     pub(super) fits_lag: bool,
 }

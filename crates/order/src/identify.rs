@@ -15,7 +15,7 @@ use bench_external::{Columns, ExternalCsvError, Sampling, TimeUnit};
 use bench_identify::periodic::Repetition;
 use bench_identify::settling::settling_periods;
 use bench_identify::{Identification, IdentificationError, IdentifyError, Signals};
-use bench_plant::OutputKind;
+use bench_plant::{InputKind, OutputKind};
 
 /// The recording or the file, and what it contains.
 #[derive(Clone, Debug, PartialEq, clap::Args, Serialize, JsonSchema)]
@@ -83,6 +83,10 @@ pub struct ExternalOptions {
     /// unit; not the control error. The input is then the whole signal that acts on the stage [default: none, open loop]
     #[arg(long, value_name = "COLUMN", requires = "input")]
     pub reference: Option<String>,
+    /// What the input is: `force`, `current`, or `voltage` of a coil, whose lag L/R is then fitted together with complex residues, unless
+    /// --input-lag states it [default: not stated]
+    #[arg(long, value_name = "KIND", requires = "data", value_enum)]
+    pub input_kind: Option<InputKind>,
     /// What the output measures: `position`, `velocity` as of a laser vibrometer, or `acceleration`. The modes are those of the position
     /// [default: position, and no verdict if the output looks like another kind]
     #[arg(long, value_name = "KIND", requires = "data", value_enum)]
@@ -218,6 +222,9 @@ impl ExternalOptions {
         }
         if let Some(repetition) = self.repetition(signals)? {
             identification = identification.periods(repetition);
+        }
+        if let Some(kind) = self.input_kind {
+            identification = identification.input_kind(kind);
         }
         if let Some(kind) = self.output_kind {
             identification = identification.output_kind(kind);

@@ -17,6 +17,9 @@ impl ExternalOptions {
         if let Some((low_hz, high_hz)) = self.band_hz()? {
             identification = identification.band_hz(low_hz, high_hz);
         }
+        if let Some(kind) = self.input_kind {
+            identification = identification.input_kind(kind);
+        }
         if let Some(kind) = self.output_kind {
             identification = identification.output_kind(kind);
         }

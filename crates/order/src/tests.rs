@@ -33,7 +33,7 @@ fn orders() -> Vec<Value> {
             "single_chirp": true, "keep_recordings": true, "asymmetry_tolerance": "0.4%",
             "operating_point_tolerance": "0.1mm" }),
         json!({ "command": "identify", "recording": "-a.csv", "input": "force N", "output": "y", "time": "t",
-            "output_kind": "velocity", "period": "2500", "skip_periods": 1, "hold": "zoh", "input_lag": "0.16ms",
+            "input_kind": "voltage", "output_kind": "velocity", "period": "2500", "skip_periods": 1, "hold": "zoh", "input_lag": "0.16ms",
             "band": "11Hz:250Hz" }),
         json!({ "command": "identify", "recording": "a.csv", "input": "u", "output": "y", "reference": "r",
             "rate": "1000" }),

@@ -120,6 +120,7 @@ fn through_unknown_lag(frf: &Frf) -> FitThroughLag {
     let source = Source {
         rate_hz: 1e3,
         input_path: InputPath::default(),
+        input_kind: None,
         fits_lag: true,
     };
     let seen = Observation {
@@ -219,6 +220,107 @@ fn no_lag_is_fitted_without_one_or_if_it_is_stated() {
         let found = found.expect("a response");
         assert_eq!(found.fitted_lag, None);
         assert_eq!(found.input_path.lag_s, stated_s);
+    }
+}
+
+/// The stage driven by a voltage source: with tau = L/R, d = k^2/R and the response G_x of the coil, H = G_y/(1 + s tau + s d G_x), in units
+/// of k/R.
+struct Driven {
+    probe: Vec<Mode>,
+    coil: Vec<Mode>,
+    lag_s: f64,
+    damper_kg_s: f64,
+}
+
+impl Driven {
+    /// The coil moves in all modes; its residues are those of squares.
+    fn new(probe: &[Mode], pole_hz: f64, damper_kg_s: f64) -> Driven {
+        let shapes = [1.0, 0.5, 0.8];
+        let coil = probe.iter().zip(shapes);
+        Driven {
+            probe: probe.to_vec(),
+            coil: coil
+                .map(|((hz, zeta, _), shape)| (*hz, *zeta, shape))
+                .collect(),
+            lag_s: 1.0 / (TAU * pole_hz),
+            damper_kg_s,
+        }
+    }
+
+    /// 1 + s tau + s d G_x, which is 0 at the poles.
+    fn impedance(&self, s: Complex<f64>) -> Complex<f64> {
+        s * self.lag_s + s * self.damper_kg_s * stage(&self.coil, s) + 1.0
+    }
+
+    fn response(&self, s: Complex<f64>) -> Complex<f64> {
+        stage(&self.probe, s) / self.impedance(s)
+    }
+
+    /// The pole near a number, by Newton's method with a difference quotient.
+    fn pole_near(&self, start: Complex<f64>) -> Complex<f64> {
+        let step = Complex::new(1e-3, 0.0);
+        (0..40).fold(start, |s, _| {
+            let slope = (self.impedance(s + step) - self.impedance(s - step)) / (step * 2.0);
+            s - self.impedance(s) / slope
+        })
+    }
+}
+
+/// Complex residues have a delay of their own, of which the sum of modes is only nearly that of the stage: 0.1 % are allowed beside the noise.
+fn is_near(estimate: Estimate, truth: f64, size: f64) -> bool {
+    (estimate.value - truth).abs() < 4.5 * estimate.sigma + 1e-3 * size
+}
+
+#[test]
+fn modes_and_zeros_behind_a_voltage_source_are_those_with_its_damping() {
+    for (modes, cnmp) in [(&CMP[..], Cnmp::Excluded), (&CNMP[..], Cnmp::Detected)] {
+        for (seed, pole_hz) in [60.0, 300.0].into_iter().enumerate() {
+            let driven = Driven::new(modes, pole_hz, 10.0);
+            let frf = measured(|s| driven.response(s), sigma(modes), seed as u64);
+            let voltage = ResponseIdentification::new().input_kind(InputKind::Voltage);
+            let found = voltage.run(&frf).expect("a response");
+            let why = format!("{pole_hz} Hz: {}", found.verdict.why);
+            assert_eq!(found.verdict.cnmp, cnmp, "{why}");
+            let lag_s = found.fitted_lag.expect(&why).lag_s;
+            let real_pole = driven.pole_near(Complex::new(-1.0 / driven.lag_s, 0.0));
+            let truth_s = -1.0 / real_pole.re;
+            // The further the pole is above the band, the more of the lag the delay takes.
+            assert!(is_near(lag_s, truth_s, 30.0 * truth_s), "{why} {real_pole}");
+            let fit = found.fit.expect("modes");
+            assert!(!fit.parameters.has_real_residues(), "{why}");
+            assert_eq!(fit.modes().len(), modes.len(), "{why}");
+            for mode in fit.modes() {
+                let (w, zeta) = (mode.omega_rad_s.value, mode.damping_ratio.value);
+                let pole = driven.pole_near(Complex::new(-zeta, (1.0 - zeta * zeta).sqrt()) * w);
+                let damping = -pole.re / pole.norm();
+                assert!(
+                    is_near(mode.omega_rad_s, pole.norm(), pole.norm()),
+                    "{why} {pole}"
+                );
+                assert!(
+                    is_near(mode.damping_ratio, damping, damping),
+                    "{why} {pole}"
+                );
+            }
+            for zero in found.verdict.zeros.iter().filter(|zero| zero.s.im > 0.0) {
+                let truth = zero_near(modes, zero.s);
+                assert!(
+                    is_near(zero.real_part(), truth.re, truth.norm()),
+                    "{why} {truth}"
+                );
+            }
+            if seed > 0 {
+                continue;
+            }
+            // Without the statement the verdict may be undecided, but it is not wrong.
+            let unstated = ResponseIdentification::new().run(&frf).expect("a response");
+            let verdict = unstated.verdict;
+            assert!(
+                [cnmp, Cnmp::Undecided].contains(&verdict.cnmp),
+                "{pole_hz} Hz: {}",
+                verdict.why
+            );
+        }
     }
 }
 

@@ -229,7 +229,7 @@ impl ModalParameters {
     }
 
     /// The parameters with only the modes of these indices, in their order.
-    pub(super) fn selected(&self, indices: &[usize]) -> ModalParameters {
+    pub(crate) fn selected(&self, indices: &[usize]) -> ModalParameters {
         ModalParameters {
             modes: indices.iter().map(|k| self.modes[*k]).collect(),
             residues: self.residues.selected(indices),

@@ -94,6 +94,10 @@ impl<'a> ExternalRecord<'a> {
                 self.reference.map(String::from),
             ),
             (
+                "Kind of the input",
+                self.analysis.input_kind.map(|kind| kind.name().to_string()),
+            ),
+            (
                 "Kind of the output",
                 Some(self.analysis.output_kind.name().to_string()),
             ),

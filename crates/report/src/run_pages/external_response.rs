@@ -64,6 +64,10 @@ impl<'a> ResponseReport<'a> {
         let assumptions = response.assumptions.join("; ");
         let pairs = named([
             ("Unit", Some(response.unit().to_string())),
+            (
+                "Kind of the input",
+                analysis.input_kind.map(|kind| kind.name().to_string()),
+            ),
             ("Output", Some(analysis.output_kind.name().to_string())),
             ("Points of the file", Some(response.frf.len().to_string())),
             (
