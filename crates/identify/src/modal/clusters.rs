@@ -8,7 +8,7 @@ use core::ops::Range;
 use nalgebra::Complex;
 
 use super::parameters::ModalParameters;
-use super::refine::refine;
+use super::refine::{refine, refine_near};
 use super::solution::{Problem, Solution};
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
@@ -125,6 +125,9 @@ fn best_of(
     count: usize,
 ) -> Option<Solution> {
     let parameters = &solution.parameters;
+    let modes = &parameters.modes[cluster.modes()];
+    let sum_rad_s: f64 = modes.iter().map(|mode| mode.omega_rad_s).sum();
+    let middle_rad_s = sum_rad_s / modes.len() as f64;
     let subsets = subsets(cluster.count, count).take(MAX_STARTS);
     let subsets = subsets.map(|kept| only(parameters, cluster, kept));
     let pairs = if count == 2 {
@@ -133,7 +136,7 @@ fn best_of(
         Vec::new()
     };
     let starts = pairs.into_iter().chain(subsets);
-    let coarse = starts.map(|start| refine(problem, start, TOLERANCE));
+    let coarse = starts.map(|start| refine_near(problem, start, middle_rad_s, TOLERANCE));
     let best = coarse.min_by(|a, b| a.chi2.total_cmp(&b.chi2))?;
     let is_promising = problem.misfit(best.chi2) < PROMISING * problem.misfit(solution.chi2);
     is_promising.then(|| refine(problem, best.parameters, 0.0))

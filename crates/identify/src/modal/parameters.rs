@@ -159,6 +159,27 @@ pub enum Parameter {
     Delay,
 }
 
+/// The parameters that a refinement changes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Moving {
+    /// All free parameters.
+    All,
+    /// Residues and R, and w and zeta of the modes with these indices.
+    Modes(Vec<usize>),
+}
+
+impl Moving {
+    pub(super) fn includes(&self, parameter: Parameter) -> bool {
+        match (self, parameter) {
+            (Moving::All, _) => true,
+            (Moving::Modes(modes), Parameter::Frequency(k) | Parameter::Damping(k)) => {
+                modes.contains(&k)
+            }
+            (Moving::Modes(_), parameter) => parameter.is_linear(),
+        }
+    }
+}
+
 impl Parameter {
     /// Whether the model is linear in the parameter.
     pub(super) fn is_linear(self) -> bool {
@@ -320,6 +341,15 @@ impl ModalParameters {
         });
         next.modes[index] = low;
         next.with_mode(high)
+    }
+
+    /// The indices of the modes nearest to a frequency, at most `count`.
+    pub(super) fn nearest_modes(&self, omega_rad_s: f64, count: usize) -> Vec<usize> {
+        let distance = |k: &usize| (self.modes[*k].omega_rad_s - omega_rad_s).abs();
+        let mut indices: Vec<usize> = (0..self.modes.len()).collect();
+        indices.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        indices.truncate(count);
+        indices
     }
 
     /// The free parameters, in the order of a covariance.

@@ -14,7 +14,7 @@ use super::error::{FitError, Progress, report};
 use super::merge::merged;
 use super::parameters::{ModalParameters, Residues};
 use super::peaks::peak_starts;
-use super::refine::refine;
+use super::refine::{moves_all, refine, refine_near};
 use super::solution::{Problem, Solution};
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -319,10 +319,15 @@ fn best_with(
     mode: ModalTerm,
     tolerance: f64,
 ) -> Solution {
-    let added = refine(problem, parameters.clone().with_mode(mode), tolerance);
+    let added = parameters.clone().with_mode(mode);
+    let near = |start| refine_near(problem, start, mode.omega_rad_s, tolerance);
     let starts = parameters.with_split_mode(mode.omega_rad_s).into_iter();
-    let split = starts.map(|start| refine(problem, start, tolerance));
-    split.fold(added, better)
+    let best = starts.map(near).fold(near(added), better);
+    if moves_all(&best.parameters) {
+        best
+    } else {
+        refine(problem, best.parameters, tolerance)
+    }
 }
 
 /// The solution with other pairs in place of those whose residues cancel, if it is better. Two close modes that a coarse pass did not need

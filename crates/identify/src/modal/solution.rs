@@ -10,7 +10,7 @@ use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
 use super::measurement_chain::{MeasurementChain, NodeResponse, Nodes, log_derivatives};
 use super::normal_equations::{NormalEquations, WeightedColumns};
-use super::parameters::{ModalParameters, Parameter, Residues};
+use super::parameters::{ModalParameters, Moving, Parameter, Residues};
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
 
@@ -77,11 +77,44 @@ impl Solution {
         modes: &ModeResponses,
     ) -> Solution {
         let mut solution = Solution::components(problem, parameters, modes);
-        if let Some(linear) = solution.best_residues(problem.data) {
-            solution.parameters = solution.parameters.with_linear(&linear);
-        }
-        solution.compare(problem.data);
+        solution.take_best_residues(problem.data);
         solution
+    }
+
+    /// As [`Solution::with_best_residues`], with parameters that differ from those of this solution in the modes with these indices only.
+    pub(super) fn with_moved_modes(
+        &self,
+        problem: Problem<'_>,
+        parameters: ModalParameters,
+        indices: &[usize],
+    ) -> Solution {
+        let nodes = problem.nodes;
+        let delays = nodes.delays(parameters.delay_s);
+        let mut solution = Solution {
+            modes: self.modes.clone(),
+            rates: self.rates.clone(),
+            constant: self.constant.clone(),
+            parameters,
+            residual: Vec::new(),
+            chi2: f64::NAN,
+        };
+        for k in indices {
+            let term = &solution.parameters.modes[*k];
+            solution.modes[*k] = nodes.mean(&nodes.mode(term), &delays);
+            if let Some(rate) = solution.rates.get_mut(*k) {
+                *rate = nodes.mean(&nodes.mode_rate(term), &delays);
+            }
+        }
+        solution.take_best_residues(problem.data);
+        solution
+    }
+
+    /// Replaces residues and R by those of least chi^2, if the data determine them.
+    fn take_best_residues(&mut self, data: &[FrfDatum]) {
+        if let Some(linear) = self.best_residues(data) {
+            self.parameters = std::mem::take(&mut self.parameters).with_linear(&linear);
+        }
+        self.compare(data);
     }
 
     fn components(
@@ -147,11 +180,12 @@ impl Solution {
         columns.normal_equations(responses).solve(|_| 0.0)
     }
 
-    /// The normal equations of a step in ln w, ln zeta, r, q, R and, unless it is fixed, tau, in the order of [`ModalParameters::free`].
-    pub(super) fn normal_equations(&self, data: &[FrfDatum]) -> NormalEquations {
+    /// The normal equations of a step in those of ln w, ln zeta, r, q, R and, unless it is fixed, tau that move, in the order of
+    /// [`ModalParameters::free`].
+    pub(super) fn normal_equations(&self, data: &[FrfDatum], moving: &Moving) -> NormalEquations {
         let mut columns = WeightedColumns::new(data);
         for (k, mode) in self.parameters.modes.iter().enumerate() {
-            if mode.omega_rad_s != 0.0 {
+            if mode.omega_rad_s != 0.0 && moving.includes(Parameter::Frequency(k)) {
                 let (by_omega, by_damping) = self.logarithm_columns(k, data);
                 columns.add(by_omega.into_iter());
                 columns.add(by_damping.into_iter());
@@ -162,7 +196,7 @@ impl Solution {
             }
         }
         columns.add(self.constant.iter().copied());
-        if self.parameters.has_fixed_delay {
+        if self.parameters.has_fixed_delay || !moving.includes(Parameter::Delay) {
             return columns.normal_equations(self.residual.iter().copied());
         }
         // Aliases have another phase. Neglecting it changes the step and the covariance by their share of the response, not the
@@ -196,7 +230,7 @@ impl Solution {
     /// [`ModalParameters::free`]; `None` where the data do not determine them.
     pub(super) fn covariance(&self, data: &[FrfDatum]) -> Option<DMatrix<f64>> {
         let free = self.parameters.free();
-        let (scale, unit) = self.normal_equations(data).scaled()?;
+        let (scale, unit) = self.normal_equations(data, &Moving::All).scaled()?;
         let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
         let factors = free.iter().zip(scale.iter());
         let factors: Vec<f64> = factors
