@@ -16,16 +16,19 @@ use nalgebra::Complex;
 
 use crate::external_signals::ExternalSignals;
 use crate::fft::RealFft;
-use crate::modal::{self, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues};
+use crate::frf::with_relative_error;
+use crate::modal::{
+    self, CoarseFit, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues,
+};
 use crate::observation::describes;
-use crate::profile::{self, NEGLIGIBLE_SIGMAS};
+use crate::profile::{self, NEGLIGIBLE_SIGMAS, is_progress};
 use crate::resampling::Readings;
 use crate::{Estimate, FrfDatum, Signals};
 
 /// Two clocks differ by at most this ratio: quartz has 1e-4, the timers of computers less than 1e-3.
 const MAX_RATIO: f64 = 2e-3;
-/// Steps of the first scan to either side.
-const FIRST_STEPS: i32 = 10;
+/// The first scan is of the data up to this angle per ratio in radians.
+const FIRST_LIMIT_RAD: f64 = 3e4;
 /// Steps of the next scans to either side. The best one of a scan is right to about a step, each of which is four of the next.
 const NEXT_STEPS: i32 = 5;
 /// The angle in radians by which the response turns in a step, from the lowest to the highest frequency.
@@ -35,6 +38,8 @@ const WIDER: f64 = 4.0;
 /// Largest number of data and of modes in a scan.
 const SCANNED_DATA: usize = 160;
 const SCANNED_MODES: usize = 4;
+/// Errors over the response with which the ratio is refined, one after the other.
+const RELATIVE_ERRORS: [f64; 2] = [0.03, 0.003];
 /// Largest number of data, and of modes, with which a ratio is found before all data are used.
 const FITTED_DATA: usize = 400;
 const FITTED_MODES: usize = 8;
@@ -46,12 +51,10 @@ const HALF_WIDTH_BINS: usize = 8;
 const SWEEP_SPREAD: f64 = 0.1;
 /// Angle in radians of the first step of the parabolas.
 const FIRST_STEP_RAD: f64 = 0.1;
-/// Largest number of fits with the ratio of the one before.
-const MAX_REFITS: usize = 3;
 /// A ratio of fewer standard deviations is noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
 /// Largest number of corrections of a record.
-const MAX_CORRECTIONS: usize = 4;
+const MAX_CORRECTIONS: usize = 6;
 
 /// The difference between the clocks of input and output.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,32 +72,43 @@ impl ClockSkew {
         band_hz: (f64, f64),
         chain: &MeasurementChain,
     ) -> Option<ClockSkew> {
-        let data = record.response(band_hz).ok()?.data;
         let excited = record.excited();
-        let turned = TurnedData::new(&excited, &data, chain)?;
-        let (near, modes) = turned.thinned(FITTED_DATA).described()?;
+        let turned = |record: ExternalSignals<'_>| {
+            let data = record.response(band_hz).ok()?.data;
+            TurnedData::new(&excited, &data, chain)
+        };
         let mut skew = ClockSkew {
-            ratio: turned.refined(&modes, near)?,
+            ratio: turned(record)?.thinned(FITTED_DATA).near()?,
             duration_s: excited.len() as f64 / excited.rate_hz,
         };
         // The turn of a datum is an approximation: the plant responds for a while after t(f). Of a small rest the error is small.
+        let mut before: Option<ModalFit> = None;
         for _ in 0..MAX_CORRECTIONS {
             let corrected = ExternalSignals {
                 signals: &skew.corrected(record.signals),
                 ..record
             };
-            let data = corrected.response(band_hz).ok()?.data;
-            let rest = TurnedData::new(&excited, &data, chain)?.refined(&modes, 0.0)?;
+            let turned = turned(corrected)?;
+            let part = turned.thinned(FITTED_DATA);
+            let fit = part.few_modes()?;
+            let is_stuck = |before: &ModalFit| !describes(&fit) && !is_progress(before, &fit);
+            if before.as_ref().is_some_and(is_stuck) {
+                return None;
+            }
+            let used = if describes(&fit) { turned } else { part };
+            let rest = used.refined(&fit.parameters, 0.0)?;
             skew.ratio = Estimate {
                 value: (1.0 + skew.ratio.value) * (1.0 + rest.value) - 1.0,
                 sigma: rest.sigma,
             };
-            if rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma {
+            if describes(&fit) && rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma {
                 break;
             }
+            before = Some(fit);
         }
+        let is_described = before.as_ref().is_none_or(describes);
         let is_certain = skew.ratio.value.abs() > CERTAIN_SIGMAS * skew.ratio.sigma;
-        is_certain.then_some(skew)
+        (is_described && is_certain).then_some(skew)
     }
 
     /// The record with the output at the times of the input.
@@ -223,11 +237,11 @@ impl<'a> TurnedData<'a> {
 
     /// The ratio with which modes describe the data best, to about a step of the widest band.
     fn scan(&self) -> Option<f64> {
-        let first_step = MAX_RATIO / f64::from(FIRST_STEPS);
-        let mut limit_rad = STEP_RAD / first_step;
+        let mut limit_rad = self.span_rad().min(FIRST_LIMIT_RAD);
         let part = self.up_to(limit_rad).thinned(SCANNED_DATA);
-        let mut best = part.best_of(0.0, first_step, FIRST_STEPS)?;
-        while limit_rad < WIDER * self.span_rad() {
+        let steps = (MAX_RATIO * limit_rad / STEP_RAD).ceil();
+        let mut best = part.best_of(0.0, MAX_RATIO / steps, steps as i32)?;
+        while limit_rad < self.span_rad() {
             limit_rad *= WIDER;
             let part = self.up_to(limit_rad).thinned(SCANNED_DATA);
             best = part.best_of(best, STEP_RAD / limit_rad, NEXT_STEPS)?;
@@ -241,36 +255,43 @@ impl<'a> TurnedData<'a> {
             return None;
         }
         let ratios = (-steps..=steps).map(|k| middle + f64::from(k) * step);
-        let costs = ratios.filter_map(|ratio| Some((self.cost(ratio)?, ratio)));
+        let costs = ratios.filter_map(|ratio| Some((self.coarse_modes(ratio)?.cost, ratio)));
         let best = costs.min_by(|a, b| a.0.total_cmp(&b.0))?;
         Some(best.1)
     }
 
-    /// How well a few modes describe the data turned back.
-    fn cost(&self, ratio: f64) -> Option<f64> {
-        let data = self.turned_back(ratio);
-        let few = modal::coarse_fit(&data, self.chain, SCANNED_MODES).ok()?;
-        Some(few.cost)
+    /// A few modes of the data turned back, and how well they describe them.
+    fn coarse_modes(&self, ratio: f64) -> Option<CoarseFit> {
+        modal::coarse_fit(&self.turned_back(ratio), self.chain, SCANNED_MODES).ok()
     }
 
-    /// The ratio with which a few modes describe the data, and these modes; `None` if they do not.
-    fn described(&self) -> Option<(f64, ModalParameters)> {
-        let mut ratio = self.scan()?;
-        let mut fit = self.few_modes(ratio)?;
-        // The modes of a ratio that is not exact are too many: the next ones are fewer.
-        for _ in 0..MAX_REFITS {
-            if describes(&fit) {
-                return Some((ratio, fit.parameters));
-            }
-            ratio = self.refined(&fit.parameters, ratio)?.value;
-            fit = self.few_modes(ratio)?;
+    /// The data with an error in proportion to the response beside their noise.
+    fn with_relative_error(&self, relative_error: f64) -> TurnedData<'a> {
+        TurnedData {
+            data: with_relative_error(&self.data, relative_error),
+            time_s: self.time_s.clone(),
+            chain: self.chain,
         }
-        describes(&fit).then_some((ratio, fit.parameters))
     }
 
-    fn few_modes(&self, ratio: f64) -> Option<ModalFit> {
-        let data = self.turned_back(ratio);
-        modal::fit_few(&data, self.chain, &Residues::Real, FITTED_MODES).ok()
+    /// About the ratio with which modes describe the data best.
+    fn near(&self) -> Option<Estimate> {
+        let mut ratio = Estimate {
+            value: self.scan()?,
+            sigma: 0.0,
+        };
+        // Small modes count only when the angle is so exact that they do not take the place of a part of it.
+        for relative_error in RELATIVE_ERRORS {
+            let modes = self.coarse_modes(ratio.value)?.parameters;
+            let inexact = self.with_relative_error(relative_error);
+            ratio = inexact.refined(&modes, ratio.value).unwrap_or(ratio);
+        }
+        Some(ratio)
+    }
+
+    /// A few modes of the data as they are.
+    fn few_modes(&self) -> Option<ModalFit> {
+        modal::fit_few(&self.data, self.chain, &Residues::Real, FITTED_MODES).ok()
     }
 
     /// The ratio of least chi^2 near one.

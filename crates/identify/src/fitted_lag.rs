@@ -26,8 +26,8 @@ use crate::frf::with_relative_error;
 use crate::modal::{
     self, FitError, InputPath, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues,
 };
-use crate::observation::{Observation, PART_MODES, Source, part};
-use crate::profile;
+use crate::observation::{Observation, PART_MODES, Source, describes, part};
+use crate::profile::{self, is_progress};
 use crate::{Estimate, FrfDatum};
 use bench_plant::{InputKind, OutputKind};
 
@@ -195,9 +195,15 @@ impl UnknownLag {
             found = self.best_of(data, std::iter::once(near.lag_s.value))?;
         }
         // Without the error the data show smaller modes. Those of a lag that is not exact are too many: the next ones are fewer.
+        let mut before: Option<ModalFit> = None;
         for _ in 0..MAX_REFITS {
             let chain = self.chain(found.lag_s.value, data);
             let fit = modal::fit_few(data, &chain, &self.residues, PART_MODES).ok()?;
+            let is_stuck = |before: &ModalFit| !describes(&fit) && !is_progress(before, &fit);
+            let is_real = self.residues == Residues::Real;
+            if is_real && before.as_ref().is_some_and(is_stuck) {
+                return None;
+            }
             let is_complete = match self.residues {
                 Residues::Real => fit.is_sum_of_few_modes(),
                 Residues::Complex(_) => fit.is_of_a_stage(),
@@ -207,6 +213,7 @@ impl UnknownLag {
             if is_complete {
                 return Some(found);
             }
+            before = Some(fit);
         }
         None
     }

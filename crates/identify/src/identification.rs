@@ -1,20 +1,18 @@
 //! From two signals to modes and verdict: force and displacement or similar quantities, without a model of the stage.
 
-use std::borrow::Cow;
-
 use crate::ClockSkew;
 use crate::external_signals::ExternalSignals;
 use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
-use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{Observation, Source, describes, fit_part, part};
+use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
+use crate::observation::{Observation, OtherKind, Source};
 use crate::periodic::Repetition;
-use crate::periodic_part::{PeriodicPart, fit_of_periods};
+use crate::periodic_part::PeriodicPart;
 use crate::plausibility::{
-    OtherModel, complex_model, cut_within_excitation, due_to_cut, hint, implausible, known_cause,
-    lag_model, unless_undetermined,
+    OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
+    unless_undetermined,
 };
+use crate::prepared::{Prepared, Stated};
 use crate::record_check::{Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
@@ -54,9 +52,7 @@ pub struct ExternalAnalysis {
     pub clock_skew: Option<ClockSkew>,
     /// Where the signals come from.
     source: Source,
-    /// Whether defects of the record, its ends, or its kind of output, explain an undecided verdict.
-    has_known_cause: bool,
-    /// Whether it is known why modes do not describe the response: a defect, or another kind of output.
+    /// Whether it is known why modes do not describe the response: a defect, a cut, or another kind of output.
     is_explained: bool,
     /// The sinusoids that were subtracted, and other cautions of the verdict.
     cautions: Vec<String>,
@@ -249,37 +245,61 @@ impl Identification {
             output: output.to_vec(),
         };
         let record = ExternalSignals::new(&signals, reference, self.repetition);
-        let analysis = analyse(record, *self, None)?;
-        let analysis = self.with_other_model(record, analysis, lag_model)?;
-        let analysis = self.with_one_clock(record, analysis)?;
-        self.with_other_model(record, analysis, complex_model)
-    }
-
-    /// The analysis of the record with its output at the times of the input, if these differ, and if modes describe the response only
-    /// then.
-    fn with_one_clock(
-        &self,
-        record: ExternalSignals<'_>,
-        analysis: ExternalAnalysis,
-    ) -> Result<ExternalAnalysis, IdentificationError> {
-        let is_decided = analysis.verdict.cnmp != Cnmp::Undecided;
-        let is_known = analysis.has_known_cause || analysis.fitted_lag.is_some();
-        if self.repetition.is_some() || is_known || is_decided {
+        let prepared = self.prepared(record)?;
+        // Many modes would be fitted to the turn of two clocks in vain.
+        let compares_first = !prepared.few_modes_describe();
+        if compares_first && let Some(analysis) = self.with_one_clock(&prepared)? {
             return Ok(analysis);
         }
-        let Some(skew) = ClockSkew::find(record, analysis.band_hz, &analysis.chain) else {
-            return Ok(analysis);
+        let analysis = self.analysed(&prepared, None)?;
+        let analysis = self.with_other_model(record, analysis, lag_model)?;
+        let analysis = self.with_other_model(record, analysis, complex_model)?;
+        // A small difference of the clocks takes the place of complex residues more easily than these that of a difference.
+        let is_open = analysis.verdict.cnmp == Cnmp::Undecided
+            && analysis.fitted_lag.is_none()
+            && has_real_residues(&analysis.fit);
+        if is_open
+            && !compares_first
+            && let Some(corrected) = self.with_one_clock(&prepared)?
+            && number_of_modes(&corrected) < number_of_modes(&analysis)
+        {
+            return Ok(corrected);
+        }
+        Ok(analysis)
+    }
+
+    fn prepared<'a>(&self, record: ExternalSignals<'a>) -> Result<Prepared<'a>, IdentifyError> {
+        let stated = Stated {
+            band_hz: self.band_hz,
+            repetition: self.repetition,
+            output_kind: self.output_kind,
+        };
+        Prepared::of(record, self.source(), stated)
+    }
+
+    /// The analysis of a record with its output at the times of the input, if these differ, and if modes describe the response then.
+    fn with_one_clock(
+        &self,
+        prepared: &Prepared<'_>,
+    ) -> Result<Option<ExternalAnalysis>, IdentificationError> {
+        // A resampled output has no steps by which its errors could be known.
+        let has_steps = prepared.resolution.output.is_some();
+        if self.repetition.is_some() || has_steps || !prepared.is_sound() {
+            return Ok(None);
+        }
+        let record = prepared.record;
+        let Some(skew) = ClockSkew::find(record, prepared.band_hz, &prepared.assumed) else {
+            return Ok(None);
         };
         let corrected = ExternalSignals {
             signals: &skew.corrected(record.signals),
             ..record
         };
-        let Ok(corrected) = analyse(corrected, *self, Some(skew)) else {
-            return Ok(analysis);
+        let Ok(prepared) = self.prepared(corrected) else {
+            return Ok(None);
         };
-        let is_better = is_sum_of_few_modes(&corrected.fit)
-            && number_of_modes(&corrected) <= number_of_modes(&analysis);
-        Ok(if is_better { corrected } else { analysis })
+        let analysis = self.analysed(&prepared, Some(skew))?;
+        Ok(is_sum_of_few_modes(&analysis.fit).then_some(analysis))
     }
 
     /// The analysis with a lag that is not stated, or with complex residues, as `model` finds them, if modes with real ones do not describe
@@ -290,9 +310,7 @@ impl Identification {
         analysis: ExternalAnalysis,
         model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        // What is missing of a record that is cut is easily taken for another model.
-        let is_cut = cut_within_excitation(record).is_some();
-        if analysis.is_explained || is_cut || analysis.fitted_lag.is_some() {
+        if analysis.is_explained || analysis.fitted_lag.is_some() {
             return Ok(analysis);
         }
         let ExternalAnalysis { frf, chain, .. } = &analysis;
@@ -303,6 +321,7 @@ impl Identification {
             chain,
             stated: self.output_kind,
             clear_kind: None,
+            other_kind: &OtherKind::new(),
             output_step: analysis.resolution.output,
             remedies: record.remedies(),
         };
@@ -325,6 +344,66 @@ impl Identification {
         })
     }
 
+    /// The modes of a record, and the verdict. `clock_skew` is that for which the output was corrected.
+    fn analysed(
+        &self,
+        prepared: &Prepared<'_>,
+        clock_skew: Option<ClockSkew>,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        let (cleaned, frf) = (prepared.cleaned(), &prepared.frf);
+        let with_few = prepared.with_few_modes();
+        let FirstFit {
+            fit,
+            chain,
+            lag,
+            clear_kind,
+            source,
+        } = FirstFit::of(&with_few, prepared.is_sound(), || prepared.all_modes());
+        let fit = match &clock_skew {
+            Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
+            None => fit,
+        };
+        let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * prepared.band_hz.1;
+        let observation = Observation {
+            source,
+            fit: &fit,
+            chain: &chain,
+            clear_kind,
+            ..with_few
+        };
+        let known = listed(&prepared.defects).or_else(|| known_cause(&observation));
+        // What is missing of a record that is cut is easily taken for another model.
+        let is_explained = known.is_some() || prepared.cut.is_some();
+        let why = known.or_else(|| implausible(&observation));
+        let verdict = judged(why, frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
+            hint(verdict, cleaned, &fit, &prepared.resolution)
+        })?;
+        let verdict = match &prepared.cut {
+            Some(cut) if prepared.defects.is_empty() => due_to_cut(verdict, cut),
+            _ => verdict,
+        };
+        let cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
+        let input_path = self.input_path;
+        Ok(ExternalAnalysis {
+            frf: frf.clone(),
+            verdict: verdict.with(listed(&cautions)),
+            fit,
+            input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
+            fitted_lag: lag,
+            source,
+            input_kind: self.input_kind,
+            output_kind: self.output_kind.unwrap_or_default(),
+            chain,
+            band_hz: prepared.band_hz,
+            judged_up_to_rad_s,
+            periodic: prepared.periodic.clone(),
+            resolution: prepared.resolution,
+            clock_skew,
+            is_explained,
+            cautions,
+        })
+    }
+
     /// Where the signals come from.
     fn source(&self) -> Source {
         Source {
@@ -336,117 +415,19 @@ impl Identification {
     }
 }
 
-/// Analyses input and output between two frequencies, or in the band that is excited. With a repetition, periods are averaged;
-/// without one, the record must begin and end at rest. `clock_skew` is that for which the output was corrected.
-fn analyse(
-    record: ExternalSignals<'_>,
-    identification: Identification,
-    clock_skew: Option<ClockSkew>,
-) -> Result<ExternalAnalysis, IdentificationError> {
-    let Identification {
-        band_hz,
-        repetition,
-        input_path,
-        ..
-    } = identification;
-    record.check()?;
-    // The lines of a periodic record are estimated one by one.
-    let (signals, stray_lines) = match repetition {
-        Some(_) => (Cow::Borrowed(record.signals), Vec::new()),
-        None => record.without_stray_lines(),
-    };
-    let cleaned = ExternalSignals {
-        signals: &signals,
-        ..record
-    };
-    let resolution = record.resolution();
-    let defects = record.defects(&cleaned);
-    let requested_hz = band_hz.unwrap_or_else(|| default_band_hz(cleaned, repetition));
-    let (frf, periodic) = response(cleaned, requested_hz, repetition)?;
-    // Beyond the outermost excited lines nothing is known.
-    let band_hz = if band_hz.is_none() && periodic.is_some() {
-        frf.band_hz()
-    } else {
-        requested_hz
-    };
-    let stated = identification.output_kind;
-    let output_kind = stated.unwrap_or_default();
-    let source = identification.source();
-    let assumed = source.chain(output_kind, &frf.data);
-    let few = fit_part(&part(&frf.data), &assumed);
-    let with_few = Observation {
-        source,
-        frf: &frf,
-        fit: &few,
-        chain: &assumed,
-        stated,
-        clear_kind: None,
-        output_step: resolution.output,
-        remedies: record.remedies(),
-    };
-    let cut = cut_within_excitation(cleaned);
-    let is_sound = defects.is_empty() && cut.is_none();
-    let FirstFit {
-        fit,
-        chain,
-        lag,
-        clear_kind,
-        source,
-    } = FirstFit::of(&with_few, is_sound, || match &periodic {
-        Some(part) => fit_of_periods(&frf.data, part.linearity.as_ref(), &assumed),
-        // Many modes would be fitted to a defect or a missing end.
-        None if !defects.is_empty() => few.clone(),
-        None if cut.is_some() && !few.as_ref().is_ok_and(describes) => few.clone(),
-        None => modal::fit(&frf.data, &assumed),
-    });
-    let fit = match &clock_skew {
-        Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
-        None => fit,
-    };
-    let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
-    let observation = Observation {
-        source,
-        fit: &fit,
-        chain: &chain,
-        clear_kind,
-        ..with_few
-    };
-    let known = listed(&defects).or_else(|| known_cause(&observation));
-    let is_explained = known.is_some();
-    let why = known.or_else(|| implausible(&observation));
-    let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
-        hint(verdict, cleaned, &fit, &resolution)
-    })?;
-    let verdict = due_to_cut(verdict, cut.filter(|_| defects.is_empty()));
-    let clocks = clock_skew.map(|skew| skew.description());
-    let motion = (record.ends == Ends::Motion).then(|| IN_MOTION.to_owned());
-    let stray_lines = stray_lines.iter().map(ToString::to_string);
-    let lag_text = lag.map(|lag| lag.description());
-    let cautions: Vec<String> = stray_lines
+/// What was done with a record beyond averaging, in the order in which it is told.
+fn cautions(
+    prepared: &Prepared<'_>,
+    clock_skew: Option<&ClockSkew>,
+    lag: Option<&FittedLag>,
+) -> Vec<String> {
+    let motion = (prepared.record.ends == Ends::Motion).then(|| IN_MOTION.to_owned());
+    let stray_lines = prepared.stray_lines.iter().map(ToString::to_string);
+    stray_lines
         .chain(motion)
-        .chain(clocks)
-        .chain(lag_text)
-        .collect();
-    let verdict = verdict.with(listed(&cautions));
-    Ok(ExternalAnalysis {
-        frf,
-        fit,
-        verdict,
-        input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
-        fitted_lag: lag,
-        source,
-        input_kind: identification.input_kind,
-        output_kind,
-        chain,
-        band_hz,
-        judged_up_to_rad_s,
-        periodic,
-        resolution,
-        clock_skew,
-        has_known_cause: !is_sound || clear_kind.is_some(),
-        is_explained,
-        cautions,
-    })
+        .chain(clock_skew.map(ClockSkew::description))
+        .chain(lag.map(FittedLag::description))
+        .collect()
 }
 
 /// The verdict of a fit, with what else may be the cause of an undecided one; undecided for a reason that is already known.
@@ -472,37 +453,15 @@ fn is_sum_of_few_modes(fit: &Result<ModalFit, FitError>) -> bool {
     fit.as_ref().is_ok_and(ModalFit::is_sum_of_few_modes)
 }
 
+fn has_real_residues(fit: &Result<ModalFit, FitError>) -> bool {
+    fit.as_ref()
+        .map_or(true, |fit| fit.parameters.has_real_residues())
+}
+
 fn number_of_modes(analysis: &ExternalAnalysis) -> usize {
     match &analysis.fit {
         Ok(fit) => fit.parameters.modes.len(),
         Err(_) => usize::MAX,
-    }
-}
-
-/// The band that is excited. Of a periodic record the excited lines are found one by one, so that all frequencies are used; of a held
-/// sequence such as a PRBS those up to half of its power.
-fn default_band_hz(record: ExternalSignals<'_>, repetition: Option<Repetition>) -> (f64, f64) {
-    let all = (0.0, record.signals.rate_hz / 2.0);
-    match repetition {
-        Some(repetition) => {
-            let limit_hz = useful_limit_hz(record.signals, repetition);
-            (all.0, limit_hz.unwrap_or(all.1))
-        }
-        None => record.excited_band_hz().unwrap_or(all),
-    }
-}
-
-fn response(
-    record: ExternalSignals<'_>,
-    band_hz: (f64, f64),
-    repetition: Option<Repetition>,
-) -> Result<(Frf, Option<PeriodicPart>), IdentificationError> {
-    match repetition {
-        Some(repetition) => {
-            let (frf, part) = PeriodicPart::of(record.signals, band_hz, repetition)?;
-            Ok((frf, Some(part)))
-        }
-        None => Ok((record.response(band_hz)?, None)),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::fitted_lag::FittedLag;
 use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::observation::{Observation, Source, fit_part, part};
+use crate::observation::{Observation, OtherKind, Source, fit_part, part};
 use crate::plausibility::{
     OtherModel, complex_model, implausible, known_cause, lag_model, response_hint,
 };
@@ -202,6 +202,7 @@ impl ResponseIdentification {
             chain: &assumed,
             stated: self.output_kind,
             clear_kind: None,
+            other_kind: &OtherKind::new(),
             output_step: None,
             remedies: &OF_RESPONSE,
         };

@@ -59,6 +59,7 @@ mod observation;
 mod other_kind;
 mod periodic_part;
 mod plausibility;
+mod prepared;
 mod profile;
 pub mod record_check;
 mod remedies;

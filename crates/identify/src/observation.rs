@@ -1,5 +1,7 @@
 //! A response with the modes that were fitted to it, and how it was observed.
 
+use core::cell::OnceCell;
+
 use bench_plant::{InputKind, OutputKind};
 
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -62,6 +64,9 @@ pub(super) fn part(data: &[FrfDatum]) -> Vec<FrfDatum> {
     data.iter().step_by(every).copied().collect()
 }
 
+/// The only other kind of output of which modes describe a response, with these modes; computed when it is first asked for.
+pub(super) type OtherKind = OnceCell<Option<(OutputKind, ModalFit)>>;
+
 /// A response with its modes.
 #[derive(Clone, Copy)]
 pub(super) struct Observation<'a> {
@@ -74,6 +79,7 @@ pub(super) struct Observation<'a> {
     pub(super) stated: Option<OutputKind>,
     /// The kind of an output that is clearly another one.
     pub(super) clear_kind: Option<OutputKind>,
+    pub(super) other_kind: &'a OtherKind,
     /// Step of the output, if it exceeds its noise: its errors are no noise, and fewer modes of another kind may describe them by chance.
     pub(super) output_step: Option<f64>,
     /// What to do about implausible data.

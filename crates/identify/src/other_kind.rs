@@ -41,14 +41,14 @@ pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
-    let (kind, other) = other_kind(&seen.source, data, seen.chain.output())?;
+    let (kind, other) = other_kind(seen)?;
     let other_modes = other.parameters.modes.len();
     let is_far_better = |few: &ModalFit| few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
     let is_clear = 2 * other_modes <= PART_MODES
         || few.as_ref().is_ok_and(is_far_better)
         || (other.leaves_noise() && other_modes + SAVED_MODES <= few_modes);
-    let is_simplest = is_clear && !complex_residues_are_simpler(data, seen.chain, few, &other);
-    is_simplest.then_some(kind)
+    let is_simplest = is_clear && !complex_residues_are_simpler(data, seen.chain, few, other);
+    is_simplest.then_some(*kind)
 }
 
 /// Another kind of output that describes the data in place of that of the fit.
@@ -68,9 +68,9 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
     if seen.output_step.is_some() {
         return None;
     }
-    let (kind, other) = other_kind(&seen.source, &seen.frf.data, assumed)?;
-    let is_simplest = !complex_residues_are_simpler(&seen.frf.data, seen.chain, seen.fit, &other);
-    is_simplest.then(|| give_kind(assumed, kind))
+    let (kind, other) = other_kind(seen)?;
+    let is_simplest = !complex_residues_are_simpler(&seen.frf.data, seen.chain, seen.fit, other);
+    is_simplest.then(|| give_kind(assumed, *kind))
 }
 
 /// Exchanged columns: modes describe the inverse of a response that they do not describe.
@@ -103,7 +103,7 @@ fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {
 /// The only other kind of output, of which as many modes describe the data to their noise, clearly better than those of the assumed kind.
 fn described_better(seen: &Observation<'_>) -> Option<String> {
     let (data, assumed) = (&seen.frf.data, seen.chain.output());
-    let (kind, other) = other_kind(&seen.source, data, assumed)?;
+    let (kind, other) = other_kind(seen)?;
     let few = fit_part(&part(data), seen.chain).ok()?;
     let ratio = few.chi2_per_freedom / other.chi2_per_freedom;
     let is_better = ratio > CLEARLY_BETTER
@@ -119,7 +119,7 @@ fn described_better(seen: &Observation<'_>) -> Option<String> {
 
 /// The kind of an output that modes describe as the assumed kind only implausibly: the only other kind of which they describe it.
 pub(super) fn better_kind(seen: &Observation<'_>) -> Option<String> {
-    let (kind, _) = other_kind(&seen.source, &seen.frf.data, seen.chain.output())?;
+    let (kind, _) = other_kind(seen)?;
     let (assumed, kind) = (seen.chain.output().name(), kind.name());
     Some(format!(
         "the response grows with frequency as that of no {assumed}, and modes describe the output as {kind}; give --output-kind {kind}"
@@ -127,13 +127,14 @@ pub(super) fn better_kind(seen: &Observation<'_>) -> Option<String> {
 }
 
 /// The only other kind of output of which modes describe the data, with these modes.
-fn other_kind(
-    source: &Source,
-    data: &[FrfDatum],
-    assumed: OutputKind,
-) -> Option<(OutputKind, ModalFit)> {
+fn other_kind<'a>(seen: &Observation<'a>) -> Option<&'a (OutputKind, ModalFit)> {
+    seen.other_kind.get_or_init(|| only_other(seen)).as_ref()
+}
+
+fn only_other(seen: &Observation<'_>) -> Option<(OutputKind, ModalFit)> {
+    let (data, assumed) = (&seen.frf.data, seen.chain.output());
     let others = OutputKind::ALL.into_iter().filter(|kind| *kind != assumed);
-    let mut found = others.filter_map(|kind| Some((kind, modes_as(source, data, kind)?)));
+    let mut found = others.filter_map(|kind| Some((kind, modes_as(&seen.source, data, kind)?)));
     let first = found.next()?;
     found.next().is_none().then_some(first)
 }
@@ -149,10 +150,9 @@ fn modes_as(source: &Source, data: &[FrfDatum], kind: OutputKind) -> Option<Moda
 fn inverse_fits(seen: &Observation<'_>) -> bool {
     let mut inverse: Vec<FrfDatum> = seen.frf.data.iter().map(inverse_datum).collect();
     inverse.retain(|datum| datum.variance.is_normal());
-    let is_sum_of_modes = |data: &[FrfDatum]| {
-        modal::fit(data, seen.chain).is_ok_and(|fit| describes(&fit) && !is_of_inverse(&fit))
-    };
-    is_sum_of_modes(&part(&inverse)) && is_sum_of_modes(&inverse)
+    let is_sum_of_modes = |fit: ModalFit| describes(&fit) && !is_of_inverse(&fit);
+    fit_part(&part(&inverse), seen.chain).is_ok_and(is_sum_of_modes)
+        && modal::fit(&inverse, seen.chain).is_ok_and(is_sum_of_modes)
 }
 
 fn inverse_datum(datum: &FrfDatum) -> FrfDatum {

@@ -49,20 +49,24 @@ fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
 }
 
 /// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one. (That of a plant
-/// that is not linear, or of a coarse probe, may grow as well, but modes do not describe it.)
+/// that is not linear, or of a coarse probe, may grow as well, but modes do not describe it; modes with complex residues may have no mode at the end of
+/// the band, unlike those with real ones in their place.)
 fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
     let is_misfit = seen.fit.as_ref().is_ok_and(|fit| !describes(fit));
     if is_misfit || seen.output_step.is_some() {
         return None;
     }
     let what = growing(seen.frf, seen.fit, seen.chain.output())?;
+    if fit_complex(&seen.frf.data, seen.chain, seen.fit).is_some() {
+        return None;
+    }
     better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
 }
 
 /// An undecided verdict of a record that is cut within its excitation is due to that.
-pub(super) fn due_to_cut(verdict: Verdict, cut: Option<String>) -> Verdict {
-    match cut {
-        Some(cut) if verdict.cnmp == Cnmp::Undecided => Verdict {
+pub(super) fn due_to_cut(verdict: Verdict, cut: &str) -> Verdict {
+    match verdict.cnmp {
+        Cnmp::Undecided => Verdict {
             why: format!("{cut} (it seems that {})", verdict.why),
             ..verdict
         },

@@ -14,6 +14,8 @@ use crate::modal::{ModalFit, ModalParameters, Nearest};
 const MAX_SHIFT: f64 = 4.0;
 /// Largest number of parabolas.
 const MAX_PARABOLAS: usize = 10;
+/// A better value of the parameter decreases chi^2 at least to this part of it, while modes do not describe the data.
+const MAX_REMAINDER: f64 = 0.9;
 /// A change by fewer standard deviations is negligible.
 pub(crate) const NEGLIGIBLE_SIGMAS: f64 = 0.1;
 
@@ -71,6 +73,11 @@ pub(crate) fn best(
         }
     }
     None
+}
+
+/// Whether a fit with a better value of the parameter describes the data better than the one before.
+pub(crate) fn is_progress(before: &ModalFit, next: &ModalFit) -> bool {
+    next.chi2_per_freedom < MAX_REMAINDER * before.chi2_per_freedom
 }
 
 /// A fit with the error of the parameter in its covariance: that of the modes if it changes by a standard deviation, d, adds d d'.

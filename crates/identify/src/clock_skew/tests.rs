@@ -10,8 +10,10 @@ use crate::{ExternalAnalysis, Identification};
 const RATE_HZ: f64 = 500.0;
 /// Rest of 0.5 s, a logarithmic sweep from 2 to 90 Hz in 10 s, and rest until the plant has settled.
 const SAMPLES: usize = 7000;
-/// Frequency in hertz, damping ratio and residue of each mode: zeros left of the axis.
-const MODES: [(f64, f64, f64); 2] = [(12.0, 0.02, 1.0), (38.0, 0.01, 0.6)];
+/// Frequency in hertz, damping ratio and residue.
+type Mode = (f64, f64, f64);
+/// Modes with zeros left of the axis.
+const MODES: [Mode; 2] = [(12.0, 0.02, 1.0), (38.0, 0.01, 0.6)];
 /// Standard deviation of the noise of the output.
 const NOISE: f64 = 1e-6;
 
@@ -29,13 +31,13 @@ fn input() -> Vec<f64> {
 
 /// The output at rising times in seconds. With the pole p and a held force u, q(t) = exp(p (t - t_n)) q_n + (exp(p (t - t_n)) - 1)/p u_n,
 /// and the position of a mode is r Im q/Im p.
-fn output(input: &[f64], times_s: &[f64], seed: u64) -> Vec<f64> {
+fn output(input: &[f64], times_s: &[f64], modes: &[Mode], seed: u64) -> Vec<f64> {
     let mut random = Pcg64Mcg::seed_from_u64(seed);
     let mut outputs: Vec<f64> = times_s
         .iter()
         .map(|_| NOISE * normal(&mut random))
         .collect();
-    for (frequency_hz, damping_ratio, residue) in MODES {
+    for &(frequency_hz, damping_ratio, residue) in modes {
         let omega = std::f64::consts::TAU * frequency_hz;
         let pole = Complex::new(-damping_ratio, (1.0 - damping_ratio.powi(2)).sqrt()) * omega;
         let after = |state: Complex<f64>, force: f64, time_s: f64| {
@@ -62,9 +64,14 @@ fn normal(random: &mut Pcg64Mcg) -> f64 {
 
 /// The analysis of a record whose output was sampled at these times.
 fn analysis(time_s: impl Fn(f64) -> f64, seed: u64) -> ExternalAnalysis {
+    analysis_of(&MODES, time_s, seed)
+}
+
+/// The same of a plant with these modes.
+fn analysis_of(modes: &[Mode], time_s: impl Fn(f64) -> f64, seed: u64) -> ExternalAnalysis {
     let input = input();
     let times_s: Vec<f64> = (0..SAMPLES).map(|k| time_s(k as f64 / RATE_HZ)).collect();
-    let output = output(&input, &times_s, seed);
+    let output = output(&input, &times_s, modes, seed);
     let identification = Identification::new(RATE_HZ).held_s(1.0 / RATE_HZ);
     identification.run(&input, &output).expect("a response")
 }
@@ -97,6 +104,21 @@ fn finds_the_difference_of_the_clocks_and_the_modes() {
             );
             assert!(found.sigma < 2e-3 * residue, "{found:?}");
         }
+    }
+}
+
+/// The lowest frequencies, of which a scan has few steps, show one mode alone: any ratio describes it.
+#[test]
+fn finds_a_large_difference_with_close_modes_above_a_single_one() {
+    let modes = [(18.0, 0.018, 4.7), (61.8, 0.0068, 3.2), (62.9, 0.0035, 1.2)];
+    for (seed, ratio) in [(6, -9.73e-4), (7, 1.5e-4)] {
+        let found = analysis_of(&modes, |time_s| time_s * (1.0 + ratio), seed);
+        let skew = found.clock_skew.expect("two clocks");
+        let error = (skew.ratio.value - ratio).abs();
+        assert!(error < 5.0 * skew.ratio.sigma, "{ratio}: {skew:?}");
+        assert!(skew.ratio.sigma < 3e-6, "{skew:?}");
+        assert_eq!(found.verdict.cnmp, Cnmp::Excluded, "{}", found.verdict.why);
+        assert_eq!(found.fit.expect("modes").modes().len(), modes.len());
     }
 }
 

@@ -1,0 +1,175 @@
+//! What is known of external signals before all of their modes are fitted: their defects, their response, and a few modes of it.
+
+use std::borrow::Cow;
+
+use crate::external_signals::ExternalSignals;
+use crate::modal::{self, FitError, MeasurementChain, ModalFit};
+use crate::multisine_lines::useful_band::useful_limit_hz;
+use crate::observation::{Observation, OtherKind, Source, describes, fit_part, part};
+use crate::periodic::Repetition;
+use crate::periodic_part::{PeriodicPart, fit_of_periods};
+use crate::plausibility::cut_within_excitation;
+use crate::record_check::{Defect, Resolution, StrayLine};
+use crate::{Frf, IdentifyError, Signals};
+use bench_plant::OutputKind;
+
+/// What the user states of external signals.
+pub(super) struct Stated {
+    pub(super) band_hz: Option<(f64, f64)>,
+    /// How a periodic record repeats.
+    pub(super) repetition: Option<Repetition>,
+    /// The kind of the output.
+    pub(super) output_kind: Option<OutputKind>,
+}
+
+/// External signals with their response and a few modes of it.
+pub(super) struct Prepared<'a> {
+    /// The signals as they are recorded.
+    pub(super) record: ExternalSignals<'a>,
+    /// The signals without their stray lines.
+    signals: Cow<'a, Signals>,
+    pub(super) stray_lines: Vec<StrayLine>,
+    pub(super) resolution: Resolution,
+    pub(super) defects: Vec<Defect>,
+    /// What is missing of a record that is cut within its excitation.
+    pub(super) cut: Option<String>,
+    pub(super) frf: Frf,
+    pub(super) periodic: Option<PeriodicPart>,
+    pub(super) band_hz: (f64, f64),
+    pub(super) source: Source,
+    /// The kind of the output, if the user states it.
+    stated: Option<OutputKind>,
+    /// The chain of an output of the stated kind, or of a position.
+    pub(super) assumed: MeasurementChain,
+    other_kind: OtherKind,
+    /// A few modes, fitted to a part of the response.
+    pub(super) few: Result<ModalFit, FitError>,
+}
+
+impl<'a> Prepared<'a> {
+    /// The response between two frequencies, or in the band that is excited. With a repetition, periods are averaged; without one, the
+    /// record must begin and end at rest.
+    pub(super) fn of(
+        record: ExternalSignals<'a>,
+        source: Source,
+        stated: Stated,
+    ) -> Result<Prepared<'a>, IdentifyError> {
+        let repetition = stated.repetition;
+        record.check()?;
+        // The lines of a periodic record are estimated one by one.
+        let (signals, stray_lines) = match repetition {
+            Some(_) => (Cow::Borrowed(record.signals), Vec::new()),
+            None => record.without_stray_lines(),
+        };
+        let cleaned = ExternalSignals {
+            signals: &signals,
+            ..record
+        };
+        let requested_hz = stated
+            .band_hz
+            .unwrap_or_else(|| default_band_hz(cleaned, repetition));
+        let (frf, periodic) = response(cleaned, requested_hz, repetition)?;
+        // Beyond the outermost excited lines nothing is known.
+        let band_hz = if stated.band_hz.is_none() && periodic.is_some() {
+            frf.band_hz()
+        } else {
+            requested_hz
+        };
+        let assumed = source.chain(stated.output_kind.unwrap_or_default(), &frf.data);
+        Ok(Prepared {
+            resolution: record.resolution(),
+            defects: record.defects(&cleaned),
+            cut: cut_within_excitation(cleaned),
+            other_kind: OtherKind::new(),
+            few: fit_part(&part(&frf.data), &assumed),
+            record,
+            signals,
+            stray_lines,
+            frf,
+            periodic,
+            band_hz,
+            source,
+            stated: stated.output_kind,
+            assumed,
+        })
+    }
+
+    /// The record without its stray lines.
+    pub(super) fn cleaned(&self) -> ExternalSignals<'_> {
+        ExternalSignals {
+            signals: &self.signals,
+            ..self.record
+        }
+    }
+
+    /// Whether the record has no defect, and all of its excitation.
+    pub(super) fn is_sound(&self) -> bool {
+        self.defects.is_empty() && self.cut.is_none()
+    }
+
+    /// Whether a few modes describe a part of the response.
+    pub(super) fn few_modes_describe(&self) -> bool {
+        self.few.as_ref().is_ok_and(describes)
+    }
+
+    /// As many modes as are significant. Many modes would be fitted to a defect or to a missing end, of which the few are kept.
+    pub(super) fn all_modes(&self) -> Result<ModalFit, FitError> {
+        if let Some(part) = &self.periodic {
+            return fit_of_periods(&self.frf.data, part.linearity.as_ref(), &self.assumed);
+        }
+        let is_cut = self.cut.is_some() && !self.few_modes_describe();
+        if is_cut || !self.defects.is_empty() {
+            return self.few.clone();
+        }
+        if !self.few_modes_describe() {
+            // Nor do many, if they do not describe a part.
+            let of_part = modal::fit(&part(&self.frf.data), &self.assumed);
+            if !of_part.as_ref().is_ok_and(describes) {
+                return of_part;
+            }
+        }
+        modal::fit(&self.frf.data, &self.assumed)
+    }
+
+    /// The response with the few modes.
+    pub(super) fn with_few_modes(&self) -> Observation<'_> {
+        Observation {
+            source: self.source,
+            frf: &self.frf,
+            fit: &self.few,
+            chain: &self.assumed,
+            stated: self.stated,
+            clear_kind: None,
+            other_kind: &self.other_kind,
+            output_step: self.resolution.output,
+            remedies: self.record.remedies(),
+        }
+    }
+}
+
+/// The band that is excited. Of a periodic record the excited lines are found one by one, so that all frequencies are used; of a held
+/// sequence such as a PRBS those up to half of its power.
+fn default_band_hz(record: ExternalSignals<'_>, repetition: Option<Repetition>) -> (f64, f64) {
+    let all = (0.0, record.signals.rate_hz / 2.0);
+    match repetition {
+        Some(repetition) => {
+            let limit_hz = useful_limit_hz(record.signals, repetition);
+            (all.0, limit_hz.unwrap_or(all.1))
+        }
+        None => record.excited_band_hz().unwrap_or(all),
+    }
+}
+
+fn response(
+    record: ExternalSignals<'_>,
+    band_hz: (f64, f64),
+    repetition: Option<Repetition>,
+) -> Result<(Frf, Option<PeriodicPart>), IdentifyError> {
+    match repetition {
+        Some(repetition) => {
+            let (frf, part) = PeriodicPart::of(record.signals, band_hz, repetition)?;
+            Ok((frf, Some(part)))
+        }
+        None => Ok((record.response(band_hz)?, None)),
+    }
+}
