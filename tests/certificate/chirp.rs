@@ -110,6 +110,7 @@ fn uncertain_or_missing_signs_do_not_differ() {
                     sigma: residue_sigma,
                 },
                 residue_imaginary_per_kg: None,
+                turned_by_one_more: 0.0,
             })
             .collect()
     };

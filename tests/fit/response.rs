@@ -18,6 +18,7 @@ fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
         parameters,
         covariance,
         orders: Vec::new(),
+        one_more_mode: None,
         chi2_per_freedom: 1.0,
         band_hz: (1.0, 500.0),
         left_out_hz: Vec::new(),

@@ -27,6 +27,7 @@ fn modes(frequencies_hz: &[f64]) -> Vec<ModeOverAmplitude> {
         damping_ratio: estimate(0.005),
         residue_per_kg: estimate(0.5),
         residue_imaginary_per_kg: None,
+        turned_by_one_more: 0.0,
     };
     let run = |ratio: f64| {
         frequencies_hz

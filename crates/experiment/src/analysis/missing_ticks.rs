@@ -277,6 +277,7 @@ mod tests {
             },
             covariance: DMatrix::zeros(0, 0),
             orders: Vec::new(),
+            one_more_mode: None,
             chi2_per_freedom: 1.0,
             band_hz: (1.0, 200.0),
             left_out_hz: Vec::new(),

@@ -252,6 +252,7 @@ impl From<&CertifiedMode> for FittedMode {
             damping_ratio: estimate(mode.damping_ratio, mode.damping_ratio_sigma),
             residue_per_kg: estimate(mode.residue, mode.residue_sigma),
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         }
     }
 }

@@ -160,6 +160,7 @@ mod tests {
             damping_ratio: known(0.01),
             residue_per_kg: known(0.5),
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         };
         let why = |runs: &[Vec<FittedMode>]| compare_modes(runs, (5.0, 200.0), true).why;
         let both = vec![mode(29.0), mode(82.0)];

@@ -121,6 +121,7 @@ mod tests {
             damping_ratio: known(damping_ratio),
             residue_per_kg: known(-0.5),
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         }
     }
 
@@ -201,6 +202,7 @@ mod tests {
                 damping_ratio: chance(0.01),
                 residue_per_kg: chance(0.5),
                 residue_imaginary_per_kg: None,
+                turned_by_one_more: 0.0,
             };
             vec![mode(180.0), mode(500.0), mode(530.0)]
         };

@@ -121,6 +121,7 @@ mod tests {
                 sigma,
             },
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         }
     }
 

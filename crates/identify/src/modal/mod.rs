@@ -25,6 +25,7 @@ mod merge;
 mod modal_fit;
 mod mode_lists;
 mod normal_equations;
+mod one_more_mode;
 mod parameters;
 mod peaks;
 mod prune;
@@ -43,6 +44,7 @@ use lone_lines::{UsedData, lone_data};
 pub use measurement_chain::{InputPath, MeasurementChain};
 pub use modal_fit::{COMPLEX_SIGN, FittedMode, ModalFit, ModeGroup, UncertainPole};
 pub use mode_lists::ModeLists;
+pub use one_more_mode::OneMoreMode;
 pub use parameters::{ModalParameters, Parameter, Residues};
 pub(crate) use search::CoarseFit;
 pub use search::ModelOrder;
@@ -126,11 +128,11 @@ fn fit_up_to(
         let nodes = &chain.nodes(data, 0.0);
         let problem = Problem { chain, data, nodes };
         // A search that is repeated makes no progress until it is farther than the one before.
-        let orders = search::orders(problem, residues, max_modes, &mut |done| {
+        let found = search::orders(problem, residues, max_modes, &mut |done| {
             searched = searched.max(SEARCH_PROGRESS * done);
             progress(searched)
         })?;
-        let best = orders.last().ok_or(no_mode(band_hz))?;
+        let best = found.orders.last().ok_or(no_mode(band_hz))?;
         let lone = lone_data(problem, &best.parameters);
         if used.can_leave_out(&lone) {
             used.leave_out(&lone);
@@ -145,7 +147,8 @@ fn fit_up_to(
         }
         report(progress, 1.0)?;
         return Ok(ModalFit {
-            orders,
+            orders: found.orders,
+            one_more_mode: found.one_more_mode,
             band_hz,
             left_out_hz: used.left_out_hz,
             ..fit
@@ -246,6 +249,7 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
             covariance: solution.covariance(data)?,
             chi2_per_freedom,
             orders: Vec::new(),
+            one_more_mode: None,
             parameters: solution.parameters.clone(),
             band_hz: (0.0, 0.0),
             left_out_hz: Vec::new(),

@@ -6,7 +6,7 @@ use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
 use super::clusters::cancelling;
-use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, Parameter};
+use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, OneMoreMode, Parameter};
 use crate::FrfDatum;
 use crate::chi2_limits::NOISE_CHI2;
 use bench_plant::Sign;
@@ -14,6 +14,8 @@ use bench_plant::zeros::ModalTerm;
 
 /// The sign of a complex residue.
 pub const COMPLEX_SIGN: char = 'c';
+/// Probability of the values beyond one end of a 95 % confidence interval.
+const ONE_SIDE_OF_95: f64 = 0.025;
 
 /// The modes that fit a response.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +27,8 @@ pub struct ModalFit {
     pub covariance: DMatrix<f64>,
     /// All significant model orders, for the stability chart.
     pub orders: Vec<ModelOrder>,
+    /// What the data may show beyond the significant modes; `None` if as many modes are fitted as are allowed.
+    pub one_more_mode: Option<OneMoreMode>,
     /// Reduced chi-square with the noise of the estimator: 1 if the residual is noise.
     pub chi2_per_freedom: f64,
     /// Lowest and highest fitted frequency in hertz.
@@ -45,17 +49,20 @@ pub struct FittedMode {
     pub residue_per_kg: Estimate,
     /// q w in 1/kg: the imaginary part of a complex residue, whose numerator at s = j w is r + j q w. `None` of a real residue.
     pub residue_imaginary_per_kg: Option<Estimate>,
+    /// Probability that the stage has one more mode, with which the residue has the other sign ([`OneMoreMode`]).
+    pub turned_by_one_more: f64,
 }
 
 impl FittedMode {
-    /// Probability that the residue, or the real part of a complex one, has the opposite sign, for normally distributed errors.
+    /// Probability that the residue, or the real part of a complex one, has the opposite sign: by its error, which is normally distributed,
+    /// or because the stage has one more mode.
     pub fn sign_error_probability(&self) -> f64 {
-        let magnitude = self.residue_per_kg.value.abs();
-        Estimate {
-            value: magnitude,
+        let magnitude = Estimate {
+            value: self.residue_per_kg.value.abs(),
             ..self.residue_per_kg
-        }
-        .below_zero_probability()
+        };
+        let turned = self.turned_by_one_more;
+        turned + (1.0 - turned) * magnitude.below_zero_probability()
     }
 
     /// The sign of the residue; [`COMPLEX_SIGN`] of a complex one, which has none.
@@ -66,9 +73,11 @@ impl FittedMode {
         }
     }
 
-    /// The sign of the residue; of a real one `?` if its 95 % confidence interval contains 0.
+    /// The sign of the residue; of a real one `?` if it has the opposite one with a probability above 2.5 %, as if its 95 % confidence
+    /// interval contains 0.
     pub fn certain_sign(&self) -> char {
-        if self.residue_imaginary_per_kg.is_some() || self.is_determined() {
+        let is_certain = self.is_determined() && self.turned_by_one_more < ONE_SIDE_OF_95;
+        if self.residue_imaginary_per_kg.is_some() || is_certain {
             self.sign()
         } else {
             '?'
@@ -158,7 +167,14 @@ impl ModalFit {
             damping_ratio: self.estimate(term.damping_ratio, Parameter::Damping(k)),
             residue_per_kg: self.estimate(term.residue_per_kg, Parameter::Residue(k)),
             residue_imaginary_per_kg: self.residue_imaginary_per_kg(k, term),
+            turned_by_one_more: self.turned_by_one_more(term),
         }
+    }
+
+    /// The probability of one more mode if that turns the sign of a residue.
+    fn turned_by_one_more(&self, term: &ModalTerm) -> f64 {
+        let turning = self.one_more_mode.as_ref().filter(|more| more.turns(term));
+        turning.map_or(0.0, |more| more.probability)
     }
 
     /// q w. Its error is that of q, beside which that of w is negligible. (The rate of a free body has no such unit: 0.)

@@ -35,6 +35,7 @@ mod tests {
             damping_ratio: estimate(0.05),
             residue_per_kg: estimate(-0.5),
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         }
     }
 

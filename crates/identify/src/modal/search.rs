@@ -12,6 +12,7 @@ use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
 use super::clusters::cancelling;
 use super::error::{FitError, Progress, report};
 use super::merge::merged;
+use super::one_more_mode::OneMoreMode;
 use super::parameters::{ModalParameters, Residues};
 use super::peaks::peak_starts;
 use super::refine::{moves_all, refine, refine_near};
@@ -88,7 +89,15 @@ impl Serialize for ModelOrder {
     }
 }
 
-/// All orders that are significant, from one mode on to `max_modes`.
+/// What a search finds.
+pub(super) struct Found {
+    /// All orders that are significant.
+    pub(super) orders: Vec<ModelOrder>,
+    /// What the data show beyond the last one.
+    pub(super) one_more_mode: Option<OneMoreMode>,
+}
+
+/// All orders that are significant, from one mode on to `max_modes`, and the best one with one more mode.
 ///
 /// A relative error is added to the noise: a large one first, then a small one, then none. So modes are found in the order of
 /// their effect on the response rather than of the accuracy of the data, and an approximate model of all of them exists before
@@ -98,11 +107,12 @@ pub(super) fn orders(
     residues: &Residues,
     max_modes: usize,
     progress: &mut Progress<'_>,
-) -> Result<Vec<ModelOrder>, FitError> {
+) -> Result<Found, FitError> {
     let mut search = Search {
         residues,
         max_modes,
         orders: Vec::new(),
+        one_more_mode: None,
         parameters: ModalParameters::without_modes(residues),
         done: 0.0,
         progress,
@@ -112,7 +122,10 @@ pub(super) fn orders(
     for pass in finer {
         search.run(pass, problem)?;
     }
-    Ok(search.orders)
+    Ok(Found {
+        orders: search.orders,
+        one_more_mode: search.one_more_mode,
+    })
 }
 
 /// At most `max_modes` modes by the coarse pass, with chi^2 and the smallest significant decrease for each of them: how well a few modes
@@ -122,6 +135,7 @@ pub(super) fn coarse(problem: Problem<'_>, max_modes: usize) -> Result<CoarseFit
         residues: &Residues::Real,
         max_modes,
         orders: Vec::new(),
+        one_more_mode: None,
         parameters: ModalParameters::default(),
         done: 0.0,
         progress: &mut |_| ControlFlow::Continue(()),
@@ -148,6 +162,8 @@ struct Search<'a, 'p> {
     max_modes: usize,
     /// The orders found so far.
     orders: Vec<ModelOrder>,
+    /// The best mode that is not significant.
+    one_more_mode: Option<OneMoreMode>,
     /// Result of the pass before.
     parameters: ModalParameters,
     /// Progress at the end of the pass before.
@@ -232,13 +248,18 @@ impl Search<'_, '_> {
         first_misfit: f64,
         mut solution: Solution,
     ) -> Result<(), FitError> {
+        self.one_more_mode = None;
         while solution.parameters.modes.len() < self.max_modes {
             let fraction = pass_progress(first_misfit, problem.misfit(solution.chi2));
             self.report(pass, fraction)?;
-            let Some(next) = with_another_mode(problem, &solution, pass.tolerance) else {
-                break;
+            let next = match with_another_mode(problem, &solution, pass.tolerance) {
+                Another::Significant(next) => next,
+                Another::Insignificant(mode) => {
+                    self.one_more_mode = mode;
+                    break;
+                }
             };
-            let evidence = evidence(problem, &solution, &next);
+            let evidence = problem.evidence(&solution, &next);
             self.orders.push(order(problem, &next, evidence));
             solution = next;
             if problem
@@ -296,20 +317,34 @@ fn order(problem: Problem<'_>, solution: &Solution, evidence: f64) -> ModelOrder
     }
 }
 
-/// The best solution with one more mode, if it is significantly better.
-fn with_another_mode(
-    problem: Problem<'_>,
-    solution: &Solution,
-    tolerance: f64,
-) -> Option<Solution> {
-    let significant = |next: &Solution| evidence(problem, solution, next) > 1.0;
+/// One more mode.
+enum Another {
+    /// A solution that is significantly better.
+    Significant(Solution),
+    /// The best one, if there are candidates; none is significant.
+    Insignificant(Option<OneMoreMode>),
+}
+
+/// The first significant candidate, or else the best one.
+fn with_another_mode(problem: Problem<'_>, solution: &Solution, tolerance: f64) -> Another {
+    let is_significant = |next: &Solution| problem.evidence(solution, next) > 1.0;
     if solution.parameters.modes.is_empty() {
-        return first_mode(problem, solution, tolerance).filter(significant);
+        let first = first_mode(problem, solution, tolerance).filter(is_significant);
+        return first.map_or(Another::Insignificant(None), Another::Significant);
     }
-    let candidates = candidates(problem, solution).into_iter().take(TRIALS);
-    candidates
-        .map(|mode| best_with(problem, &solution.parameters, mode, tolerance))
-        .find(significant)
+    let mut best: Option<OneMoreMode> = None;
+    for mode in candidates(problem, solution).into_iter().take(TRIALS) {
+        let next = best_with(problem, &solution.parameters, mode, tolerance);
+        if is_significant(&next) {
+            return Another::Significant(next);
+        }
+        let next = OneMoreMode::new(problem, solution, next, mode.omega_rad_s);
+        let is_better = |best: &OneMoreMode| next.probability > best.probability;
+        if best.as_ref().is_none_or(is_better) {
+            best = Some(next);
+        }
+    }
+    Another::Insignificant(best)
 }
 
 /// The best solution of those with a mode added, and, if a mode lies there already, with that one split.
@@ -357,11 +392,4 @@ fn first_mode(problem: Problem<'_>, solution: &Solution, tolerance: f64) -> Opti
     let starts = terms.flat_map(|term| first_mode_starts(problem, solution, term));
     let fitted = starts.map(|start| refine(problem, start, tolerance));
     fitted.min_by(|a, b| a.chi2.total_cmp(&b.chi2))
-}
-
-/// The decrease of chi^2 over the smallest significant one.
-fn evidence(problem: Problem<'_>, solution: &Solution, next: &Solution) -> f64 {
-    let misfit = problem.misfit(next.chi2);
-    let significant = problem.significant_decrease(&next.parameters.residues);
-    (solution.chi2 - next.chi2) / (significant * misfit)
 }

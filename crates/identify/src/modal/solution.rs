@@ -36,6 +36,13 @@ impl Problem<'_> {
         let n = self.data.len() as f64;
         residues.parameters_per_mode() * (2.0 * n).ln() + 2.0 * n.ln()
     }
+
+    /// The decrease of chi^2 by the last mode of `next`, over the smallest significant one.
+    pub(super) fn evidence(&self, solution: &Solution, next: &Solution) -> f64 {
+        let misfit = self.misfit(next.chi2);
+        let significant = self.significant_decrease(&next.parameters.residues);
+        (solution.chi2 - next.chi2) / (significant * misfit)
+    }
 }
 
 /// Parameters, and the model that they give at the data.

@@ -1,4 +1,4 @@
-//! Uncertain signs of residues that can change the verdict.
+//! Uncertain signs of residues, and modes that are not significant, that can change the verdict.
 //!
 //! A residue of uncertain sign belongs to a mode with little effect on the response, or to one of two modes so close that only the sum
 //! of their residues is determined. The residue is shifted to the ends of its interval; all other parameters follow by their
@@ -11,7 +11,7 @@
 //! If the number of CNMP pairs stays the same, the sign has no effect on the verdict. Complex residues have no sign.
 
 use super::input::VerdictInput;
-use crate::modal::{ModalParameters, Parameter};
+use crate::modal::{ModalParameters, OneMoreMode, Parameter};
 use bench_plant::PlantError;
 use bench_plant::zeros::ZeroKind;
 
@@ -33,6 +33,23 @@ pub(super) fn decisive_uncertain_mode(
         votes && !is_same_at_both_ends(input, *k, pairs)
     };
     Ok((0..modes.len()).find(is_decisive))
+}
+
+/// One more mode than is significant, if its probability is not negligible, and the number of CNMP pairs is another one with it.
+///
+/// # Errors
+/// When the zeros of the fit cannot be computed.
+pub(super) fn decisive_mode_more<'a>(
+    input: &VerdictInput<'a>,
+) -> Result<Option<&'a OneMoreMode>, PlantError> {
+    let is_real = input.fit.parameters.has_real_residues();
+    let more = input.fit.one_more_mode.as_ref().filter(|_| is_real);
+    let Some(more) = more.filter(|more| !input.certainty.allows(more.probability)) else {
+        return Ok(None);
+    };
+    let pairs = cnmp_pairs(input, &input.fit.parameters)?;
+    let is_same = cnmp_pairs(input, &more.parameters).is_ok_and(|with_it| with_it == pairs);
+    Ok((!is_same).then_some(more))
 }
 
 /// Whether the number of pairs is the same at both ends of the interval of a residue. Parameters without zeros are another case.

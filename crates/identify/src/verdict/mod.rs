@@ -12,8 +12,8 @@
 //! With complex residues, of damping that is not proportional, the second one does not apply, and the zeros are computed from the complex
 //! residues ([`crate::modal::Residues`]).
 //!
-//! Only what can change the verdict is evaluated: a residue of uncertain sign prevents a verdict only if the number of CNMP pairs
-//! depends on it, and a real zero may lie on either side.
+//! Only what can change the verdict is evaluated: a residue of uncertain sign, or one more mode that is not excluded, prevents a verdict
+//! only if the number of CNMP pairs depends on it, and a real zero may lie on either side.
 //!
 //! A verdict needs sufficient data: as many modes as the model has, and residuals that are noise. It covers the band up to a
 //! given frequency. All comparisons state what must hold, so that a number that is not finite (a singular covariance, a bin
@@ -34,14 +34,14 @@ pub use input::{Certainty, MAX_LOOKS, VerdictInput, VerdictScope};
 pub use phase_drop::PhaseDrop;
 pub use zeros::{UncertainZero, zeros};
 
-use decisive::decisive_uncertain_mode;
+use decisive::{decisive_mode_more, decisive_uncertain_mode};
 use phase_check::phase_drop_over;
 use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
-use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit};
+use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit, OneMoreMode};
 use bench_base::decimal::Decimal;
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
@@ -154,9 +154,11 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         zeros.clone()
     };
     let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
+    let mode_more = decisive_mode_more(input)?;
     let insufficient = insufficient_data(input, &modes)
         .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
         .or_else(|| uncertain_side(&zeros, input.certainty))
+        .or_else(|| mode_more.map(uncertain_mode_reason))
         .or_else(|| unconfirmed_in_a_misfit(input.fit, &zeros, phase_drop))
         .or_else(|| only_of_the_chain(&zeros, &of_stage));
     let (cnmp, why) = match insufficient {
@@ -244,6 +246,14 @@ fn uncertain_sign_reason(mode: &FittedMode) -> String {
     format!(
         "the sign of the residue at {:.2} Hz is uncertain, and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
         mode.frequency_hz().value
+    )
+}
+
+fn uncertain_mode_reason(mode: &OneMoreMode) -> String {
+    format!(
+        "it is uncertain whether there is one more mode near {:.2} Hz (probability {:.1} %), and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
+        hertz(mode.near_rad_s),
+        100.0 * mode.probability
     )
 }
 

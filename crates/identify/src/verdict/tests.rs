@@ -9,7 +9,7 @@ mod zeros;
 use nalgebra::Complex;
 
 use super::{Certainty, Cnmp, Verdict};
-use crate::modal::Parameter;
+use crate::modal::{OneMoreMode, Parameter};
 use bench_plant::zeros::{ModalTerm, ZeroKind};
 use stage::{Case, DAMPING_RAD_S, PAIR_RAD_S, Stage, UP_TO_RAD_S, all_pass_lag_deg, hertz, pair};
 
@@ -67,6 +67,32 @@ fn requires_a_reduced_chi_square_of_at_most_four() {
     }
     for poor in [4.01, 12.0, f64::INFINITY, f64::NAN] {
         assert_undecided(&verdict_at(poor), "reduced chi-square");
+    }
+}
+
+#[test]
+fn undecided_if_one_more_mode_that_is_not_excluded_changes_the_number_of_cnmp_pairs() {
+    let verdict_with = |certainty: Certainty, more: &Stage, probability: f64| {
+        let mut case = Case::of(&Stage::with_mode_below(3.0));
+        case.certainty = certainty;
+        case.fit.one_more_mode = Some(OneMoreMode {
+            parameters: more.fit().parameters,
+            near_rad_s: 60.0,
+            probability,
+        });
+        case.verdict()
+    };
+    let (one_look, looks) = (Certainty::ONE_LOOK, Certainty::REPEATED_LOOKS);
+    let (other, same) = (Stage::with_mode_below(-0.3), Stage::with_pair(2.0));
+    for (certainty, probability) in [(one_look, 1.01e-3), (one_look, 0.5), (looks, 1.3e-4)] {
+        let verdict = verdict_with(certainty, &other, probability);
+        assert_undecided(&verdict, "one more mode near 9.55 Hz");
+        let verdict = verdict_with(certainty, &same, probability);
+        assert_eq!(verdict.cnmp, Cnmp::Detected, "{}", verdict.why);
+    }
+    for (certainty, probability) in [(one_look, 0.99e-3), (looks, 1.2e-4)] {
+        let verdict = verdict_with(certainty, &other, probability);
+        assert_eq!(verdict.cnmp, Cnmp::Detected, "{}", verdict.why);
     }
 }
 

@@ -124,6 +124,7 @@ mod tests {
             damping_ratio: estimate(0.05),
             residue_per_kg: estimate(-0.5),
             residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
         };
         let [page, terminal] =
             [Width::Page, Width::Terminal].map(|w| mode_table(&[mode], "1/kg", w));
@@ -170,6 +171,7 @@ mod tests {
             damping_ratio: estimate(0.05),
             residue_per_kg: estimate(-0.5),
             residue_imaginary_per_kg: Some(estimate(0.25)),
+            turned_by_one_more: 0.0,
         };
         assert!(has_complex_residues(&[mode]));
         for width in [Width::Page, Width::Terminal] {

@@ -125,6 +125,7 @@ impl Stage {
             parameters,
             covariance: DMatrix::zeros(free, free),
             orders: Vec::new(),
+            one_more_mode: None,
             chi2_per_freedom: 1.0,
             band_hz: (hertz(FIRST_RAD_S), hertz(FIRST_RAD_S + FREQUENCIES as f64)),
             left_out_hz: Vec::new(),
