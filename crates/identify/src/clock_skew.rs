@@ -53,6 +53,9 @@ const SWEEP_SPREAD: f64 = 0.1;
 const FIRST_STEP_RAD: f64 = 0.1;
 /// A ratio of fewer standard deviations is noise.
 const CERTAIN_SIGMAS: f64 = 5.0;
+/// A difference is confirmed if less than this part of it is found again in the corrected record. Without a difference all of it would be,
+/// with one nothing but noise.
+const MAX_REST: f64 = 0.5;
 /// Largest number of corrections of a record.
 const MAX_CORRECTIONS: usize = 6;
 
@@ -101,12 +104,13 @@ impl ClockSkew {
                 value: (1.0 + skew.ratio.value) * (1.0 + rest.value) - 1.0,
                 sigma: rest.sigma,
             };
-            if describes(&fit) && rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma {
+            let is_found = describes(&fit) && rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma;
+            before = Some(fit);
+            if is_found {
                 break;
             }
-            before = Some(fit);
         }
-        let is_described = before.as_ref().is_none_or(describes);
+        let is_described = before.as_ref().is_some_and(describes);
         let is_certain = skew.ratio.value.abs() > CERTAIN_SIGMAS * skew.ratio.sigma;
         (is_described && is_certain).then_some(skew)
     }
@@ -124,6 +128,23 @@ impl ClockSkew {
         }
     }
 
+    /// Whether the modes of a corrected record agree with the difference: with them, most of it is no longer there. (Modes of another
+    /// number than those with which the ratio was found may describe the response by another ratio.)
+    pub(super) fn is_confirmed(
+        &self,
+        fit: &ModalFit,
+        corrected: ExternalSignals<'_>,
+        data: &[FrfDatum],
+        chain: &MeasurementChain,
+    ) -> bool {
+        let turned = TurnedData::new(&corrected.excited(), data, chain);
+        let rest = turned.and_then(|turned| {
+            let part = turned.thinned(FITTED_DATA);
+            part.refined(&fit.parameters, 0.0)
+        });
+        rest.is_some_and(|rest| rest.value.abs() < MAX_REST * self.ratio.value.abs())
+    }
+
     /// The fit of a corrected record with the error of the ratio in its covariance.
     pub(super) fn widened(
         &self,
@@ -139,7 +160,10 @@ impl ClockSkew {
             value: 0.0,
             sigma: self.ratio.sigma,
         };
-        profile::with_error(fit, rest, |ratio, modes| turned.nearest(ratio, modes))
+        let merging = fit.parameters.clone();
+        profile::with_error(fit, rest, |ratio, modes| {
+            turned.nearest(ratio, modes, &merging)
+        })
     }
 
     /// The change of the delay of the output from begin to end of the record, in seconds.
@@ -302,13 +326,14 @@ impl<'a> TurnedData<'a> {
             step: FIRST_STEP_RAD / self.span_rad(),
             limits: (-MAX_RATIO, MAX_RATIO),
         };
-        let best = profile::best(&start, |ratio, modes| self.nearest(ratio, modes))?;
+        let best = profile::best(&start, |ratio, near| self.nearest(ratio, near, modes))?;
         Some(best.value)
     }
 
-    /// The modes of least chi^2 with a ratio, near given ones.
-    fn nearest(&self, ratio: f64, modes: &ModalParameters) -> Nearest {
-        modal::nearest(modes, &self.turned_back(ratio), self.chain)
+    /// The modes of least chi^2 with a ratio, near given ones. The data are merged as other modes allow.
+    fn nearest(&self, ratio: f64, near: &ModalParameters, merging: &ModalParameters) -> Nearest {
+        let data = modal::merged(&self.turned_back(ratio), merging);
+        modal::nearest(near, &data, self.chain)
     }
 }
 

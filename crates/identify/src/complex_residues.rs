@@ -19,7 +19,8 @@
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{
-    FitError, FittedMode, MeasurementChain, ModalFit, ModalParameters, Residues, fit_few, nearest,
+    FitError, FittedMode, MeasurementChain, ModalFit, ModalParameters, Residues, fit_few, merged,
+    nearest,
 };
 
 /// Largest number of modes with complex residues. More are a sign of something else, and take long.
@@ -115,6 +116,7 @@ fn is_better_than_real(
         has_fixed_delay: false,
         ..complex.clone()
     };
+    let data = &merged(data, complex);
     let [with_real, with_complex] = [&real, complex].map(|start| nearest(start, data, chain));
     let rates = complex.modes.len() as f64;
     let significant = rates * (2.0 * data.len() as f64).ln() + CERTAIN_DECREASE;

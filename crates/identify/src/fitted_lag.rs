@@ -279,6 +279,7 @@ impl UnknownLag {
 
     /// The modes of least chi^2 with a lag of exp(`ln_lag`) seconds, near given ones.
     fn nearest(&self, data: &[FrfDatum], ln_lag: f64, modes: &ModalParameters) -> Nearest {
+        let data = &modal::merged(data, modes);
         modal::nearest(modes, data, &self.chain(ln_lag.exp(), data))
     }
 }

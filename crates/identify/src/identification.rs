@@ -254,7 +254,7 @@ impl Identification {
         let analysis = self.analysed(&prepared, None)?;
         let analysis = self.with_other_model(record, analysis, lag_model)?;
         let analysis = self.with_other_model(record, analysis, complex_model)?;
-        // A small difference of the clocks takes the place of complex residues more easily than these that of a difference.
+        // Complex residues are tried first: a small difference of the clocks easily takes their place.
         let is_open = analysis.verdict.cnmp == Cnmp::Undecided
             && analysis.fitted_lag.is_none()
             && has_real_residues(&analysis.fit);
@@ -299,7 +299,11 @@ impl Identification {
             return Ok(None);
         };
         let analysis = self.analysed(&prepared, Some(skew))?;
-        Ok(is_sum_of_few_modes(&analysis.fit).then_some(analysis))
+        let is_confirmed = analysis.fit.as_ref().is_ok_and(|fit| {
+            let (record, data) = (prepared.cleaned(), &prepared.frf.data);
+            fit.is_sum_of_few_modes() && skew.is_confirmed(fit, record, data, &analysis.chain)
+        });
+        Ok(is_confirmed.then_some(analysis))
     }
 
     /// The analysis with a lag that is not stated, or with complex residues, as `model` finds them, if modes with real ones do not describe
@@ -446,11 +450,6 @@ pub(super) fn judged(
     let verdict = unless_undetermined(verdict, fit);
     let hint = hint(&verdict).filter(|hint| !verdict.why.contains(hint));
     Ok(verdict.with(hint))
-}
-
-/// Whether a few modes with real residues describe the data.
-fn is_sum_of_few_modes(fit: &Result<ModalFit, FitError>) -> bool {
-    fit.as_ref().is_ok_and(ModalFit::is_sum_of_few_modes)
 }
 
 fn has_real_residues(fit: &Result<ModalFit, FitError>) -> bool {

@@ -4,8 +4,10 @@ use nalgebra::Complex;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use super::ClockSkew;
+use crate::external_signals::ExternalSignals;
 use crate::verdict::Cnmp;
-use crate::{ExternalAnalysis, Identification};
+use crate::{Estimate, ExternalAnalysis, Identification, Signals};
 
 const RATE_HZ: f64 = 500.0;
 /// Rest of 0.5 s, a logarithmic sweep from 2 to 90 Hz in 10 s, and rest until the plant has settled.
@@ -127,6 +129,37 @@ fn one_clock_has_no_difference() {
     let found = analysis(|time_s| time_s, 4);
     assert_eq!(found.clock_skew, None);
     assert_eq!(found.verdict.cnmp, Cnmp::Excluded, "{}", found.verdict.why);
+}
+
+/// A record with one clock gives the modes. Other records of the same plant are corrected for a difference of 1e-4, which they have or
+/// not.
+#[test]
+fn modes_confirm_a_true_difference_only() {
+    let known = analysis(|time_s| time_s, 4);
+    let fit = known.fit.expect("modes");
+    let skew = ClockSkew {
+        ratio: Estimate {
+            value: 1e-4,
+            sigma: 1e-6,
+        },
+        duration_s: SAMPLES as f64 / RATE_HZ,
+    };
+    let is_confirmed = |true_ratio: f64| {
+        let times = (0..SAMPLES).map(|k| k as f64 / RATE_HZ * (1.0 + true_ratio));
+        let times_s: Vec<f64> = times.collect();
+        let input = input();
+        let signals = Signals {
+            rate_hz: RATE_HZ,
+            output: output(&input, &times_s, &MODES, 8),
+            input,
+        };
+        let corrected = skew.corrected(&signals);
+        let record = ExternalSignals::new(&corrected, None, None);
+        let frf = record.response((2.0, 90.0)).expect("a response");
+        skew.is_confirmed(&fit, record, &frf.data, &known.chain)
+    };
+    assert!(is_confirmed(1e-4));
+    assert!(!is_confirmed(0.0));
 }
 
 #[test]

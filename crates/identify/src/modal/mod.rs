@@ -178,13 +178,13 @@ pub(crate) struct Nearest {
     pub(crate) chi2_per_freedom: f64,
 }
 
-/// The parameters of least chi^2 near given ones, with as many modes. The data are merged as `start` allows.
+/// The parameters of least chi^2 near given ones, with as many modes. The data are best [`merged`], with the same modes wherever chi^2 is
+/// compared.
 pub(crate) fn nearest(
     start: &ModalParameters,
     data: &[FrfDatum],
     chain: &MeasurementChain,
 ) -> Nearest {
-    let data = &merged(data, start);
     let nodes = &chain.nodes(data, start.delay_s);
     let problem = Problem { chain, data, nodes };
     let solution = refine(problem, start.clone(), 0.0);
