@@ -48,9 +48,10 @@ fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {
     what.map(|what| format!("{what}; {remedy}"))
 }
 
-/// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one. (That of a plant
-/// that is not linear, or of a coarse probe, may grow as well, but modes do not describe it; modes with complex residues may have no mode at the end of
-/// the band, unlike those with real ones in their place.)
+/// A response that grows as that of no output of the assumed kind, with the kind that describes it, if there is one.
+///
+/// The response of a plant that is not linear, or of a coarse probe, may grow as well; modes do not describe it. A response with complex
+/// residues may seem to grow, because real ones need another mode at the end of the band in their place.
 fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
     let is_misfit = seen.fit.as_ref().is_ok_and(|fit| !describes(fit));
     if is_misfit || seen.output_step.is_some() {

@@ -56,6 +56,13 @@ impl Cluster {
     fn modes(&self) -> Range<usize> {
         self.first..self.first + self.count
     }
+
+    /// Mean frequency of its modes, which are among these parameters, in rad/s.
+    fn mean_omega_rad_s(&self, parameters: &ModalParameters) -> f64 {
+        let modes = &parameters.modes[self.modes()];
+        let sum_rad_s: f64 = modes.iter().map(|mode| mode.omega_rad_s).sum();
+        sum_rad_s / modes.len() as f64
+    }
 }
 
 /// The clusters whose residues cancel.
@@ -125,9 +132,7 @@ fn best_of(
     count: usize,
 ) -> Option<Solution> {
     let parameters = &solution.parameters;
-    let modes = &parameters.modes[cluster.modes()];
-    let sum_rad_s: f64 = modes.iter().map(|mode| mode.omega_rad_s).sum();
-    let middle_rad_s = sum_rad_s / modes.len() as f64;
+    let middle_rad_s = cluster.mean_omega_rad_s(parameters);
     let subsets = subsets(cluster.count, count).take(MAX_STARTS);
     let subsets = subsets.map(|kept| only(parameters, cluster, kept));
     let pairs = if count == 2 {
