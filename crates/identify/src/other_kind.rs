@@ -31,39 +31,55 @@ const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
 /// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do, or
-/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not with fewer parameters. `seen` with few modes
-/// of a part of the data.
+/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not with fewer parameters. If few modes describe
+/// the data, it is clear only if they are suspect, and fewer of that kind leave noise. `seen` with few modes of a part of the data.
 pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
     let (few, data) = (seen.fit, &seen.frf.data);
     let few_modes = match few {
-        Ok(fit) if describes(fit) => return None,
         Ok(fit) => fit.parameters.modes.len(),
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
+    let is_described = few.as_ref().is_ok_and(describes);
+    if is_described && !few.as_ref().is_ok_and(|few| is_suspect(few, seen)) {
+        return None;
+    }
     let (kind, other) = other_kind(seen)?;
     let other_modes = other.parameters.modes.len();
     let is_far_better = |few: &ModalFit| few.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
-    let is_clear = 2 * other_modes <= PART_MODES
-        || few.as_ref().is_ok_and(is_far_better)
-        || (other.leaves_noise() && other_modes + SAVED_MODES <= few_modes);
+    let saves_modes = other.leaves_noise() && other_modes + SAVED_MODES <= few_modes;
+    let is_clear = if is_described {
+        saves_modes
+    } else {
+        saves_modes || 2 * other_modes <= PART_MODES || few.as_ref().is_ok_and(is_far_better)
+    };
     let is_simplest = is_clear && !complex_residues_are_simpler(data, seen.chain, few, other);
     is_simplest.then_some(*kind)
+}
+
+/// Whether modes of a kind that is not stated may be those of another one: as many as are allowed, or without a static response.
+fn is_suspect(few: &ModalFit, seen: &Observation<'_>) -> bool {
+    let is_full = few.parameters.modes.len() == PART_MODES;
+    seen.stated.is_none() && (is_full || vanishes(few))
 }
 
 /// Another kind of output that describes the data in place of that of the fit.
 pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
     let assumed = seen.chain.output();
-    if let Some(fit) = seen.fit.as_ref().ok().filter(|fit| describes(fit)) {
+    let described = seen.fit.as_ref().ok().filter(|fit| describes(fit));
+    if let Some(kind) = seen.clear_kind {
+        return Some(match described {
+            Some(_) => give_kind_of_fewer_modes(assumed, kind),
+            None => give_kind(assumed, kind),
+        });
+    }
+    if let Some(fit) = described {
         let is_clear = seen.stated.is_some() || fit.chi2_per_freedom <= NOISE_CHI2;
         return if is_clear {
             None
         } else {
             described_better(seen)
         };
-    }
-    if let Some(kind) = seen.clear_kind {
-        return Some(give_kind(assumed, kind));
     }
     if seen.output_step.is_some() {
         return None;
@@ -98,6 +114,13 @@ fn complex_residues_are_simpler(
 fn give_kind(assumed: OutputKind, kind: OutputKind) -> String {
     let (assumed, kind) = (assumed.name(), kind.name());
     format!("modes describe the output as {kind}, but not as {assumed}; give --output-kind {kind}")
+}
+
+fn give_kind_of_fewer_modes(assumed: OutputKind, kind: OutputKind) -> String {
+    let (assumed, kind) = (assumed.name(), kind.name());
+    format!(
+        "fewer modes describe the output as {kind} than as {assumed}; give --output-kind {kind}, or --output-kind {assumed} if it is one"
+    )
 }
 
 /// The only other kind of output, of which as many modes describe the data to their noise, clearly better than those of the assumed kind.
