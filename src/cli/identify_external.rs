@@ -16,7 +16,7 @@ use bench_experiment::outputs::{ExistingFile, ModalSummary, PageFiles, ResultFil
 use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
-use bench_identify::record_check::Resolution;
+use bench_identify::record_check::{Correction, Resolution};
 use bench_identify::{ClockSkew, Distortion, DistortionSource, InputKind, OutputKind};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
@@ -55,6 +55,8 @@ struct Report {
     output_resolution: Option<f64>,
     #[serde(skip)]
     resolution: Resolution,
+    /// Spikes and steps of the output that were corrected.
+    corrections: Vec<Correction>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
     clock_skew_ppm: Option<f64>,
     clock_skew_ppm_sigma: Option<f64>,
@@ -161,6 +163,7 @@ impl Report {
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
+            corrections: analysis.corrections.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
             clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),
             clock_skew: analysis.clock_skew,
@@ -194,7 +197,7 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
@@ -206,6 +209,7 @@ impl Report {
             input_kind_text(self.input_kind),
             self.output_kind_text(),
             self.resolution_text(),
+            self.corrections_text(),
             self.input_path.text()
         )
     }
@@ -250,6 +254,12 @@ impl Report {
     fn clocks_text(&self) -> String {
         let text = self.clock_skew.map(|skew| skew.description());
         text.map_or_else(String::new, |text| labelled("clocks", &text))
+    }
+
+    /// Spikes and steps that were corrected.
+    fn corrections_text(&self) -> String {
+        let text = Correction::description(&self.corrections);
+        text.map_or_else(String::new, |text| labelled("corrected", &text))
     }
 
     /// The resolution of the channels, if it exceeds their noise.

@@ -133,17 +133,12 @@ fn defect_is_named_with_its_time_and_its_remedy_gives_the_verdict() {
         assert_eq!(answer["cnmp"], verdict, "{answer}");
     };
 
-    let mut spike = lines.clone();
-    add(&mut spike, middle..middle + 1, 1e-3);
-    refused(&spike, &["spike", &format!("{time:.4} s"), "interpolation"]);
-    spike[middle][2] = lines[middle - 1][2].clone();
-    decided(&spike);
-
-    let mut step = lines.clone();
-    add(&mut step, middle..end, 5e-5);
-    refused(&step, &["jumps by", &format!("{time:.4} s"), "subtract"]);
-    add(&mut step, middle..end, -5e-5);
-    decided(&step);
+    // A glitch of 6 samples is longer than a spike.
+    let mut glitch = lines.clone();
+    add(&mut glitch, middle..middle + 6, 1e-3);
+    refused(&glitch, &[&format!("{time:.4} s")]);
+    add(&mut glitch, middle..middle + 6, -1e-3);
+    decided(&glitch);
 
     let mut repeated = lines.clone();
     let value = lines[middle][2].clone();
@@ -161,6 +156,53 @@ fn defect_is_named_with_its_time_and_its_remedy_gives_the_verdict() {
         &begun,
         &["moves at the first sample", "begin the record before"],
     );
+}
+
+/// The position of the mode of a result that is nearest to a frequency, with its standard deviation.
+fn mode<'a>(answer: &'a Value, near: &Value) -> &'a Value {
+    let distance = |mode: &&Value| {
+        let hz = |mode: &Value| mode["frequency_hz"].as_f64().expect("a frequency");
+        (hz(mode) - hz(near)).abs()
+    };
+    let modes = answer["modes"].as_array().expect("modes").iter();
+    modes
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .expect("a mode")
+}
+
+#[test]
+fn spike_and_step_are_stated_and_change_neither_verdict_nor_modes() {
+    let bench = Bench::new();
+    if stages(&bench).is_none() {
+        return;
+    }
+    let sound = identify(&bench, &file(2));
+    assert_eq!(sound["corrections"], serde_json::json!([]));
+    let lines = rows(&bench.read(file(2)));
+    let (middle, end) = (lines.len() / 2, lines.len());
+    let mut spoiled = lines.clone();
+    add(&mut spoiled, middle..middle + 1, 1e-3);
+    add(&mut spoiled, middle + 500..end, 5e-5);
+    bench.write("spoiled.csv", text(&spoiled));
+    let answer = identify(&bench, "spoiled.csv");
+    assert_eq!(answer["cnmp"], sound["cnmp"], "{answer}");
+    let why = answer["why"].as_str().expect("a reason");
+    for k in [middle, middle + 500] {
+        let time_s: f64 = lines[k][0].parse().expect("a time");
+        assert!(why.contains(&format!("at {time_s:.4} s")), "{why}");
+    }
+    let kinds: Vec<&Value> = (0..2).map(|k| &answer["corrections"][k]["kind"]).collect();
+    assert_eq!(kinds, ["spike", "step"]);
+    // The corrected samples deviate by about their noise, which the intervals contain.
+    for expected in sound["modes"].as_array().expect("modes") {
+        let found = mode(&answer, expected);
+        for name in ["frequency_hz", "damping_ratio", "residue"] {
+            let number = |mode: &Value, name: &str| mode[name].as_f64().expect("a number");
+            let change = (number(found, name) - number(expected, name)).abs();
+            let sigma = number(expected, &format!("{name}_sigma"));
+            assert!(change < sigma, "{name}: {change}, {sigma}");
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::periodic::Repetition;
-use crate::record_check::{self, Defect, Ends, Resolution, StrayLine};
+use crate::record_check::{self, Corrected, Defect, Ends, Resolution, StrayLine};
 use crate::remedies::{OF_LOOP, OF_SIGNALS, Remedies};
 use crate::steady_input::is_steady;
 use crate::{
@@ -106,6 +106,15 @@ impl<'a> ExternalSignals<'a> {
     /// The first defect of each kind; `cleaned` is the record without its stray lines.
     pub(super) fn defects(&self, cleaned: &ExternalSignals<'_>) -> Vec<Defect> {
         record_check::defects(&self.excited(), &cleaned.excited(), self.ends)
+    }
+
+    /// The signals without the spikes and steps of the output. In closed loop they are not corrected: they move the plant as well.
+    pub(super) fn corrected(&self, defects: &[Defect]) -> Option<Corrected> {
+        let are_outliers = |defect: &Defect| defect.is_outlier();
+        if self.reference.is_some() || !defects.iter().any(are_outliers) {
+            return None;
+        }
+        Corrected::of(self.signals)
     }
 
     /// The signals without sinusoids that do not come from the excitation, and those of the output. A loop feeds them back, so that the

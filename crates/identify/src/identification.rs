@@ -13,7 +13,7 @@ use crate::plausibility::{
     unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
-use crate::record_check::{Ends, Resolution};
+use crate::record_check::{Correction, Ends, Resolution};
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
@@ -46,6 +46,8 @@ pub struct ExternalAnalysis {
     pub judged_up_to_rad_s: f64,
     /// Periods and distortion of a periodic record.
     pub periodic: Option<PeriodicPart>,
+    /// Spikes and steps of the output that were corrected before the analysis.
+    pub corrections: Vec<Correction>,
     /// Steps of the values of input and output that exceed their noise.
     pub resolution: Resolution,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
@@ -56,6 +58,17 @@ pub struct ExternalAnalysis {
     is_explained: bool,
     /// The sinusoids that were subtracted, and other cautions of the verdict.
     cautions: Vec<String>,
+}
+
+impl ExternalAnalysis {
+    /// The analysis of a record in which spikes and steps were corrected before.
+    fn after(self, corrections: Vec<Correction>) -> ExternalAnalysis {
+        ExternalAnalysis {
+            verdict: self.verdict.with(Correction::description(&corrections)),
+            corrections,
+            ..self
+        }
+    }
 }
 
 /// Why signals cannot be identified.
@@ -246,12 +259,29 @@ impl Identification {
         };
         let record = ExternalSignals::new(&signals, reference, self.repetition);
         let prepared = self.prepared(record)?;
+        let Some(corrected) = record.corrected(&prepared.defects) else {
+            return self.of_prepared(&prepared);
+        };
+        let record = ExternalSignals {
+            signals: &corrected.signals,
+            ..record
+        };
+        let analysis = self.of_prepared(&self.prepared(record)?)?;
+        Ok(analysis.after(corrected.corrections))
+    }
+
+    /// The analysis with the model that describes the record best.
+    fn of_prepared(
+        &self,
+        prepared: &Prepared<'_>,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        let record = prepared.record;
         // Many modes would be fitted to the turn of two clocks in vain.
         let compares_first = !prepared.few_modes_describe();
-        if compares_first && let Some(analysis) = self.with_one_clock(&prepared)? {
+        if compares_first && let Some(analysis) = self.with_one_clock(prepared)? {
             return Ok(analysis);
         }
-        let analysis = self.analysed(&prepared, None)?;
+        let analysis = self.analysed(prepared, None)?;
         let analysis = self.with_other_model(record, analysis, lag_model)?;
         let analysis = self.with_other_model(record, analysis, complex_model)?;
         // Complex residues are tried first: a small difference of the clocks easily takes their place.
@@ -260,7 +290,7 @@ impl Identification {
             && has_real_residues(&analysis.fit);
         if is_open
             && !compares_first
-            && let Some(corrected) = self.with_one_clock(&prepared)?
+            && let Some(corrected) = self.with_one_clock(prepared)?
             && number_of_modes(&corrected) < number_of_modes(&analysis)
         {
             return Ok(corrected);
@@ -401,6 +431,7 @@ impl Identification {
             band_hz: prepared.band_hz,
             judged_up_to_rad_s,
             periodic: prepared.periodic.clone(),
+            corrections: Vec::new(),
             resolution: prepared.resolution,
             clock_skew,
             is_explained,

@@ -61,6 +61,13 @@ pub enum Defect {
     },
 }
 
+impl Defect {
+    /// Whether it is a spike or a step, which may be corrected.
+    pub fn is_outlier(&self) -> bool {
+        matches!(self, Defect::Spike { .. } | Defect::Step { .. })
+    }
+}
+
 impl fmt::Display for Defect {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

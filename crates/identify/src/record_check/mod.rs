@@ -2,9 +2,11 @@
 //!
 //! A defect is alike from one frequency to the next, so that modes are fitted to it. It is found in the time domain.
 
+mod correction;
 mod defect;
 mod ends;
 mod held;
+mod outlier;
 mod plateaus;
 mod prediction;
 mod resolution;
@@ -13,6 +15,7 @@ mod stray_lines;
 mod tests;
 
 use super::Signals;
+pub use correction::{Corrected, Correction};
 pub use defect::Defect;
 use ends::motion_at_ends;
 pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};

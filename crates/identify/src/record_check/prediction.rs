@@ -3,11 +3,9 @@
 //!
 //! ```text
 //! y_k = sum a_i y_(k-i) + sum b_j u_(k-j) + e_k           i = 1 .. 8, j = 0 .. 8
-//! spike of height h     e = h (1, -a_1, -a_2, ...)
-//! step of height h      e = h (1, 1 - a_1, 1 - a_1 - a_2, ...)
 //! ```
 //!
-//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins a defect. A spike counts if its square
+//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins an outlier. A spike counts if its square
 //! exceeds 2 % of the energy of the noise over the record: smaller ones have no effect. Samples after a jump of the input, which
 //! excites more than the prediction describes, do not count. In a periodic record such defects differ from period to period and count
 //! as noise.
@@ -15,11 +13,14 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::defect::Defect;
+use super::outlier::{MAX_SPIKE, Outlier, Patterns, Place, Shape};
 use crate::Signals;
 use crate::mean;
 
 /// Samples of the output, and of the input before the present one, in the prediction.
 const ORDER: usize = 8;
+/// Number of errors on which a spike has an effect.
+pub(super) const REACH: usize = ORDER + MAX_SPIKE;
 /// Coefficients of the prediction.
 const COEFFICIENTS: usize = 2 * ORDER + 1;
 /// The coefficients are determined from at most this many samples.
@@ -40,13 +41,11 @@ const IMPULSE_RATIO: usize = 100;
 const MIN_ENERGY_RATIO: f64 = 0.02;
 /// A spike or a jump is larger than this number of steps of the output: rounding may add one half at each side of it.
 const MIN_STEPS: f64 = 2.0;
-/// A spike is at most this many samples long.
-const MAX_SPIKE: usize = 4;
 
 /// The errors of the prediction of a record.
 pub(super) struct Prediction<'a> {
     signals: &'a Signals,
-    coefficients: DVector<f64>,
+    patterns: Patterns,
     /// Error of each sample; 0 of the first ones.
     error: Vec<f64>,
     /// Standard deviation of the errors of each block, at least that of rounding.
@@ -72,7 +71,8 @@ impl<'a> Prediction<'a> {
         let mut error = vec![0.0; ORDER];
         error.extend((ORDER..signals.len()).map(row_error));
         // Output whose motion is below one step has no errors for a while, and then some of the size of the step.
-        let quantisation = step * gain(&coefficients) / 12.0_f64.sqrt();
+        let patterns = Patterns::new(&coefficients.as_slice()[..ORDER]);
+        let quantisation = step * patterns.gain() / 12.0_f64.sqrt();
         let rounding = f64::EPSILON * scale.output.max(scale.offset.abs());
         let rounding = rounding.max(quantisation);
         let blocks = error.chunks(BLOCK);
@@ -81,7 +81,7 @@ impl<'a> Prediction<'a> {
             .collect();
         Some(Self {
             signals,
-            coefficients,
+            patterns,
             error,
             sigma,
             step,
@@ -90,7 +90,7 @@ impl<'a> Prediction<'a> {
 
     /// The standard deviation of white noise of the output that gives these errors.
     pub(super) fn noise(&self) -> f64 {
-        self.median_sigma() / gain(&self.coefficients)
+        self.median_sigma() / self.patterns.gain()
     }
 
     /// The median over the blocks.
@@ -101,6 +101,20 @@ impl<'a> Prediction<'a> {
     /// The first spike and the first step.
     pub(super) fn jumps(&self) -> Vec<Defect> {
         let mut found: Vec<Defect> = Vec::new();
+        for outlier in self.outliers() {
+            let defect = self.defect(outlier);
+            let is_new =
+                |known: &Defect| std::mem::discriminant(known) != std::mem::discriminant(&defect);
+            if found.iter().all(is_new) {
+                found.push(defect);
+            }
+        }
+        found
+    }
+
+    /// The spikes and steps that have an effect.
+    pub(super) fn outliers(&self) -> Vec<Outlier> {
+        let mut found = Vec::new();
         let jumps_of_input = jumps(&self.signals.input);
         let mut k = ORDER;
         while k < self.error.len() {
@@ -108,14 +122,9 @@ impl<'a> Prediction<'a> {
                 k += 1;
                 continue;
             }
-            let defect = self.classify(k);
-            let has_effect = self.has_effect(defect, k);
-            let is_new =
-                |known: &Defect| std::mem::discriminant(known) != std::mem::discriminant(&defect);
-            if has_effect && found.iter().all(is_new) {
-                found.push(defect);
-            }
-            k += ORDER + 1;
+            let outlier = self.patterns.outlier(self.errors_from(k), k);
+            found.extend(outlier.filter(|outlier| self.has_effect(outlier)));
+            k += REACH;
         }
         found
     }
@@ -124,48 +133,38 @@ impl<'a> Prediction<'a> {
         self.error[k].abs() > DEFECT_SIGMAS * self.sigma[k / BLOCK]
     }
 
-    /// Whether a defect matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy.
-    fn has_effect(&self, defect: Defect, k: usize) -> bool {
-        let height = match defect {
-            Defect::Spike { height, .. } => height,
-            Defect::Step { height, .. } => return height.abs() > MIN_STEPS * self.step,
-            _ => return true,
-        };
-        if height.abs() <= MIN_STEPS * self.step {
-            return false;
-        }
-        let sigma = self.sigma[k / BLOCK];
-        height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
+    /// The heights of a spike or a step that begins at a known sample.
+    pub(super) fn heights(&self, place: Place) -> Option<Vec<f64>> {
+        let errors = self.errors_from(place.at);
+        let fitted = self.patterns.fitted(errors, place.shape);
+        fitted.map(|fitted| fitted.heights)
     }
 
-    fn classify(&self, k: usize) -> Defect {
-        let time_s = |k: usize| k as f64 / self.signals.rate_hz;
-        let end = (k + ORDER + 1).min(self.error.len());
-        let error = &self.error[k..end];
-        let time_s = time_s(k);
-        let spikes = (1..=MAX_SPIKE).map(|length| projection(error, &self.pattern(length)));
-        let spike = spikes.min_by(|a, b| a.1.total_cmp(&b.1));
-        let (step_height, step_rest) = projection(error, &self.pattern(ORDER + 1));
-        match spike {
-            Some((height, rest)) if rest <= step_rest => Defect::Spike { time_s, height },
-            _ => Defect::Step {
-                time_s,
-                height: step_height,
-            },
-        }
+    /// The errors on which a spike has an effect.
+    fn errors_from(&self, k: usize) -> &[f64] {
+        let end = (k + REACH).min(self.error.len());
+        &self.error[k..end]
     }
 
-    /// The errors after an offset of 1 that lasts some samples.
-    fn pattern(&self, length: usize) -> Vec<f64> {
-        let single = |i: usize| {
-            if i == 0 {
-                1.0
-            } else {
-                -self.coefficients[i - 1]
-            }
-        };
-        let sum = |i: usize| (0..=i.min(length - 1)).map(|j| single(i - j)).sum();
-        (0..=ORDER).map(sum).collect()
+    /// Whether an outlier matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy.
+    fn has_effect(&self, outlier: &Outlier) -> bool {
+        let Outlier { place, height, .. } = outlier;
+        let exceeds_steps = height.abs() > MIN_STEPS * self.step;
+        if place.shape == Shape::Step {
+            return exceeds_steps;
+        }
+        let sigma = self.sigma[place.at / BLOCK];
+        exceeds_steps
+            && height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
+    }
+
+    fn defect(&self, outlier: Outlier) -> Defect {
+        let Outlier { place, height, .. } = outlier;
+        let time_s = place.at as f64 / self.signals.rate_hz;
+        match place.shape {
+            Shape::Spike { .. } => Defect::Spike { time_s, height },
+            Shape::Step => Defect::Step { time_s, height },
+        }
     }
 }
 
@@ -225,11 +224,6 @@ fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
     Some(Cholesky::<f64, Dyn>::new(matrix)?.solve(&right))
 }
 
-/// The standard deviation of the errors for white noise of 1 in the output: sqrt(1 + sum a_i^2).
-fn gain(coefficients: &DVector<f64>) -> f64 {
-    (1.0 + coefficients.rows(0, ORDER).norm_squared()).sqrt()
-}
-
 fn sigma_by_median(errors: &[f64]) -> f64 {
     median(errors.iter().map(|error| error.abs()).collect()) / NORMAL_MEDIAN
 }
@@ -273,13 +267,4 @@ fn while_active(changes: &[f64]) -> &[f64] {
 fn after_a_jump(jumps: &[usize], k: usize) -> bool {
     let next = jumps.partition_point(|jump| *jump <= k);
     next > 0 && k - jumps[next - 1] <= 2 * ORDER
-}
-
-/// The factor of a pattern in some errors, and what remains of them.
-fn projection(errors: &[f64], pattern: &[f64]) -> (f64, f64) {
-    let pairs = || errors.iter().zip(pattern);
-    let product: f64 = pairs().map(|(e, p)| e * p).sum();
-    let square: f64 = pairs().map(|(_, p)| p * p).sum();
-    let factor = product / square;
-    (factor, pairs().map(|(e, p)| (e - factor * p).powi(2)).sum())
 }

@@ -1,5 +1,7 @@
 //! Defects of records with known ones, and none of sound records.
 
+mod corrections;
+
 use super::*;
 
 const RATE_HZ: f64 = 1000.0;

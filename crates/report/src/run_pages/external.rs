@@ -7,6 +7,7 @@ use crate::html::{facts, section};
 use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
 use bench_identify::modal::{InputPath, ModalFit};
+use bench_identify::record_check::Correction;
 use bench_identify::{ExternalAnalysis, FittedLag, OutputKind, Unit};
 
 /// An analysed table of samples.
@@ -105,6 +106,10 @@ impl<'a> ExternalRecord<'a> {
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
             ("Times", Some(self.times.to_string())),
             ("Resolution", self.analysis.resolution.description()),
+            (
+                "Corrected",
+                Correction::description(&self.analysis.corrections),
+            ),
             (
                 "Clocks",
                 self.analysis.clock_skew.map(|skew| skew.description()),
