@@ -7,17 +7,20 @@ use crate::external::python;
 /// The seed is not one that was used for development.
 const SEED: &str = "20261128";
 /// Records of which a verdict is expected.
-const DECIDABLE: [&str; 6] = [
+const DECIDABLE: [&str; 8] = [
     "plain",
     "inverted sensor",
     "delay",
     "hum within the band",
+    "spike",
+    "jump",
     "stated velocity",
     "rate that drifts, true times",
 ];
 /// Records with a defect that is to be named.
-const DEFECTS: [&str; 7] = [
-    "spike",
+const DEFECTS: [&str; 8] = [
+    "stuck samples",
+    "acceleration, not stated",
     "slow probe",
     "milliseconds without a unit",
     "missing rows, with times",

@@ -63,7 +63,8 @@ class Record:
 
     def __init__(self, modes, rate, columns, options=("--hold", "zoh"), causes=(), scale=1.0, model_holds=True, zeros_at=None):
         self.modes, self.rate, self.columns, self.options = modes, rate, columns, list(options)
-        self.causes = {"uncertain", "few modes", *causes}
+        # Where the model holds, the noise may prevent a verdict as well.
+        self.causes = {"uncertain", "few modes", *causes} if model_holds or not causes else set(causes)
         # Residues are those of the stage times this number, and intervals hold the truth, unless the model does not.
         self.scale, self.model_holds = scale, model_holds
         self.zeros = zeros(modes) if zeros_at is None else zeros_at
@@ -230,7 +231,7 @@ def spike(rng):
     b = Bench(rng)
     y = b.noisy(b.motion())
     y[int(rng.uniform(0.2, 0.7) * len(y))] += rng.uniform(2, 10) * np.max(abs(y))
-    return b.record(y, causes=["spike"], model_holds=False)
+    return b.record(y, causes=["spike"])
 
 
 @kind("jump")
@@ -238,7 +239,7 @@ def jump(rng):
     b = Bench(rng)
     y = b.noisy(b.motion())
     y[int(rng.uniform(0.2, 0.6) * len(y)) :] += rng.uniform(0.5, 2) * np.max(abs(y))
-    return b.record(y, causes=["jump"], model_holds=False)
+    return b.record(y, causes=["jump"])
 
 
 @kind("stuck samples")
