@@ -56,6 +56,8 @@ pub struct ExternalAnalysis {
     source: Source,
     /// Whether it is known why modes do not describe the response: a defect, a cut, or another kind of output.
     is_explained: bool,
+    /// Whether the signals can be those of input and output of a mechanical system, so that the fit is judged.
+    is_plausible: bool,
     /// The sinusoids that were subtracted, and other cautions of the verdict.
     cautions: Vec<String>,
 }
@@ -333,7 +335,8 @@ impl Identification {
             let (record, data) = (prepared.cleaned(), &prepared.frf.data);
             fit.is_sum_of_few_modes() && skew.is_confirmed(fit, record, data, &analysis.chain)
         });
-        Ok(is_confirmed.then_some(analysis))
+        // The turn that two clocks cause may also describe a part of complex residues, and leave an implausible response.
+        Ok((is_confirmed && analysis.is_plausible).then_some(analysis))
     }
 
     /// The analysis with a lag that is not stated, or with complex residues, as `model` finds them, if modes with real ones do not describe
@@ -409,6 +412,7 @@ impl Identification {
         // What is missing of a record that is cut is easily taken for another model.
         let is_explained = known.is_some() || prepared.cut.is_some();
         let why = known.or_else(|| implausible(&observation));
+        let is_plausible = why.is_none();
         let verdict = judged(why, frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
             hint(verdict, cleaned, &fit, &prepared.resolution)
         })?;
@@ -435,6 +439,7 @@ impl Identification {
             resolution: prepared.resolution,
             clock_skew,
             is_explained,
+            is_plausible,
             cautions,
         })
     }
