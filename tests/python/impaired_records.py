@@ -557,6 +557,42 @@ def lag_of_drive(rng):
     return b.record(b.noisy(through_lag(b, tau)), causes=["misfit", "complex"])
 
 
+# Stages that are hard to decide.
+
+
+@kind("pair of modes a few bins apart")
+def pair(rng):
+    """One mode of a stage is replaced by two, 1 to 6 bins of the record apart, with any signs."""
+    b = Bench(rng, seconds=float(rng.uniform(10, 60)))
+    k = int(rng.integers(len(b.modes)))
+    w, zeta, r = b.modes[k]
+    half = np.pi * rng.uniform(1, 6) * b.rate / len(b.u)
+    shares = rng.uniform(0.2, 1.0, 2) * rng.choice([-1, 1], 2)
+    twins = [[w - half, zeta, r * shares[0]], [w + half, zeta * rng.uniform(1, 1.5), r * shares[1]]]
+    b.modes = np.vstack([b.modes[:k], twins, b.modes[k + 1 :]])
+    return b.record(b.noisy(b.motion()))
+
+
+@kind("zero near the axis")
+def near_the_axis(rng):
+    """A stage of which one residue is changed until a complex zero in the band has a real part of at most 0.5 % of its magnitude."""
+    while True:
+        b = Bench(rng)
+        k, sign = int(rng.integers(len(b.modes))), rng.choice([-1, 1])
+        found = []
+        for factor in np.exp(np.linspace(np.log(0.02), np.log(50), 400)):
+            modes = b.modes.copy()
+            modes[k, 2] *= sign * factor
+            at = zeros(modes)
+            hz = abs(at) / (2 * np.pi)
+            at = at[(at.imag > 1e-3 * abs(at)) & (hz > 1.2 * b.low) & (hz < 0.9 * b.high)]
+            if len(at) and np.min(abs(at.real) / abs(at)) < 5e-3:
+                found.append(modes)
+        if found:
+            b.modes = found[int(rng.integers(len(found)))]
+            return b.record(b.noisy(b.motion()))
+
+
 # What is done with a record.
 
 
