@@ -1,4 +1,5 @@
-"""Identifies the same external records with `bench identify` and with sdypy-EMA (pyFRF, LSCF, LSFD), and prints one table.
+"""Identifies the same external records with `bench identify`, with sdypy-EMA (pyFRF, LSCF, LSFD) and by vector fitting, and prints one
+table.
 
     python3 -m pip install numpy scipy sdypy-EMA pyFRF
     python3 benches/peer_identification.py [--stages 12] [--seed 1] [--bench target/release/bench] [--motor-bench FILE.csv]
@@ -16,12 +17,14 @@ How each program is used:
   the model order up to 100; at this order the stable pole nearest to each true pole; residues with or without the terms of modes
   outside of the band. Of all combinations the one with the smallest sum of relative errors of poles and residues is taken. So its
   errors are a lower limit of what an operator without the truth gets.
+- Vector fitting (vector_fitting.py) gets the same response, and the best choice as well: of the number of poles, from that of the true
+  modes to three more, and of the weight of the response, |H|^0, |H|^-0.5 or |H|^-1.
 
 Errors are relative, and the largest of all modes that were found in the excited band. `signs` counts residues with the wrong sign, and
 before `?` those of `bench` whose 95 % confidence interval contains both signs; these are not counted as wrong. The verdict is whether
-there is a CNMP pair in the band: sdypy-EMA has none, so it is that of the zeros of its modes, which cannot be undecided. Time is
-processor time: of `bench identify` as a whole with its plots and report, and of the one chosen combination of sdypy-EMA (all orders up
-to the chosen one) without reading the file and without the search.
+there is a CNMP pair in the band: the others have none, so it is that of the zeros of their modes, which cannot be undecided. Time is
+processor time: of `bench identify` as a whole with its plots and report, and of the one chosen combination of the others (of sdypy-EMA
+with all orders up to the chosen one) without reading the file and without the search.
 """
 
 import argparse
@@ -47,14 +50,16 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent
 SCRIPTS = ROOT / "tests/python"
 sys.path.insert(0, str(SCRIPTS))
 import random_stages  # noqa: E402
+import vector_fitting  # noqa: E402
 
 warnings.filterwarnings("ignore", message="f_upper .* is outside")  # sdypy-EMA cuts the response one line below the limit itself
 LAG_S = 1 / random_stages.LOOP_RAD_S
 MAX_ORDER = 100
+MAX_MORE_POLES = 3
 MAX_SIGN_ERROR = 0.025  # beyond it the 95 % confidence interval of the residue contains both signs
 MOTOR_PERIOD, MOTOR_SKIP, MOTOR_RATE_HZ, MOTOR_BAND_HZ = 2500, 2, 2500.0, (11.0, 250.0)
 HEADER = ("stage", "program", "modes", "frequency", "damping", "residue", "signs", "verdict", "time s", "chosen by hand")
-WIDTHS = (18, 9, 5, 11, 9, 9, 5, 10, 6, 0)
+WIDTHS = (18, 14, 5, 11, 9, 9, 5, 10, 6, 0)
 
 
 class Truth:
@@ -212,6 +217,48 @@ def of_peer(rate_hz, inputs, outputs, path, truth):
     }
 
 
+# vector fitting -------------------------------------------------------------------------------------------------------
+
+
+def modes_by_vector_fitting(f_hz, receptance, truth, count, exponent):
+    """Rows (w, zeta, residue) of the poles nearest to the true ones, and for which true modes there is one."""
+    weight = np.abs(receptance) ** -exponent
+    candidates = vector_fitting.poles(f_hz, receptance, count, weight)
+    residues = vector_fitting.real_residues(f_hz, receptance, candidates, weight)
+    chosen = nearest(candidates, poles(truth.modes))
+    has = chosen >= 0
+    picked = candidates[chosen[has]]
+    return np.column_stack([np.abs(picked), -picked.real / np.abs(picked), residues[chosen[has]]]), has
+
+
+def of_vector_fitting(rate_hz, inputs, outputs, path, truth):
+    def in_band():
+        f_hz, receptance = response(rate_hz, inputs, outputs)
+        inside = (f_hz >= truth.band_hz[0]) & (f_hz <= truth.band_hz[1])
+        return f_hz[inside], receptance[inside] / path(f_hz[inside])
+
+    data = in_band()
+    choices = []
+    for more in range(MAX_MORE_POLES + 1):
+        for exponent in (0.0, 0.5, 1.0):
+            rows, has = modes_by_vector_fitting(*data, truth, len(truth.modes) + more, exponent)
+            choices.append((-len(rows), cost(rows, truth.modes[has]), len(truth.modes) + more, exponent))
+    count, exponent = min(choices)[2:]
+    begin = time.process_time()
+    rows, has = modes_by_vector_fitting(*in_band(), truth, count, exponent)
+    expected = truth.modes[has]
+    seconds = time.process_time() - begin
+    return {
+        "program": "vector fitting",
+        "found": f"{len(rows)}/{len(truth.modes)}",
+        "errors": errors(rows, expected),
+        "signs": str(int(np.sum(np.sign(rows[:, 2]) != np.sign(expected[:, 2])))),
+        "verdict": right(has_cnmp(random_stages.zeros(rows), truth.band_hz), truth),
+        "seconds": seconds,
+        "by_hand": f"band, path, {count} poles, weight |H|^-{exponent:g}",
+    }
+
+
 # table ----------------------------------------------------------------------------------------------------------------
 
 
@@ -226,7 +273,7 @@ def print_row(truth, result):
 
 
 def print_summary(results):
-    for program in ("bench", "sdypy-EMA"):
+    for program in ("bench", "sdypy-EMA", "vector fitting"):
         own = [result for result in results if result["program"] == program]
         frequency, damping, residue = (f"{100 * part:.3g} %" for part in np.nanmedian([result["errors"] for result in own], axis=0))
         verdicts = [result["verdict"] for result in own]
@@ -237,7 +284,7 @@ def print_summary(results):
 
 
 def random_stage(k, chosen, folder):
-    """Both results for one random stage."""
+    """All results for one random stage."""
     family = random_stages.FAMILIES[k % len(random_stages.FAMILIES)]
     file = folder / f"stage-{k}.csv"
     facts = random_stages.record(np.random.default_rng([chosen.seed, k]), family, file)
@@ -247,12 +294,12 @@ def random_stage(k, chosen, folder):
     data = np.loadtxt(file, delimiter=",", skiprows=1)
     rate_hz = facts["rate_hz"]
     own = of_bench(chosen.bench, file, truth, options, folder / "results")
-    peer = of_peer(rate_hz, data[None, :, 1], data[None, :, 2], lambda f_hz: path_to_force(f_hz, rate_hz), truth)
-    return truth, (own, peer)
+    record = (rate_hz, data[None, :, 1], data[None, :, 2], lambda f_hz: path_to_force(f_hz, rate_hz), truth)
+    return truth, (own, of_peer(*record), of_vector_fitting(*record))
 
 
 def motor_side(column, chosen, folder):
-    """Both results for the flexible mode at one side of the motor bench. The rigid body has no frequency in the band."""
+    """All results for the flexible mode at one side of the motor bench. The rigid body has no frequency in the band."""
     fit = [sys.executable, SCRIPTS / "motor_bench.py", chosen.motor_bench, column]
     printed = subprocess.run(fit, capture_output=True, text=True, check=True)
     _, hz, zeta, residue, _ = (float(row.split()[0]) for row in printed.stdout.splitlines())
@@ -261,9 +308,9 @@ def motor_side(column, chosen, folder):
     data = np.genfromtxt(chosen.motor_bench, delimiter=",", names=True)
     own = of_bench(chosen.bench, chosen.motor_bench, truth, options, folder / "results")
     inputs, outputs = (periods(data[name]) for name in ("current_a", column))
-    peer = of_peer(MOTOR_RATE_HZ, inputs, outputs, lambda f_hz: 1.0, truth)
+    record = (MOTOR_RATE_HZ, inputs, outputs, lambda f_hz: 1.0, truth)
     # One mode has no zeros: there is no verdict to compare.
-    return truth, ({**own, "verdict": "-"}, {**peer, "verdict": "-"})
+    return truth, tuple({**result, "verdict": "-"} for result in (own, of_peer(*record), of_vector_fitting(*record)))
 
 
 def periods(signal):
@@ -286,14 +333,14 @@ def main():
         folder = pathlib.Path(name)
         results = []
         for k in range(chosen.stages):
-            truth, both = random_stage(k, chosen, folder)
-            for result in both:
+            truth, of_stage = random_stage(k, chosen, folder)
+            for result in of_stage:
                 print_row(truth, result)
-            results += both
+            results += of_stage
         print_summary(results)
         for column in ("motor_angle_rad", "load_angle_rad") if chosen.motor_bench else ():
-            truth, both = motor_side(column, chosen, folder)
-            for result in both:
+            truth, of_side = motor_side(column, chosen, folder)
+            for result in of_side:
                 print_row(truth, result)
 
 
