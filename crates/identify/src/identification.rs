@@ -1,77 +1,25 @@
 //! From two signals to modes and verdict: force and displacement or similar quantities, without a model of the stage.
 
 use crate::ClockSkew;
+use crate::external_analysis::ExternalAnalysis;
 use crate::external_signals::ExternalSignals;
 use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, OtherKind, Source};
 use crate::periodic::Repetition;
-use crate::periodic_part::PeriodicPart;
 use crate::plausibility::{
     OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
     unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
-use crate::record_check::{Correction, Ends, Resolution};
+use crate::record_check::Ends;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
 
 /// The caution of a verdict from a record in motion.
 const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
-
-/// The analysis of external signals.
-#[derive(Clone, Debug)]
-pub struct ExternalAnalysis {
-    /// The response from input to output.
-    pub frf: Frf,
-    /// Its modes, or why none can be fitted.
-    pub fit: Result<ModalFit, FitError>,
-    /// The verdict on CNMP zeros.
-    pub verdict: Verdict,
-    /// The hold of the input, and its lag, which are stated or fitted.
-    pub input_path: InputPath,
-    /// The lag of the input, if it was fitted.
-    pub fitted_lag: Option<FittedLag>,
-    /// What the input is, if that is stated.
-    pub input_kind: Option<InputKind>,
-    /// What the output measures: as stated, or a position. The modes and zeros are those of the position.
-    pub output_kind: OutputKind,
-    /// The chain from the input to the force that follows from them.
-    pub chain: MeasurementChain,
-    /// The analysed band in hertz.
-    pub band_hz: (f64, f64),
-    /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
-    pub judged_up_to_rad_s: f64,
-    /// Periods and distortion of a periodic record.
-    pub periodic: Option<PeriodicPart>,
-    /// Spikes and steps of the output that were corrected before the analysis.
-    pub corrections: Vec<Correction>,
-    /// Steps of the values of input and output that exceed their noise.
-    pub resolution: Resolution,
-    /// By how much the clocks of input and output differ, if the output was resampled for that.
-    pub clock_skew: Option<ClockSkew>,
-    /// Where the signals come from.
-    source: Source,
-    /// Whether it is known why modes do not describe the response: a defect, a cut, or another kind of output.
-    is_explained: bool,
-    /// Whether the signals can be those of input and output of a mechanical system, so that the fit is judged.
-    is_plausible: bool,
-    /// The sinusoids that were subtracted, and other cautions of the verdict.
-    cautions: Vec<String>,
-}
-
-impl ExternalAnalysis {
-    /// The analysis of a record in which spikes and steps were corrected before.
-    fn after(self, corrections: Vec<Correction>) -> ExternalAnalysis {
-        ExternalAnalysis {
-            verdict: self.verdict.with(Correction::description(&corrections)),
-            corrections,
-            ..self
-        }
-    }
-}
 
 /// Why signals cannot be identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -289,11 +237,11 @@ impl Identification {
         // Complex residues are tried first: a small difference of the clocks easily takes their place.
         let is_open = analysis.verdict.cnmp == Cnmp::Undecided
             && analysis.fitted_lag.is_none()
-            && has_real_residues(&analysis.fit);
+            && analysis.has_real_residues();
         if is_open
             && !compares_first
             && let Some(corrected) = self.with_one_clock(prepared)?
-            && number_of_modes(&corrected) < number_of_modes(&analysis)
+            && corrected.number_of_modes() < analysis.number_of_modes()
         {
             return Ok(corrected);
         }
@@ -486,18 +434,6 @@ pub(super) fn judged(
     let verdict = unless_undetermined(verdict, fit);
     let hint = hint(&verdict).filter(|hint| !verdict.why.contains(hint));
     Ok(verdict.with(hint))
-}
-
-fn has_real_residues(fit: &Result<ModalFit, FitError>) -> bool {
-    fit.as_ref()
-        .map_or(true, |fit| fit.parameters.has_real_residues())
-}
-
-fn number_of_modes(analysis: &ExternalAnalysis) -> usize {
-    match &analysis.fit {
-        Ok(fit) => fit.parameters.modes.len(),
-        Err(_) => usize::MAX,
-    }
 }
 
 fn listed(items: &[impl ToString]) -> Option<String> {

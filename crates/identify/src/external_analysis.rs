@@ -1,0 +1,76 @@
+//! The analysis of external signals: response, modes and verdict, and what was done to get them.
+
+use crate::Frf;
+use crate::clock_skew::ClockSkew;
+use crate::fitted_lag::FittedLag;
+use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
+use crate::observation::Source;
+use crate::periodic_part::PeriodicPart;
+use crate::record_check::{Correction, Resolution};
+use crate::verdict::Verdict;
+use bench_plant::{InputKind, OutputKind};
+
+/// The analysis of external signals.
+#[derive(Clone, Debug)]
+pub struct ExternalAnalysis {
+    /// The response from input to output.
+    pub frf: Frf,
+    /// Its modes, or why none can be fitted.
+    pub fit: Result<ModalFit, FitError>,
+    /// The verdict on CNMP zeros.
+    pub verdict: Verdict,
+    /// The hold of the input, and its lag, which are stated or fitted.
+    pub input_path: InputPath,
+    /// The lag of the input, if it was fitted.
+    pub fitted_lag: Option<FittedLag>,
+    /// What the input is, if that is stated.
+    pub input_kind: Option<InputKind>,
+    /// What the output measures: as stated, or a position. The modes and zeros are those of the position.
+    pub output_kind: OutputKind,
+    /// The chain from the input to the force that follows from them.
+    pub chain: MeasurementChain,
+    /// The analysed band in hertz.
+    pub band_hz: (f64, f64),
+    /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
+    pub judged_up_to_rad_s: f64,
+    /// Periods and distortion of a periodic record.
+    pub periodic: Option<PeriodicPart>,
+    /// Spikes and steps of the output that were corrected before the analysis.
+    pub corrections: Vec<Correction>,
+    /// Steps of the values of input and output that exceed their noise.
+    pub resolution: Resolution,
+    /// By how much the clocks of input and output differ, if the output was resampled for that.
+    pub clock_skew: Option<ClockSkew>,
+    /// Where the signals come from.
+    pub(super) source: Source,
+    /// Whether it is known why modes do not describe the response: a defect, a cut, or another kind of output.
+    pub(super) is_explained: bool,
+    /// Whether the signals can be those of input and output of a mechanical system, so that the fit is judged.
+    pub(super) is_plausible: bool,
+    /// The sinusoids that were subtracted, and other cautions of the verdict.
+    pub(super) cautions: Vec<String>,
+}
+
+impl ExternalAnalysis {
+    /// The analysis of a record in which spikes and steps were corrected before.
+    pub(super) fn after(self, corrections: Vec<Correction>) -> ExternalAnalysis {
+        ExternalAnalysis {
+            verdict: self.verdict.with(Correction::description(&corrections)),
+            corrections,
+            ..self
+        }
+    }
+
+    /// The number of fitted modes; without a fit as if there were any number.
+    pub(super) fn number_of_modes(&self) -> usize {
+        match &self.fit {
+            Ok(fit) => fit.parameters.modes.len(),
+            Err(_) => usize::MAX,
+        }
+    }
+
+    pub(super) fn has_real_residues(&self) -> bool {
+        let fit = self.fit.as_ref();
+        fit.map_or(true, |fit| fit.parameters.has_real_residues())
+    }
+}
