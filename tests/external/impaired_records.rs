@@ -7,7 +7,7 @@ use crate::external::python;
 /// The seed is not one that was used for development.
 const SEED: &str = "20261128";
 /// Records of which a verdict is expected.
-const DECIDABLE: [&str; 8] = [
+const DECIDABLE: [&str; 9] = [
     "plain",
     "inverted sensor",
     "delay",
@@ -16,6 +16,7 @@ const DECIDABLE: [&str; 8] = [
     "jump",
     "stated velocity",
     "rate that drifts, true times",
+    "coarse resolution",
 ];
 /// Records with a defect that is to be named.
 const DEFECTS: [&str; 8] = [

@@ -593,6 +593,43 @@ def near_the_axis(rng):
             return b.record(b.noisy(b.motion()))
 
 
+# What is rounded as well.
+ROUNDED_AS_WELL = (
+    "slow noise of the floor",
+    "drift",
+    "hum within the band",
+    "delay",
+    "known lag",
+    "hammer",
+    "bursts of noise",
+    "filter in the channel",
+    "mean of eight samples",
+    "one damper",
+    "friction",
+    "stiffness that depends on amplitude",
+    "mode that moves during the record",
+    "lag of the drive that is not given",
+    "zero near the axis",
+    "pair of modes a few bins apart",
+)
+
+
+@kind("coarse resolution beside another difficulty")
+def coarse_as_well(rng):
+    record = KINDS[ROUNDED_AS_WELL[int(rng.integers(len(ROUNDED_AS_WELL)))]](rng)
+    name = list(record.columns)[2]
+    y = record.columns[name]
+    step = rng.uniform(0.002, 0.02) * np.max(abs(y))
+    # Of one in three the ends of the cells are off by some per cent of a step.
+    levels = np.arange(np.floor(np.min(y) / step) - 1, np.max(y) / step + 2)
+    uneven = rng.uniform(0.0, 0.1) * (rng.random() < 1 / 3)
+    ends = levels + (0.5 if rng.random() < 0.5 else 1.0) + uneven * rng.standard_normal(len(levels))
+    record.columns[name] = step * (levels[0] + np.searchsorted(np.sort(ends), y / step))
+    record.causes |= {"coarse"}
+    record.model_holds &= uneven < 0.01
+    return record
+
+
 # What is done with a record.
 
 
