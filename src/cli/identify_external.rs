@@ -17,7 +17,9 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::{Correction, Resolution};
-use bench_identify::{ClockSkew, Distortion, DistortionSource, InputKind, OutputKind};
+use bench_identify::{
+    ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, RoundedOutput,
+};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -55,6 +57,10 @@ struct Report {
     output_resolution: Option<f64>,
     #[serde(skip)]
     resolution: Resolution,
+    /// Standard deviation of the noise of the output before rounding, if the modes are those of the greatest likelihood of its readings.
+    noise_before_rounding: Option<f64>,
+    #[serde(skip)]
+    rounded: Option<RoundedOutput>,
     /// Spikes and steps of the output that were corrected.
     corrections: Vec<Correction>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
@@ -163,6 +169,8 @@ impl Report {
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
+            noise_before_rounding: analysis.rounded.map(|rounded| rounded.sigma),
+            rounded: analysis.rounded,
             corrections: analysis.corrections.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
             clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),
@@ -197,7 +205,7 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
@@ -209,6 +217,7 @@ impl Report {
             input_kind_text(self.input_kind),
             self.output_kind_text(),
             self.resolution_text(),
+            self.rounding_text(),
             self.corrections_text(),
             self.input_path.text()
         )
@@ -266,6 +275,12 @@ impl Report {
     fn resolution_text(&self) -> String {
         let text = self.resolution.description();
         text.map_or_else(String::new, |text| labelled("resolution", &text))
+    }
+
+    /// How the modes of a rounded output were found.
+    fn rounding_text(&self) -> String {
+        let text = self.rounded.map(|rounded| rounded.description());
+        text.map_or_else(String::new, |text| labelled("rounding", &text))
     }
 
     /// The averaged periods and the distortion of a periodic record.

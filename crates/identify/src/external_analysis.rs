@@ -7,7 +7,8 @@ use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::Source;
 use crate::periodic_part::PeriodicPart;
 use crate::record_check::{Correction, Resolution};
-use crate::verdict::Verdict;
+use crate::rounded::RoundedOutput;
+use crate::verdict::{Cnmp, Verdict};
 use bench_plant::{InputKind, OutputKind};
 
 /// The analysis of external signals.
@@ -39,6 +40,8 @@ pub struct ExternalAnalysis {
     pub corrections: Vec<Correction>,
     /// Steps of the values of input and output that exceed their noise.
     pub resolution: Resolution,
+    /// How the modes were found, if the output has steps above its noise, and they describe its readings.
+    pub rounded: Option<RoundedOutput>,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
     /// Where the signals come from.
@@ -57,6 +60,21 @@ impl ExternalAnalysis {
         ExternalAnalysis {
             verdict: self.verdict.with(Correction::description(&corrections)),
             corrections,
+            ..self
+        }
+    }
+
+    /// The analysis with a reason not to decide.
+    pub(super) fn undecided_by(self, why: String) -> ExternalAnalysis {
+        if self.verdict.cnmp == Cnmp::Undecided {
+            return self;
+        }
+        ExternalAnalysis {
+            verdict: Verdict {
+                cnmp: Cnmp::Undecided,
+                why,
+                ..self.verdict
+            },
             ..self
         }
     }

@@ -98,8 +98,8 @@ impl<'a> ExternalSignals<'a> {
     /// The resolution of input and output.
     pub(super) fn resolution(&self) -> Resolution {
         Resolution {
-            output: Resolution::of(&self.excited()).output,
-            ..Resolution::of(self.signals)
+            input: Resolution::of(self.signals).input,
+            ..Resolution::of(&self.excited())
         }
     }
 

@@ -10,10 +10,11 @@ use crate::observation::{Observation, OtherKind, Source};
 use crate::periodic::Repetition;
 use crate::plausibility::{
     OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
-    unless_undetermined,
+    undescribed_steps, unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
 use crate::record_check::Ends;
+use crate::rounded::RoundedFit;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
@@ -225,6 +226,9 @@ impl Identification {
         &self,
         prepared: &Prepared<'_>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
+        if let Some(step) = prepared.rounded_step() {
+            return self.of_rounded_output(prepared, step);
+        }
         let record = prepared.record;
         // Many modes would be fitted to the turn of two clocks in vain.
         let compares_first = !prepared.few_modes_describe();
@@ -329,6 +333,68 @@ impl Identification {
         })
     }
 
+    /// The analysis of an output with steps above its noise, which is decided only if modes describe its readings.
+    fn of_rounded_output(
+        &self,
+        prepared: &Prepared<'_>,
+        step: f64,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        if let Some(found) = prepared.rounded_fit() {
+            return self.with_rounded_fit(prepared, found);
+        }
+        let analysis = self.analysed(prepared, None)?;
+        Ok(analysis.undecided_by(undescribed_steps(step)))
+    }
+
+    /// The analysis of a rounded output with the modes of the greatest likelihood.
+    fn with_rounded_fit(
+        &self,
+        prepared: &Prepared<'_>,
+        found: RoundedFit,
+    ) -> Result<ExternalAnalysis, IdentificationError> {
+        let RoundedFit { fit, output, noise } = found;
+        let gap = noise.gap(&fit);
+        let (low_hz, high_hz) = prepared.band_hz;
+        let seen_hz = if gap.is_none() {
+            noise.seen_up_to_hz
+        } else {
+            high_hz
+        };
+        let band_hz = (low_hz, seen_hz);
+        let (frf, chain) = (&prepared.frf, &prepared.assumed);
+        let fit = Ok(ModalFit { band_hz, ..fit });
+        let why = implausible(&Observation {
+            fit: &fit,
+            ..prepared.with_few_modes()
+        })
+        .or(gap);
+        let unrounded = prepared.response_of(output)?;
+        let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
+        let is_plausible = why.is_none();
+        let verdict = judged(why, &unrounded, &fit, chain, judged_up_to_rad_s, |_| None)?;
+        Ok(ExternalAnalysis {
+            frf: frf.clone(),
+            verdict: verdict.with(Some(noise.description())),
+            fit,
+            input_path: self.input_path,
+            fitted_lag: None,
+            source: prepared.source,
+            input_kind: self.input_kind,
+            output_kind: self.output_kind.unwrap_or_default(),
+            chain: chain.clone(),
+            band_hz,
+            judged_up_to_rad_s,
+            periodic: None,
+            corrections: Vec::new(),
+            resolution: prepared.resolution,
+            rounded: Some(noise),
+            clock_skew: None,
+            is_explained: false,
+            is_plausible,
+            cautions: Vec::new(),
+        })
+    }
+
     /// The modes of a record, and the verdict. `clock_skew` is that for which the output was corrected.
     fn analysed(
         &self,
@@ -348,7 +414,7 @@ impl Identification {
             Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
             None => fit,
         };
-        let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * prepared.band_hz.1;
+        let judged_up_to_rad_s = prepared.judged_up_to_rad_s();
         let observation = Observation {
             source,
             fit: &fit,
@@ -384,6 +450,7 @@ impl Identification {
             judged_up_to_rad_s,
             periodic: prepared.periodic.clone(),
             corrections: Vec::new(),
+            rounded: None,
             resolution: prepared.resolution,
             clock_skew,
             is_explained,

@@ -16,6 +16,7 @@
 //! | the estimator that the configuration selects | [`response`] |
 //! | the response while a run goes on | [`GrowingResponse`] |
 //! | defects of an external record | [`record_check`] |
+//! | an output with steps above its noise | [`RoundedOutput`] |
 //! | the band that an input excites | [`excited_band_hz`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
 //! | the periods in which a plant settles | [`settling`] |
@@ -65,6 +66,7 @@ mod profile;
 pub mod record_check;
 mod remedies;
 pub mod repeated;
+mod rounded;
 pub mod scatter;
 mod settings;
 mod signals;
@@ -89,6 +91,7 @@ pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
 pub(crate) use noise_parts::{NoiseParts, PowerDatum};
 pub use periodic_part::{Distortion, DistortionSource, PeriodicPart};
+pub use rounded::RoundedOutput;
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};

@@ -214,6 +214,13 @@ fn coarse_steps(step: f64) -> String {
     )
 }
 
+/// Why a verdict from an output with steps that no modes describe is undecided.
+pub(super) fn undescribed_steps(step: f64) -> String {
+    format!(
+        "the output has steps of {step:.4e}, more than its noise, and no sum of modes describes all of its readings, so that modes may be due to the steps; increase the amplitude, or use a finer range of the probe"
+    )
+}
+
 /// A verdict that was decided from modes that are not determined, and whose residues cancel, is undecided.
 pub(super) fn unless_undetermined(verdict: Verdict, fit: &Result<ModalFit, FitError>) -> Verdict {
     let undetermined = fit.as_ref().ok().and_then(ModalFit::undetermined_modes);

@@ -5,13 +5,20 @@ use std::borrow::Cow;
 use crate::external_signals::ExternalSignals;
 use crate::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{Observation, OtherKind, Source, describes, fit_part, part};
+use crate::observation::{Observation, OtherKind, PART_MODES, Source, describes, fit_part, part};
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::cut_within_excitation;
-use crate::record_check::{Defect, Resolution, StrayLine};
+use crate::record_check::{Defect, Ends, Resolution, StrayLine};
+use crate::rounded::{RoundedFit, RoundedSearch};
 use crate::{Frf, IdentifyError, Signals};
-use bench_plant::OutputKind;
+use bench_plant::{OutputKind, SignalPath};
+
+/// Number of responses with whose modes the search for those of a rounded output begins.
+const MAX_RESPONSES: usize = 4;
+
+/// Number of modes that the search for those of a rounded output adds by one response.
+const MORE_MODES: usize = 4;
 
 /// What the user states of external signals.
 pub(super) struct Stated {
@@ -105,6 +112,67 @@ impl<'a> Prepared<'a> {
     /// Whether the record has no defect, and all of its excitation.
     pub(super) fn is_sound(&self) -> bool {
         self.defects.is_empty() && self.cut.is_none()
+    }
+
+    /// The step of an output that can be simulated, if its noise does not make the rounding errors a noise.
+    pub(super) fn rounded_step(&self) -> Option<f64> {
+        self.step_and_path().map(|(step, _)| step)
+    }
+
+    /// The modes of the greatest likelihood of a rounded output, if they describe its readings.
+    ///
+    /// The search begins with a few modes of the response, which the steps distort, and goes on with those of the response of the expected
+    /// output before rounding.
+    pub(super) fn rounded_fit(&self) -> Option<RoundedFit> {
+        let (step, path) = self.step_and_path()?;
+        let mut search = RoundedSearch::new(self.record.signals, step, path);
+        let mut orders =
+            modal::rising_orders(&part(&self.frf.data), &self.assumed, PART_MODES).ok()?;
+        for _ in 0..MAX_RESPONSES {
+            search.try_modes(orders);
+            if let Some(found) = search.result(self.band_hz) {
+                return Some(found);
+            }
+            let (output, modes) = search.unrounded()?;
+            let data = part(&self.response_of(output).ok()?.data);
+            let max_modes = modes.modes.len() + MORE_MODES;
+            orders = modal::grown_orders(&data, &self.assumed, modes, max_modes).ok()?;
+        }
+        None
+    }
+
+    /// The step of the output, and the path from its input. The output must be a position that follows from a held input alone, from rest
+    /// to rest.
+    fn step_and_path(&self) -> Option<(f64, &SignalPath)> {
+        let is_open = self.record.reference.is_none() && self.record.ends == Ends::Rest;
+        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
+        match &self.assumed {
+            MeasurementChain::Bench(path)
+                if is_open && is_sound && path.output == OutputKind::Position =>
+            {
+                let step = self.resolution.output?;
+                (!self.resolution.is_dithered).then_some((step, path))
+            }
+            _ => None,
+        }
+    }
+
+    /// The response of the record with another output.
+    pub(super) fn response_of(&self, output: Vec<f64>) -> Result<Frf, IdentifyError> {
+        let signals = &Signals {
+            output,
+            ..self.record.signals.clone()
+        };
+        let record = ExternalSignals {
+            signals,
+            ..self.record
+        };
+        record.response(self.band_hz)
+    }
+
+    /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
+    pub(super) fn judged_up_to_rad_s(&self) -> f64 {
+        2.0 * std::f64::consts::PI * self.band_hz.1
     }
 
     /// Whether a few modes describe a part of the response.

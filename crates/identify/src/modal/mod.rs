@@ -53,6 +53,7 @@ use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 pub use crate::{Estimate, SIGMAS_95};
 pub use merge::merged;
+pub(crate) use prune::sigmas_of_residues;
 use prune::{pruned, without_least_certain};
 use refine::refine;
 use residual_noise::with_residual_noise;
@@ -107,6 +108,32 @@ pub(crate) fn fit_few(
 ) -> Result<ModalFit, FitError> {
     let progress = &mut |_| ControlFlow::Continue(());
     fit_up_to(data, chain, residues, max_modes, progress)
+}
+
+/// The modes of all significant orders with real residues, at most `max_modes`, and those with one more mode, whether or not the data
+/// determine all of their parameters.
+pub(crate) fn rising_orders(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    max_modes: usize,
+) -> Result<Vec<ModalParameters>, FitError> {
+    let nodes = &chain.nodes(data, 0.0);
+    let problem = Problem { chain, data, nodes };
+    let progress = &mut |_| ControlFlow::Continue(());
+    let found = search::orders(problem, &Residues::Real, max_modes, progress)?;
+    Ok(found.parameters())
+}
+
+/// As [`rising_orders`], from given modes on.
+pub(crate) fn grown_orders(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    start: &ModalParameters,
+    max_modes: usize,
+) -> Result<Vec<ModalParameters>, FitError> {
+    let nodes = &chain.nodes(data, start.delay_s);
+    let found = search::grown(Problem { chain, data, nodes }, start, max_modes)?;
+    Ok(found.parameters())
 }
 
 /// As [`fit_with_progress`], with residues of this kind and at most `max_modes` modes.

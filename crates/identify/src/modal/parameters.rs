@@ -259,13 +259,13 @@ impl ModalParameters {
     }
 
     /// The parameters without one mode.
-    pub(super) fn without_mode(&self, index: usize) -> ModalParameters {
+    pub(crate) fn without_mode(&self, index: usize) -> ModalParameters {
         let others: Vec<usize> = (0..self.modes.len()).filter(|k| *k != index).collect();
         self.selected(&others)
     }
 
     /// The parameters with the lowest frequency first.
-    pub(super) fn by_rising_frequency(self) -> ModalParameters {
+    pub(crate) fn by_rising_frequency(self) -> ModalParameters {
         let omega = |k: &usize| self.modes[*k].omega_rad_s;
         let mut order: Vec<usize> = (0..self.modes.len()).collect();
         order.sort_by(|a, b| omega(a).total_cmp(&omega(b)));
@@ -401,7 +401,7 @@ impl ModalParameters {
     }
 
     /// The parameters after a step in ln w, ln zeta, r, q, R and tau, limited to what is possible.
-    pub(super) fn moved(&self, free: &[Parameter], step: &DVector<f64>) -> ModalParameters {
+    pub(crate) fn moved(&self, free: &[Parameter], step: &DVector<f64>) -> ModalParameters {
         let mut next = self.clone();
         for (parameter, step) in free.iter().zip(step.iter()) {
             next.change(*parameter, *step);

@@ -92,7 +92,10 @@ fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<(usize, f6
 }
 
 /// Each residue as a multiple of its standard deviation; of a complex one the larger multiple of r and q.
-fn sigmas_of_residues(parameters: &ModalParameters, covariance: &DMatrix<f64>) -> Vec<f64> {
+pub(crate) fn sigmas_of_residues(
+    parameters: &ModalParameters,
+    covariance: &DMatrix<f64>,
+) -> Vec<f64> {
     let (free, values) = (parameters.free(), parameters.free_values());
     let mut sigmas = vec![0.0; parameters.modes.len()];
     for (i, parameter) in free.iter().enumerate() {

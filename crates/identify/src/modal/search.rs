@@ -97,6 +97,15 @@ pub(super) struct Found {
     pub(super) one_more_mode: Option<OneMoreMode>,
 }
 
+impl Found {
+    /// The parameters of all orders, and those with one more mode.
+    pub(super) fn parameters(self) -> Vec<ModalParameters> {
+        let orders = self.orders.into_iter().map(|order| order.parameters);
+        let more = self.one_more_mode.map(|more| more.parameters);
+        orders.chain(more).collect()
+    }
+}
+
 /// All orders that are significant, from one mode on to `max_modes`, and the best one with one more mode.
 ///
 /// A relative error is added to the noise: a large one first, then a small one, then none. So modes are found in the order of
@@ -122,6 +131,29 @@ pub(super) fn orders(
     for pass in finer {
         search.run(pass, problem)?;
     }
+    Ok(Found {
+        orders: search.orders,
+        one_more_mode: search.one_more_mode,
+    })
+}
+
+/// The significant orders from given modes on, to which modes are added.
+pub(super) fn grown(
+    problem: Problem<'_>,
+    start: &ModalParameters,
+    max_modes: usize,
+) -> Result<Found, FitError> {
+    let mut search = Search {
+        residues: &Residues::Real,
+        max_modes,
+        orders: Vec::new(),
+        one_more_mode: None,
+        parameters: start.clone(),
+        done: 0.0,
+        progress: &mut |_| ControlFlow::Continue(()),
+    };
+    let [.., last] = &PASSES;
+    search.run(last, problem)?;
     Ok(Found {
         orders: search.orders,
         one_more_mode: search.one_more_mode,

@@ -25,6 +25,10 @@ const STARTS: [f64; 3] = [0.02, 0.01, 0.0];
 /// The resolution of an input matters if its step exceeds this ratio of the range: its error, q/sqrt(12), is then 0.03 % of it.
 const COARSE_RANGE_RATIO: f64 = 1e-3;
 
+/// Noise and rounding errors above this ratio of the step, with step^2/12 of rounding: the noise alone is then above 0.53 steps, and the
+/// mean of readings follows the true value to exp(-2 pi^2 0.53^2)/pi = 0.1 % of a step.
+const DITHER_STEPS: f64 = 0.6;
+
 /// The steps of the channels, in their units, as far as they exceed the noise.
 ///
 /// Rounding adds noise of variance q^2/12, which the analysis measures with all other noise.
@@ -35,6 +39,8 @@ pub struct Resolution {
     pub input: Option<f64>,
     /// Step of the output, if it exceeds the standard deviation of its noise.
     pub output: Option<f64>,
+    /// Whether the noise of the output makes its rounding errors a noise.
+    pub(crate) is_dithered: bool,
 }
 
 impl Resolution {
@@ -42,9 +48,11 @@ impl Resolution {
     pub fn of(signals: &Signals) -> Resolution {
         let coarse = |step: &f64| *step > COARSE_RANGE_RATIO * range(&signals.input);
         let noise = Prediction::new(signals, 0.0).map_or(0.0, |prediction| prediction.noise());
+        let output = step(&signals.output).filter(|step| *step > noise);
         Resolution {
             input: step_of_many_levels(&signals.input).filter(coarse),
-            output: step(&signals.output).filter(|step| *step > noise),
+            output,
+            is_dithered: output.is_some_and(|step| noise > DITHER_STEPS * step),
         }
     }
 

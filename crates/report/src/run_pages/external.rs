@@ -107,6 +107,10 @@ impl<'a> ExternalRecord<'a> {
             ("Times", Some(self.times.to_string())),
             ("Resolution", self.analysis.resolution.description()),
             (
+                "Rounding",
+                self.analysis.rounded.map(|rounded| rounded.description()),
+            ),
+            (
                 "Corrected",
                 Correction::description(&self.analysis.corrections),
             ),

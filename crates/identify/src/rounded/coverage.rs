@@ -1,0 +1,80 @@
+//! The frequencies up to which rounded readings show the modes of a stage.
+//!
+//! Where the output moves by less than a step, readings may not change at all, and a mode there is not seen. A trial mode of residue 1 at a
+//! frequency w gives the standard deviation with which the readings show its residue:
+//!
+//! ```text
+//! sigma_r = (sum of I o^2/s^2)^-1/2       I: information of a reading, s: noise, o: output of the trial mode near its resonance
+//! seen:     5 sigma_r/(2 zeta w^2) < |G(j w)|                      a mode as narrow as the narrowest one, with a peak as high as the response around w
+//! ```
+//!
+//! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis.
+
+use nalgebra::Complex;
+
+use super::refine::{Likeliest, RoundedRecord};
+use bench_plant::zeros::ModalSum;
+
+/// Zeros may lie below a mode that is not seen, but not much below it: those beside it, as the response around it is that of other modes.
+const BELOW_UNSEEN: f64 = 0.95;
+/// Number of trial modes in the band.
+const TRIALS: usize = 60;
+/// The response is the largest one within this ratio of the frequency, because it vanishes near a zero.
+const AROUND: f64 = 1.1;
+/// Number of frequencies at which it is looked for.
+const NODES: usize = 11;
+/// Near its resonance the output of a mode is above this ratio of its largest value.
+const NEAR_RESONANCE: f64 = 0.3;
+/// A residue of as many standard deviations is seen.
+const SEEN_SIGMAS: f64 = 5.0;
+
+impl RoundedRecord<'_> {
+    /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen, at most `to_rad_s`.
+    pub(super) fn seen_up_to_rad_s(
+        &self,
+        found: &Likeliest,
+        (from_rad_s, to_rad_s): (f64, f64),
+    ) -> Option<f64> {
+        let sum = found.parameters.sum().ok()?;
+        let zeta = least_damping(found);
+        let ratio = (to_rad_s / from_rad_s).powf(1.0 / TRIALS as f64);
+        let mut seen_rad_s = from_rad_s;
+        for k in 1..=TRIALS {
+            let trial_rad_s = from_rad_s * ratio.powi(k as i32);
+            let delay_s = found.parameters.delay_s;
+            let output = self.simulation.of_mode(trial_rad_s, zeta, delay_s);
+            let sigma_per_kg = found.sigma / information(&output, &found.information).sqrt();
+            let peak = SEEN_SIGMAS * sigma_per_kg / (2.0 * zeta * trial_rad_s * trial_rad_s);
+            let is_seen = peak < largest_around(&sum, trial_rad_s);
+            if !is_seen {
+                return Some(from_rad_s.max(BELOW_UNSEEN * seen_rad_s));
+            }
+            seen_rad_s = trial_rad_s;
+        }
+        Some(seen_rad_s)
+    }
+}
+
+/// The sum of I o^2 over the readings in which the output of a mode is not small. Far from its resonance the residual of modes beyond the
+/// band can take its place.
+fn information(output: &[f64], of_readings: &[f64]) -> f64 {
+    let largest = output.iter().fold(0.0_f64, |max, y| max.max(y.abs()));
+    let pairs = output.iter().zip(of_readings);
+    let near_resonance = pairs.filter(|(y, _)| y.abs() > NEAR_RESONANCE * largest);
+    near_resonance
+        .map(|(y, information)| y * y * information)
+        .sum()
+}
+
+/// The largest magnitude of the response around a frequency.
+fn largest_around(sum: &ModalSum, omega_rad_s: f64) -> f64 {
+    let middle = (NODES / 2) as f64;
+    let near = |k: usize| omega_rad_s * AROUND.powf((k as f64 - middle) / middle);
+    let magnitudes = (0..NODES).map(|k| sum.response(Complex::new(0.0, near(k))).norm());
+    magnitudes.fold(0.0, f64::max)
+}
+
+fn least_damping(found: &Likeliest) -> f64 {
+    let modes = found.parameters.modes.iter();
+    modes.map(|mode| mode.damping_ratio).fold(1.0, f64::min)
+}
