@@ -30,11 +30,12 @@ pub struct StopSignals {
 impl StopSignals {
     /// Installs process-wide handlers. Must be called within a tokio runtime.
     pub fn listen() -> std::io::Result<StopSignals> {
+        Listeners::lock().install_default()?;
         let kinds = stop_signals().map(SignalKind::from_raw);
         let signals: std::io::Result<_> = kinds.map(signal).collect();
         Ok(StopSignals {
             signals: signals?,
-            _listener: Listener::begin()?,
+            _listener: Listener::begin(),
         })
     }
 
@@ -68,13 +69,14 @@ impl SignalFlags {
     /// # Errors
     /// When the system refuses a handler.
     pub(super) fn set(flags: &StopFlags) -> std::io::Result<SignalFlags> {
+        Listeners::lock().install_default()?;
         let mut actions = Actions(Vec::new());
         for (number, flag) in stop_signals().zip(flags.flags()) {
             actions.0.push(register(number, Arc::clone(flag))?);
         }
         Ok(SignalFlags {
             _actions: actions,
-            _listener: Listener::begin()?,
+            _listener: Listener::begin(),
         })
     }
 }
@@ -89,7 +91,8 @@ impl Drop for Actions {
 
 /// Part of the program that waits for a stop signal. Without one, a stop signal ends the process as it does without handlers.
 ///
-/// It begins when its handlers are installed: a signal that arrives before ends the process. In the other order it would be lost.
+/// It begins when its handlers are installed: a signal that arrives before ends the process. In the other order it would be lost. The
+/// default action is installed before them ([`Listeners::install_default`]).
 struct Listener;
 
 /// Whether nothing in the program waits for a stop signal.
@@ -107,12 +110,11 @@ struct Listeners {
 }
 
 impl Listener {
-    fn begin() -> std::io::Result<Listener> {
+    fn begin() -> Listener {
         let mut listeners = Listeners::lock();
-        listeners.install_default()?;
         NO_LISTENER.store(false, Ordering::SeqCst);
         listeners.count += 1;
-        Ok(Listener)
+        Listener
     }
 }
 
@@ -130,10 +132,14 @@ impl Listeners {
     }
 
     /// A handler stays installed after its listener has gone, and would swallow the signal.
+    ///
+    /// Actions of a signal run in the order of their installation, and this one before those that wake a listener: a thread that is woken
+    /// may end its listener while the actions still run, and the default action after that would end the process.
     fn install_default(&mut self) -> std::io::Result<()> {
         if self.have_default {
             return Ok(());
         }
+        NO_LISTENER.store(self.count == 0, Ordering::SeqCst);
         for number in stop_signals() {
             register_conditional_default(number, &NO_LISTENER)?;
         }
