@@ -60,7 +60,7 @@ pub use loop_plant::{LoopPlant, LoopPlantState, PathResponse, SignalPath};
 pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
 pub use matrix_exponential::matrix_exponential;
 pub use modal::{ModalSettings, ModeSettings};
-pub use modes::{ModalModel, Mode, Sign};
+pub use modes::{FAR_RAD_S, ModalModel, Mode, Sign};
 pub use output_kind::OutputKind;
 pub use own::{OwnPlant, register_plant};
 pub use port::{Port, PortWeights};

@@ -6,6 +6,10 @@ use serde::Serialize;
 use super::linear_algebra::modes;
 use super::{PlantError, Structure};
 
+/// Natural frequency in rad/s of a mode far above all frequencies of interest: it acts as a constant compliance of
+/// r/FAR_RAD_S^2 in m/N, with r its residue in 1/kg.
+pub const FAR_RAD_S: f64 = 1e6;
+
 /// One mode of a structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mode {
@@ -24,6 +28,18 @@ pub struct Mode {
 }
 
 impl Mode {
+    /// A mode of residue 1/kg, 1/(s^2 + 2 zeta w s + w^2), without a shape and undisturbed by the floor.
+    pub fn unit(omega_rad_s: f64, damping_ratio: f64) -> Mode {
+        Mode {
+            omega_rad_s,
+            damping_ratio,
+            shape: DVector::zeros(0),
+            force_gain: 1.0,
+            sensor_gain: 1.0,
+            floor_gain: 0.0,
+        }
+    }
+
     /// The modal residue r = (c^T v)(q^T v)/(v^T M v) in 1/kg (Eq. 4-15, modal mass included).
     pub fn residue_per_kg(&self) -> f64 {
         self.force_gain * self.sensor_gain

@@ -15,12 +15,10 @@
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::unmodelled::interpolated;
-use bench_plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{FAR_RAD_S, LoopPlant, Mode, SignalPath};
 
 /// Radius of the disc that contains 95 % of a circular normal distribution, in standard deviations of one component.
 pub const DISC_SIGMAS_95: f64 = 2.447_746_830_680_816;
-/// A mode far above all frequencies of interest acts as a constant compliance.
-const FAR_RAD_S: f64 = 1e6;
 
 /// What is known of the response of an identified plant beside its modes.
 #[derive(Clone, Debug)]
@@ -39,23 +37,11 @@ pub struct IdentifiedResponse {
 pub fn loop_plant(path: &SignalPath, modes: &[Mode], remainder_m_per_n: f64) -> LoopPlant {
     let far = Mode {
         force_gain: remainder_m_per_n * FAR_RAD_S * FAR_RAD_S,
-        ..unit_mode(FAR_RAD_S, 1.0)
+        ..Mode::unit(FAR_RAD_S, 1.0)
     };
     let mut modes = modes.to_vec();
     modes.push(far);
     LoopPlant::of(path, &modes)
-}
-
-/// A mode of residue 1.
-fn unit_mode(omega_rad_s: f64, damping_ratio: f64) -> Mode {
-    Mode {
-        omega_rad_s,
-        damping_ratio,
-        shape: DVector::zeros(0),
-        force_gain: 1.0,
-        sensor_gain: 1.0,
-        floor_gain: 0.0,
-    }
 }
 
 /// Largest distance of the true response from that of the plant; none by default.
@@ -77,7 +63,7 @@ impl Uncertainty {
     /// The region of a plant with these modes, none of them a free body.
     pub fn of(plant: &IdentifiedResponse, modes: &[Mode]) -> Uncertainty {
         let alone = modes.iter().map(|mode| {
-            let unit = unit_mode(mode.omega_rad_s, mode.damping_ratio);
+            let unit = Mode::unit(mode.omega_rad_s, mode.damping_ratio);
             (mode.clone(), LoopPlant::of(&plant.path, &[unit]))
         });
         Uncertainty(Some(Region {
@@ -155,7 +141,7 @@ mod tests {
     fn mode(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> Mode {
         Mode {
             force_gain: residue_per_kg,
-            ..unit_mode(omega_rad_s, damping_ratio)
+            ..Mode::unit(omega_rad_s, damping_ratio)
         }
     }
 

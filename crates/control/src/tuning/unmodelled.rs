@@ -127,12 +127,8 @@ fn shifted(path: &SignalPath, group: &[UnmodelledMode], tolerance_ratio: f64) ->
 
 fn as_mode(mode: &UnmodelledMode, factor: f64) -> Mode {
     Mode {
-        omega_rad_s: rad_s(mode.frequency_hz) * factor,
-        damping_ratio: mode.damping_ratio,
-        shape: nalgebra::DVector::zeros(0),
         force_gain: mode.residue_per_kg,
-        sensor_gain: 1.0,
-        floor_gain: 0.0,
+        ..Mode::unit(rad_s(mode.frequency_hz) * factor, mode.damping_ratio)
     }
 }
 

@@ -25,14 +25,12 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::DVector;
-
 use super::analysis_error::AnalysisError;
 use bench_config::Config;
 use bench_excitation::Sweep;
 use bench_identify::modal::ModalFit;
 use bench_identify::{Frf, PHASE_SIGMA_LIMIT_RAD, Signals};
-use bench_plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{FAR_RAD_S, LoopPlant, Mode, SignalPath};
 
 /// Largest ratio of missing ticks of a run: a round then reduces the error of the positions to about a twentieth.
 pub(super) const MAX_RATIO: f64 = 0.05;
@@ -54,8 +52,6 @@ const ROUNDS_OF_SINGLE: usize = 2;
 /// Number of predictions with longer gaps. Straight lines through gaps of ten ticks are wrong by the whole amplitude, so that the first
 /// fits have too many modes: the third one still changes the result.
 const ROUNDS: usize = 4;
-/// A mode far above all frequencies of interest acts as a constant compliance.
-const FAR_RAD_S: f64 = 1e6;
 
 /// Missing ticks of the signals of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -207,12 +203,8 @@ fn positions_m(fit: &ModalFit, path: &SignalPath, command_a: &[f64]) -> Vec<f64>
 
 fn mode(omega_rad_s: f64, damping_ratio: f64, residue_per_kg: f64) -> Mode {
     Mode {
-        omega_rad_s,
-        damping_ratio,
-        shape: DVector::zeros(0),
-        force_gain: 1.0,
         sensor_gain: residue_per_kg,
-        floor_gain: 0.0,
+        ..Mode::unit(omega_rad_s, damping_ratio)
     }
 }
 

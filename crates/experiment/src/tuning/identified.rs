@@ -1,6 +1,6 @@
 //! The plant of a measured response: fitted modes, and the distance of the response from them.
 
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
 use super::distinct::{check_distinct, check_modes};
@@ -284,12 +284,8 @@ fn modes_of(fit: &ModalFit, roles: &[ModeRole], is_used: impl Fn(ModeRole) -> bo
     let terms = fit.parameters.modes.iter().zip(roles);
     let used = terms.filter(|(_, role)| is_used(**role));
     used.map(|(term, _)| Mode {
-        omega_rad_s: term.omega_rad_s,
-        damping_ratio: term.damping_ratio,
-        shape: DVector::zeros(0),
         force_gain: term.residue_per_kg,
-        sensor_gain: 1.0,
-        floor_gain: 0.0,
+        ..Mode::unit(term.omega_rad_s, term.damping_ratio)
     })
     .collect()
 }

@@ -1,13 +1,10 @@
 //! The measurement chain through which the mechanics are observed.
 
-use nalgebra::{Complex, DVector};
+use nalgebra::Complex;
 
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
-use bench_plant::{LoopPlant, Mode, OutputKind, PathResponse, SignalPath};
-
-/// A mode far above all frequencies of interest acts as a constant compliance: the contribution of modes above the band.
-const FAR_RAD_S: f64 = 1e6;
+use bench_plant::{FAR_RAD_S, LoopPlant, Mode, OutputKind, PathResponse, SignalPath};
 
 /// The signal path between set-point and reading, without the mechanics.
 ///
@@ -390,14 +387,7 @@ impl MeasurementChain {
 
     /// A mode of residue 1 at this chain.
     fn observed(&self, omega_rad_s: f64, damping_ratio: f64) -> ObservedMode {
-        let mode = Mode {
-            omega_rad_s,
-            damping_ratio,
-            shape: DVector::zeros(0),
-            force_gain: 1.0,
-            sensor_gain: 1.0,
-            floor_gain: 0.0,
-        };
+        let mode = Mode::unit(omega_rad_s, damping_ratio);
         let plant = match self {
             MeasurementChain::Bench(path) => Some(LoopPlant::of(path, std::slice::from_ref(&mode))),
             MeasurementChain::Direct | MeasurementChain::Input(..) => None,

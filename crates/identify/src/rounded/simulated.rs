@@ -1,13 +1,9 @@
 //! The output of a sum of modes to a held input from rest, in time, with its derivatives to the parameters.
 
-use nalgebra::DVector;
-
 use crate::modal::{ModalParameters, Parameter};
 use bench_plant::zeros::ModalTerm;
-use bench_plant::{LoopPlant, Mode, SignalPath};
+use bench_plant::{FAR_RAD_S, LoopPlant, Mode, SignalPath};
 
-/// A mode far above all frequencies acts as a constant compliance.
-const FAR_RAD_S: f64 = 1e6;
 /// Change of the logarithm of a parameter for a derivative. Its error is about the square, 1e-10, and rounding over it, 1e-11.
 const CHANGE: f64 = 1e-5;
 /// Change of the delay for its derivative, as a ratio of the period.
@@ -84,14 +80,7 @@ impl Simulation<'_> {
 
     /// The output of a mode of residue 1.
     pub(super) fn of_mode(&self, omega_rad_s: f64, damping_ratio: f64, delay_s: f64) -> Vec<f64> {
-        let mode = Mode {
-            omega_rad_s,
-            damping_ratio,
-            shape: DVector::zeros(0),
-            force_gain: 1.0,
-            sensor_gain: 1.0,
-            floor_gain: 0.0,
-        };
+        let mode = Mode::unit(omega_rad_s, damping_ratio);
         let whole_s = self.path.mean_delay_s() + delay_s;
         if whole_s >= 0.0 {
             return self.delayed(&mode, whole_s);
