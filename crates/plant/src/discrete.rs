@@ -182,7 +182,13 @@ impl DiscreteMode {
     }
 
     /// The state after a period.
-    fn advanced(&self, x: [f64; 2], current_a: f64, setpoint_a: f64, force: f64) -> [f64; 2] {
+    pub(super) fn advanced(
+        &self,
+        x: [f64; 2],
+        current_a: f64,
+        setpoint_a: f64,
+        force: f64,
+    ) -> [f64; 2] {
         [0, 1].map(|i| {
             self.a[i][0] * x[0]
                 + self.a[i][1] * x[1]

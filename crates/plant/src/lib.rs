@@ -29,6 +29,7 @@ mod damping;
 mod discrete;
 mod error;
 mod input_kind;
+mod lifted;
 pub mod linear_algebra;
 mod loop_plant;
 mod lumped;

@@ -27,6 +27,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::discrete::zero_system;
+use super::lifted::{BLOCK, LiftedMode, Output};
 use super::{DiscretePlant, Mode, OutputKind, PlantState};
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
@@ -276,6 +277,20 @@ impl LoopPlant {
         self.held.step(&mut state.plant, command_a, |_| 0.0);
     }
 
+    /// The readings of all ticks from rest, in metres, of a known sequence of commands in amperes: those of
+    /// [`LoopPlant::reading_m`] and [`LoopPlant::step`] at each tick but for rounding, four times as fast for one mode. With an advance, which
+    /// a loop cannot read, they are the readings that belong to the response.
+    pub fn readings_m(&self, commands_a: &[f64]) -> Vec<f64> {
+        let mut readings_m = vec![0.0; commands_a.len() + BLOCK + self.longest()];
+        for (index, mode) in self.held.modes.iter().enumerate() {
+            let outputs: Vec<Output> = self.taps.iter().map(|tap| tap.of_mode(index)).collect();
+            let mode = LiftedMode::new(mode, self.held.lag, &outputs);
+            mode.add_to(&mut readings_m, commands_a);
+        }
+        readings_m.truncate(commands_a.len());
+        readings_m
+    }
+
     /// Periods of the longest tap.
     fn longest(&self) -> usize {
         self.taps.iter().map(|tap| tap.periods).max().unwrap_or(0)
@@ -342,6 +357,20 @@ impl Tap {
         let rows = self.rows.iter().zip(&state.states);
         let moved: f64 = rows.map(|(c, x)| c[0] * x[0] + c[1] * x[1]).sum();
         moved + self.current * state.current_a + self.setpoint * setpoint_a
+    }
+
+    /// The part of one mode. The current and the set-point, which are those of all modes, are added to that of the first one.
+    fn of_mode(&self, index: usize) -> Output {
+        let (current, setpoint) = match index {
+            0 => (self.current, self.setpoint),
+            _ => (0.0, 0.0),
+        };
+        Output {
+            periods: self.periods,
+            row: self.rows[index],
+            current,
+            setpoint,
+        }
     }
 
     fn add_row(&self, matrix: &mut DMatrix<f64>, row: usize) {

@@ -101,14 +101,7 @@ impl Simulation<'_> {
             delays_s: vec![delay_s],
             ..self.path.clone()
         };
-        let plant = LoopPlant::of(&path, std::slice::from_ref(mode));
-        let mut state = plant.at_rest();
-        let sample = |u: &f64| {
-            let reading = plant.reading_m(&state);
-            plant.step(&mut state, *u);
-            reading
-        };
-        self.input.iter().map(sample).collect()
+        LoopPlant::of(&path, std::slice::from_ref(mode)).readings_m(self.input)
     }
 
     /// The output of a constant compliance of 1 m/N.

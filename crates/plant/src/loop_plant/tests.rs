@@ -24,13 +24,21 @@ fn mode() -> Mode {
 
 fn plant(output: OutputKind, amplifier_bandwidth_hz: f64, delay_s: f64) -> LoopPlant {
     let path = SignalPath {
+        delays_s: vec![delay_s],
+        ..path(output, amplifier_bandwidth_hz)
+    };
+    LoopPlant::of(&path, &[mode()])
+}
+
+/// A path without a delay.
+fn path(output: OutputKind, amplifier_bandwidth_hz: f64) -> SignalPath {
+    SignalPath {
         period_s: PERIOD_S,
         amplifier_bandwidth_hz,
         force_constant_n_per_a: FORCE_CONSTANT_N_PER_A,
-        delays_s: vec![delay_s],
+        delays_s: vec![0.0],
         output,
-    };
-    LoopPlant::of(&path, &[mode()])
+    }
 }
 
 fn z_at(omega_rad_s: f64) -> Complex<f64> {
@@ -199,4 +207,92 @@ fn state_space_has_the_response_of_each_output() {
             }
         }
     }
+}
+
+/// A free body and two modes.
+fn several_modes() -> [Mode; 3] {
+    let term = |w, zeta, residue_per_kg| Mode {
+        sensor_gain: residue_per_kg,
+        ..Mode::unit(w, zeta)
+    };
+    [
+        term(0.0, 0.0, 0.3),
+        term(120.0, 0.01, 0.5),
+        term(OMEGA_RAD_S, DAMPING_RATIO, -0.4),
+    ]
+}
+
+/// A sweep from 0 to 120 Hz in 2 s with a constant part; no whole number of blocks.
+fn sweep_a() -> Vec<f64> {
+    let phase = |t: f64| 2.0 * std::f64::consts::PI * 30.0 * t * t;
+    (0..2002)
+        .map(|k| 0.1 + phase(f64::from(k) * PERIOD_S).sin())
+        .collect()
+}
+
+fn readings_one_by_one(plant: &LoopPlant, commands_a: &[f64]) -> Vec<f64> {
+    let mut state = plant.at_rest();
+    let next = |command_a: &f64| {
+        let reading_m = plant.reading_m(&state);
+        plant.step(&mut state, *command_a);
+        reading_m
+    };
+    commands_a.iter().map(next).collect()
+}
+
+fn assert_readings(found: &[f64], expected: &[f64], what: &str) {
+    // A step rounds a state by some 4 times 1.1e-16 of its largest value. N such errors add up at most: in the position of a mode
+    // directly, in that of a free body through its velocity, whose error moves it during the steps that follow, as the velocity itself
+    // does. So the difference of two ways is below 2 * 4 * 1.1e-16 N of the largest state, which is at most some 10 times the largest
+    // reading: 1.8e-11 with N = 2002.
+    let largest = expected.iter().fold(0.0_f64, |max, y| max.max(y.abs()));
+    assert!(largest > 0.0 && found.len() == expected.len(), "{what}");
+    for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+        let error = (found - expected).abs() / largest;
+        assert!(error < 1.8e-11, "{what}, tick {k}: {found} {expected}");
+    }
+}
+
+#[test]
+fn readings_of_a_sequence_are_those_of_its_ticks() {
+    let delays = [0.0, 0.4, 1.0, 2.3].map(|periods| vec![periods * PERIOD_S]);
+    // A probe with its own clock, of 1.7 periods: its readings arrive after one to three ticks, or at the tick itself without a least delay.
+    let probes = [0.0, 0.6].map(|periods| {
+        let mut delays_s = SignalPath::delays_of_probe_s(periods * PERIOD_S, Some(1.7 * PERIOD_S));
+        delays_s.push(0.0);
+        delays_s
+    });
+    for output in OutputKind::ALL {
+        for amplifier_bandwidth_hz in [200.0, f64::INFINITY] {
+            for delays_s in delays.iter().chain(&probes).cloned() {
+                let what = format!("{output:?} {amplifier_bandwidth_hz} Hz {delays_s:?}");
+                let path = SignalPath {
+                    delays_s,
+                    ..path(output, amplifier_bandwidth_hz)
+                };
+                let plant = LoopPlant::of(&path, &several_modes());
+                let expected = readings_one_by_one(&plant, &sweep_a());
+                assert_readings(&plant.readings_m(&sweep_a()), &expected, &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn readings_with_an_advance_are_those_of_the_next_tick_with_a_delay() {
+    for output in OutputKind::ALL {
+        let readings_m = |periods: f64| {
+            let plant = plant(output, 200.0, periods * PERIOD_S);
+            plant.readings_m(&sweep_a())
+        };
+        let (early, late) = (readings_m(-0.25), readings_m(0.75));
+        assert_readings(&early[..2001], &late[1..], &format!("{output:?}"));
+    }
+}
+
+#[test]
+fn sequence_that_ends_before_the_first_arrival_has_readings_of_rest() {
+    let plant = plant(OutputKind::Position, 200.0, 5.3 * PERIOD_S);
+    assert_eq!(plant.readings_m(&[1.0; 3]), [0.0; 3]);
+    assert!(plant.readings_m(&[]).is_empty());
 }
