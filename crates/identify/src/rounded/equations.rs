@@ -25,26 +25,15 @@ impl Equations {
         sigma: f64,
     ) -> Equations {
         let n = columns.len();
-        let mut matrix = DMatrix::zeros(n, n);
-        let informative: Vec<usize> = (0..information.len())
-            .filter(|k| information[*k] > 0.0)
-            .collect();
-        for i in 0..n {
-            for j in 0..=i {
-                let products = informative
-                    .iter()
-                    .map(|k| columns[i][*k] * columns[j][*k] * information[*k]);
-                matrix[(i, j)] = products.sum::<f64>() / (sigma * sigma);
-                matrix[(j, i)] = matrix[(i, j)];
-            }
-        }
+        let weighted = weighted(columns, &information, sigma);
+        let matrix = weighted.tr_mul(&weighted);
         let right = DVector::from_fn(n, |i, _| {
             let products = columns[i].iter().zip(&scores).map(|(x, g)| x * g);
             products.sum::<f64>() / sigma
         });
         let scale = matrix
             .diagonal()
-            .map(|d: f64| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
         let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
         Equations {
             matrix: scaled,
@@ -73,4 +62,17 @@ impl Equations {
             inverse[(i, j)] * self.scale[i] * self.scale[j]
         }))
     }
+}
+
+/// sqrt(I) J/s, of the readings that have information.
+fn weighted(columns: &[Vec<f64>], information: &[f64], sigma: f64) -> DMatrix<f64> {
+    let readings = information.iter().enumerate();
+    let informative = readings.filter(|(_, information)| **information > 0.0);
+    let weights: Vec<(usize, f64)> = informative
+        .map(|(k, information)| (k, information.sqrt() / sigma))
+        .collect();
+    let elements = columns
+        .iter()
+        .flat_map(|column| weights.iter().map(|(k, weight)| column[*k] * weight));
+    DMatrix::from_iterator(weights.len(), columns.len(), elements)
 }

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::cell::{Cell, information};
 use super::equations::Equations;
-use super::simulated::Simulation;
+use super::simulated::{Parts, Simulation};
 use crate::modal::{ModalParameters, Parameter};
 
 /// Largest number of steps.
@@ -86,6 +86,8 @@ impl Likeliest {
 struct Trial {
     parameters: ModalParameters,
     drift: Drift,
+    /// The parts of the output.
+    parts: Parts,
     output: Vec<f64>,
 }
 
@@ -100,9 +102,9 @@ impl RoundedRecord<'_> {
     ///
     /// If too few readings are uncertain to measure the noise, it is taken as that with which enough are.
     pub(super) fn likeliest(&self, start: ModalParameters) -> Option<Likeliest> {
-        let mut trial = self.trial(start, [0.0; 2]);
+        let mut trial = self.trial(start, [0.0; 2], &Parts::default());
         trial.drift = self.mean_drift(&trial.output);
-        let from = self.trial(trial.parameters, trial.drift);
+        let from = self.trial(trial.parameters, trial.drift, &trial.parts);
         let least = SIGMA_STEPS.0 * self.step;
         let found = self.climbed(from, self.step, least);
         let informative = self.informative_sigma(&found);
@@ -139,7 +141,8 @@ impl RoundedRecord<'_> {
             }
         }
         // A mode may have moved past its neighbours.
-        best.parameters = best.parameters.by_rising_frequency();
+        let rising = best.parameters.by_rising_frequency();
+        let best = self.trial(rising, best.drift, &best.parts);
         Climbed {
             sigma: sigma_of(&best.output, sigma, FINE),
             trial: best,
@@ -188,8 +191,10 @@ impl RoundedRecord<'_> {
         })
     }
 
-    fn trial(&self, parameters: ModalParameters, drift: Drift) -> Trial {
-        let mut output = self.simulation.output(&parameters);
+    /// A model with its output, of which parts may be those of the model before.
+    fn trial(&self, parameters: ModalParameters, drift: Drift, before: &Parts) -> Trial {
+        let parts = self.simulation.parts(&parameters, before);
+        let mut output = parts.sum(&parameters);
         let count = output.len();
         for (k, y) in output.iter_mut().enumerate() {
             *y += drift_at(drift, k, count);
@@ -197,6 +202,7 @@ impl RoundedRecord<'_> {
         Trial {
             parameters,
             drift,
+            parts,
             output,
         }
     }
@@ -216,7 +222,7 @@ impl RoundedRecord<'_> {
             from.drift[0] + step[free.len()],
             from.drift[1] + step[free.len() + 1],
         ];
-        self.trial(parameters, drift)
+        self.trial(parameters, drift, &from.parts)
     }
 
     pub(super) fn log_probability(&self, output: &[f64], sigma: f64) -> f64 {
@@ -251,7 +257,7 @@ impl RoundedRecord<'_> {
     }
 
     fn equations(&self, at: &Trial, sigma: f64) -> Equations {
-        let columns = self.columns(&at.parameters);
+        let columns = self.columns(at);
         let scores: Vec<f64> = self
             .readings
             .iter()
@@ -263,9 +269,9 @@ impl RoundedRecord<'_> {
     }
 
     /// The derivatives of the readings to the free parameters, with w and zeta by their logarithms, and to both parts of the drift.
-    fn columns(&self, parameters: &ModalParameters) -> Vec<Vec<f64>> {
+    fn columns(&self, at: &Trial) -> Vec<Vec<f64>> {
         let count = self.readings.len();
-        let mut columns = self.simulation.derivatives(parameters);
+        let mut columns = self.simulation.derivatives(&at.parameters, &at.parts);
         columns.push(vec![1.0; count]);
         columns.push((0..count).map(|k| ramp(k, count)).collect());
         columns
