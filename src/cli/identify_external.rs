@@ -61,7 +61,7 @@ struct Report {
     noise_before_rounding: Option<f64>,
     #[serde(skip)]
     rounded: Option<RoundedOutput>,
-    /// Spikes and steps of the output that were corrected.
+    /// Spikes and steps of the output that were corrected, and samples that were left out.
     corrections: Vec<Correction>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
     clock_skew_ppm: Option<f64>,
@@ -169,7 +169,9 @@ impl Report {
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
-            noise_before_rounding: analysis.rounded.map(|rounded| rounded.sigma),
+            noise_before_rounding: analysis
+                .rounded
+                .and_then(|rounded| rounded.noise_before_rounding()),
             rounded: analysis.rounded,
             corrections: analysis.corrections.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
@@ -217,7 +219,7 @@ impl Report {
             input_kind_text(self.input_kind),
             self.output_kind_text(),
             self.resolution_text(),
-            self.rounding_text(),
+            self.readings_text(),
             self.corrections_text(),
             self.input_path.text()
         )
@@ -265,7 +267,7 @@ impl Report {
         text.map_or_else(String::new, |text| labelled("clocks", &text))
     }
 
-    /// Spikes and steps that were corrected.
+    /// Spikes and steps that were corrected, and samples that were left out.
     fn corrections_text(&self) -> String {
         let text = Correction::description(&self.corrections);
         text.map_or_else(String::new, |text| labelled("corrected", &text))
@@ -277,10 +279,10 @@ impl Report {
         text.map_or_else(String::new, |text| labelled("resolution", &text))
     }
 
-    /// How the modes of a rounded output were found.
-    fn rounding_text(&self) -> String {
+    /// How the modes of readings were found.
+    fn readings_text(&self) -> String {
         let text = self.rounded.map(|rounded| rounded.description());
-        text.map_or_else(String::new, |text| labelled("rounding", &text))
+        text.map_or_else(String::new, |text| labelled("readings", &text))
     }
 
     /// The averaged periods and the distortion of a periodic record.

@@ -36,11 +36,11 @@ pub struct ExternalAnalysis {
     pub judged_up_to_rad_s: f64,
     /// Periods and distortion of a periodic record.
     pub periodic: Option<PeriodicPart>,
-    /// Spikes and steps of the output that were corrected before the analysis.
+    /// Spikes and steps of the output that were corrected before the analysis, and samples that were left out because they are no readings.
     pub corrections: Vec<Correction>,
     /// Steps of the values of input and output that exceed their noise.
     pub resolution: Resolution,
-    /// How the modes were found, if the output has steps above its noise, and they describe its readings.
+    /// How the modes were found in time, if the output has steps above its noise or lost readings, and they describe its readings.
     pub rounded: Option<RoundedOutput>,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
@@ -55,7 +55,7 @@ pub struct ExternalAnalysis {
 }
 
 impl ExternalAnalysis {
-    /// The analysis of a record in which spikes and steps were corrected before.
+    /// The analysis of a record in which spikes and steps were corrected before, or samples left out.
     pub(super) fn after(self, corrections: Vec<Correction>) -> ExternalAnalysis {
         ExternalAnalysis {
             verdict: self.verdict.with(Correction::description(&corrections)),

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::periodic::Repetition;
-use crate::record_check::{self, Corrected, Defect, Ends, Resolution, StrayLine};
+use crate::record_check::{self, Checked, Corrected, Defect, Ends, Resolution, StrayLine};
 use crate::remedies::{OF_LOOP, OF_SIGNALS, Remedies};
 use crate::steady_input::is_steady;
 use crate::{
@@ -103,9 +103,9 @@ impl<'a> ExternalSignals<'a> {
         }
     }
 
-    /// The first defect of each kind; `cleaned` is the record without its stray lines.
-    pub(super) fn defects(&self, cleaned: &ExternalSignals<'_>) -> Vec<Defect> {
-        record_check::defects(&self.excited(), &cleaned.excited(), self.ends)
+    /// The first defect of each kind, and the readings that are left; `cleaned` is the record without its stray lines.
+    pub(super) fn checked(&self, cleaned: &ExternalSignals<'_>) -> Checked {
+        record_check::check(&self.excited(), &cleaned.excited(), self.ends)
     }
 
     /// The signals without the spikes and steps of the output. In closed loop they are not corrected: they move the plant as well.

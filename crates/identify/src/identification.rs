@@ -226,8 +226,13 @@ impl Identification {
         &self,
         prepared: &Prepared<'_>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
+        if let Some((found, corrections)) = prepared.fit_in_time() {
+            let analysis = self.with_fit_in_time(prepared, found, !corrections.is_empty())?;
+            return Ok(analysis.after(corrections));
+        }
         if let Some(step) = prepared.rounded_step() {
-            return self.of_rounded_output(prepared, step);
+            let analysis = self.analysed(prepared, None)?;
+            return Ok(analysis.undecided_by(undescribed_steps(step)));
         }
         let record = prepared.record;
         // Many modes would be fitted to the turn of two clocks in vain.
@@ -333,24 +338,12 @@ impl Identification {
         })
     }
 
-    /// The analysis of an output with steps above its noise, which is decided only if modes describe its readings.
-    fn of_rounded_output(
-        &self,
-        prepared: &Prepared<'_>,
-        step: f64,
-    ) -> Result<ExternalAnalysis, IdentificationError> {
-        if let Some(found) = prepared.rounded_fit() {
-            return self.with_rounded_fit(prepared, found);
-        }
-        let analysis = self.analysed(prepared, None)?;
-        Ok(analysis.undecided_by(undescribed_steps(step)))
-    }
-
-    /// The analysis of a rounded output with the modes of the greatest likelihood.
-    fn with_rounded_fit(
+    /// The analysis of an output with the modes of the greatest likelihood of its readings, some of which may be lost.
+    fn with_fit_in_time(
         &self,
         prepared: &Prepared<'_>,
         found: RoundedFit,
+        loses_readings: bool,
     ) -> Result<ExternalAnalysis, IdentificationError> {
         let RoundedFit { fit, output, noise } = found;
         let gap = noise.gap(&fit);
@@ -361,19 +354,24 @@ impl Identification {
             high_hz
         };
         let band_hz = (low_hz, seen_hz);
-        let (frf, chain) = (&prepared.frf, &prepared.assumed);
+        let chain = &prepared.assumed;
         let fit = Ok(ModalFit { band_hz, ..fit });
         let why = implausible(&Observation {
             fit: &fit,
             ..prepared.with_few_modes()
         })
         .or(gap);
-        let unrounded = prepared.response_of(output)?;
+        let expected = prepared.response_of(output)?;
         let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
         let is_plausible = why.is_none();
-        let verdict = judged(why, &unrounded, &fit, chain, judged_up_to_rad_s, |_| None)?;
+        let verdict = judged(why, &expected, &fit, chain, judged_up_to_rad_s, |_| None)?;
+        let frf = if loses_readings {
+            expected
+        } else {
+            prepared.frf.clone()
+        };
         Ok(ExternalAnalysis {
-            frf: frf.clone(),
+            frf,
             verdict: verdict.with(Some(noise.description())),
             fit,
             input_path: self.input_path,
@@ -422,7 +420,10 @@ impl Identification {
             clear_kind,
             ..with_few
         };
-        let known = listed(&prepared.defects).or_else(|| known_cause(&observation));
+        let lost = prepared.why_readings_fail().into_iter();
+        let defects = prepared.defects.iter().map(ToString::to_string);
+        let known: Vec<String> = defects.chain(lost.map(str::to_owned)).collect();
+        let known = listed(&known).or_else(|| known_cause(&observation));
         // What is missing of a record that is cut is easily taken for another model.
         let is_explained = known.is_some() || prepared.cut.is_some();
         let why = known.or_else(|| implausible(&observation));

@@ -9,7 +9,9 @@ use crate::observation::{Observation, OtherKind, PART_MODES, Source, describes, 
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::cut_within_excitation;
-use crate::record_check::{Defect, Ends, Resolution, StrayLine};
+use crate::record_check::{
+    Checked, Correction, Defect, Ends, LostReadings, Reading, Resolution, StrayLine,
+};
 use crate::rounded::{RoundedFit, RoundedSearch};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{OutputKind, SignalPath};
@@ -19,6 +21,12 @@ const MAX_RESPONSES: usize = 4;
 
 /// Number of modes that the search for those of a rounded output adds by one response.
 const MORE_MODES: usize = 4;
+
+/// Readings are left, but no modes describe them.
+const NO_MODES_OF_READINGS: &str = "no sum of modes describes the other readings";
+
+/// Readings are left, but they have no simulation.
+const HOLD_MAY_HELP: &str = "a verdict from the other readings needs a position from rest to rest, and --hold zoh if each sample of the input is held until the next one";
 
 /// What the user states of external signals.
 pub(super) struct Stated {
@@ -38,6 +46,8 @@ pub(super) struct Prepared<'a> {
     pub(super) stray_lines: Vec<StrayLine>,
     pub(super) resolution: Resolution,
     pub(super) defects: Vec<Defect>,
+    /// The readings that are left, if the defects are lost ones.
+    lost: Option<LostReadings>,
     /// What is missing of a record that is cut within its excitation.
     pub(super) cut: Option<String>,
     pub(super) frf: Frf,
@@ -83,9 +93,11 @@ impl<'a> Prepared<'a> {
             requested_hz
         };
         let assumed = source.chain(stated.output_kind.unwrap_or_default(), &frf.data);
+        let Checked { defects, lost } = record.checked(&cleaned);
         Ok(Prepared {
             resolution: record.resolution(),
-            defects: record.defects(&cleaned),
+            defects,
+            lost,
             cut: cut_within_excitation(cleaned),
             other_kind: OtherKind::new(),
             few: fit_part(&part(&frf.data), &assumed),
@@ -114,18 +126,48 @@ impl<'a> Prepared<'a> {
         self.defects.is_empty() && self.cut.is_none()
     }
 
-    /// The step of an output that can be simulated, if its noise does not make the rounding errors a noise.
+    /// The step of a sound output that can be simulated, if its noise does not make the rounding errors a noise.
     pub(super) fn rounded_step(&self) -> Option<f64> {
-        self.step_and_path().map(|(step, _)| step)
+        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
+        let can_be_simulated = is_sound && self.simulated_path().is_some();
+        self.step().filter(|_| can_be_simulated)
     }
 
-    /// The modes of the greatest likelihood of a rounded output, if they describe its readings.
+    /// The modes of the greatest likelihood of the readings of an output that is rounded, or of which readings are lost, if they describe
+    /// its readings; with what is left out.
     ///
-    /// The search begins with a few modes of the response, which the steps distort, and goes on with those of the response of the expected
-    /// output before rounding.
-    pub(super) fn rounded_fit(&self) -> Option<RoundedFit> {
-        let (step, path) = self.step_and_path()?;
-        let mut search = RoundedSearch::new(self.record.signals, step, path);
+    /// Of a rounded output all readings are tried first: modes may describe those that seem to be repeated.
+    pub(super) fn fit_in_time(&self) -> Option<(RoundedFit, Vec<Correction>)> {
+        let path = self.simulated_path()?;
+        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
+        let tries_all = self.step().is_some() && (is_sound || self.lost.is_some());
+        let all_readings = || {
+            let output = self.record.signals.output.iter();
+            output.copied().map(Reading::Value).collect::<Vec<_>>()
+        };
+        let of_all = tries_all.then(|| self.fit_of_readings(&all_readings(), path));
+        if let Some(found) = of_all.flatten() {
+            return Some((found, Vec::new()));
+        }
+        let lost = self.lost.as_ref()?;
+        let found = self.fit_of_readings(&lost.readings, path)?;
+        Some((found, lost.corrections.clone()))
+    }
+
+    /// Why the readings that are left of an output have no verdict.
+    pub(super) fn why_readings_fail(&self) -> Option<&'static str> {
+        self.lost.as_ref()?;
+        Some(match self.simulated_path() {
+            Some(_) => NO_MODES_OF_READINGS,
+            None => HOLD_MAY_HELP,
+        })
+    }
+
+    /// The search begins with a few modes of the response, which steps and lost readings distort, and goes on with those of the response of
+    /// the expected output.
+    fn fit_of_readings(&self, readings: &[Reading], path: &SignalPath) -> Option<RoundedFit> {
+        let input = &self.record.signals.input;
+        let mut search = RoundedSearch::new(input, readings, self.step(), path);
         let mut orders =
             modal::rising_orders(&part(&self.frf.data), &self.assumed, PART_MODES).ok()?;
         for _ in 0..MAX_RESPONSES {
@@ -136,22 +178,27 @@ impl<'a> Prepared<'a> {
             let (output, modes) = search.unrounded()?;
             let data = part(&self.response_of(output).ok()?.data);
             let max_modes = modes.modes.len() + MORE_MODES;
-            orders = modal::grown_orders(&data, &self.assumed, modes, max_modes).ok()?;
+            orders = if search.is_grown() {
+                modal::grown_orders(&data, &self.assumed, modes, max_modes).ok()?
+            } else {
+                modal::rising_orders(&data, &self.assumed, PART_MODES).ok()?
+            };
         }
         None
     }
 
-    /// The step of the output, and the path from its input. The output must be a position that follows from a held input alone, from rest
-    /// to rest.
-    fn step_and_path(&self) -> Option<(f64, &SignalPath)> {
+    /// The step of the output, if its noise does not make the rounding errors a noise.
+    fn step(&self) -> Option<f64> {
+        let is_dithered = self.resolution.is_dithered;
+        self.resolution.output.filter(|_| !is_dithered)
+    }
+
+    /// The path from input to output of a position that follows from a held input alone, from rest to rest.
+    fn simulated_path(&self) -> Option<&SignalPath> {
         let is_open = self.record.reference.is_none() && self.record.ends == Ends::Rest;
-        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
         match &self.assumed {
-            MeasurementChain::Bench(path)
-                if is_open && is_sound && path.output == OutputKind::Position =>
-            {
-                let step = self.resolution.output?;
-                (!self.resolution.is_dithered).then_some((step, path))
+            MeasurementChain::Bench(path) if is_open && path.output == OutputKind::Position => {
+                Some(path)
             }
             _ => None,
         }

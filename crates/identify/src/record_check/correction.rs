@@ -12,6 +12,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::defect::HeldFor;
 use super::outlier::{MAX_SPIKE, Outlier, Place, Shape};
 use super::prediction::{Prediction, REACH};
 use super::resolution;
@@ -28,7 +29,8 @@ const CLEAN_PASSES: usize = 2;
 /// outliers.
 const MIN_RATIO_TO_LARGEST: f64 = 0.1;
 
-/// A spike or a step of the output that was corrected. Times are in seconds from the first sample, heights in units of the output.
+/// A spike or a step of the output that was corrected, or samples that were left out because they are no readings. Times are in seconds
+/// from the first sample, heights and values in units of the output.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[non_exhaustive]
@@ -48,6 +50,29 @@ pub enum Correction {
         time_s: f64,
         /// The height.
         height: f64,
+    },
+    /// Samples that repeat the one before them, because the probe was stuck, were left out.
+    Repeated {
+        /// Time of the first one.
+        time_s: f64,
+        /// Their number.
+        samples: usize,
+        /// In as many places.
+        places: usize,
+    },
+    /// Of samples at a limit only this was used, that the output is there or beyond.
+    Clipped {
+        /// Time of the first one.
+        time_s: f64,
+        /// The limit.
+        value: f64,
+        /// Their number.
+        samples: usize,
+    },
+    /// Only every n-th sample was used, because the probe is slower than the log.
+    Held {
+        /// n.
+        samples: usize,
     },
 }
 
@@ -71,6 +96,33 @@ impl fmt::Display for Correction {
             Correction::Step { time_s, height } => write!(
                 f,
                 "the output jumps by {height:.3e} at {time_s:.4} s; this was subtracted from the samples after it"
+            ),
+            Correction::Repeated {
+                time_s,
+                samples,
+                places,
+            } => {
+                let more = match places {
+                    1 => String::new(),
+                    _ => format!(" in {places} places"),
+                };
+                write!(
+                    f,
+                    "{samples} samples of the output{more}, the first one at {time_s:.4} s, repeat the one before them and were left out; check the probe and its connection"
+                )
+            }
+            Correction::Clipped {
+                time_s,
+                value,
+                samples,
+            } => write!(
+                f,
+                "{samples} samples of the output are clipped at {value:.6e}, the first one at {time_s:.4} s; of these only the limit was used"
+            ),
+            Correction::Held { samples } => write!(
+                f,
+                "{}; only these samples were used",
+                HeldFor(*samples as f64)
             ),
         }
     }

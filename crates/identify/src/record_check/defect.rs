@@ -62,6 +62,14 @@ pub enum Defect {
 }
 
 impl Defect {
+    /// Whether samples of the output are no readings of it, or only limits.
+    pub fn loses_readings(&self) -> bool {
+        matches!(
+            self,
+            Defect::Repeated { .. } | Defect::Held { .. } | Defect::Clipped { .. }
+        )
+    }
+
     /// Whether it is a spike or a step, which may be corrected.
     pub fn is_outlier(&self) -> bool {
         matches!(self, Defect::Spike { .. } | Defect::Step { .. })
@@ -112,10 +120,10 @@ impl fmt::Display for Defect {
 }
 
 /// A whole number of samples differs from a measured one by less than this.
-const WHOLE: f64 = 0.02;
+pub(super) const WHOLE: f64 = 0.02;
 
 /// For how many samples the output stays the same.
-struct HeldFor(f64);
+pub(super) struct HeldFor(pub(super) f64);
 
 impl fmt::Display for HeldFor {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -7,7 +7,6 @@
 //! The changes lie on a line in each window. Those by which a slow signal passes the steps of its resolution do so, too, but each is one
 //! step high, and a fast one repeats values at its peaks only, where the changes are small; those by noise deviate from a line by the square root of their number.
 
-use super::defect::Defect;
 use crate::Signals;
 
 /// Number of changes in a window.
@@ -47,8 +46,8 @@ struct Window {
     is_regular: bool,
 }
 
-/// Whether the output changes less often than it is logged, where its values have this step.
-pub(super) fn held(signals: &Signals, step: f64) -> Option<Defect> {
+/// The samples for each value of an output that changes less often than it is logged, where its values have this step.
+pub(super) fn held(signals: &Signals, step: f64) -> Option<f64> {
     let changes = changes(&signals.output);
     let windows = changes.chunks_exact(WINDOW).map(Window::of);
     let mut moving: Vec<Window> = windows
@@ -64,11 +63,7 @@ pub(super) fn held(signals: &Signals, step: f64) -> Option<Defect> {
         && agreeing.len() as f64 >= MIN_AGREEING_RATIO * moving.len() as f64
         && typical > MIN_SAMPLES;
     let sum: f64 = agreeing.iter().map(|window| window.samples).sum();
-    let samples = sum / agreeing.len() as f64;
-    is_held.then(|| Defect::Held {
-        samples,
-        probe_hz: signals.rate_hz / samples,
-    })
+    is_held.then(|| sum / agreeing.len() as f64)
 }
 
 fn changes(output: &[f64]) -> Vec<Change> {

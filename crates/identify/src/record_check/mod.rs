@@ -6,6 +6,7 @@ mod correction;
 mod defect;
 mod ends;
 mod held;
+mod lost;
 mod outlier;
 mod plateaus;
 mod prediction;
@@ -20,7 +21,8 @@ pub use defect::Defect;
 use ends::motion_at_ends;
 pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};
 use held::held;
-use plateaus::{Quantisation, clipped, repeated};
+pub use lost::{LostReadings, Reading};
+use plateaus::{Quantisation, limits, repeated};
 use prediction::Prediction;
 pub use resolution::Resolution;
 pub use stray_lines::{StrayLine, stray_lines, without};
@@ -28,25 +30,68 @@ pub use stray_lines::{StrayLine, stray_lines, without};
 /// An output whose step is below this ratio of its noise has as few equal neighbours as one without a step.
 const MIN_STEP_RATIO: f64 = 0.1;
 
-/// The first defect of each kind. `cleaned` is the record without its stray lines; its values are no multiples of a step any more.
+/// What a record is checked for.
+#[derive(Clone, Debug, Default)]
+pub struct Checked {
+    /// The first defect of each kind.
+    pub defects: Vec<Defect>,
+    /// The readings that are left, if the defects are lost ones.
+    pub lost: Option<LostReadings>,
+}
+
+impl Checked {
+    fn of(defects: Vec<Defect>) -> Checked {
+        Checked {
+            defects,
+            lost: None,
+        }
+    }
+}
+
+/// Checks a record. `cleaned` is the record without its stray lines; its values are no multiples of a step any more.
 /// Motion is a defect of a record that must begin and end at rest.
-pub fn defects(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Vec<Defect> {
+pub fn check(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Checked {
     let step = resolution::step(&recorded.output).unwrap_or(0.0);
     let prediction = Prediction::new(cleaned, step);
     let noise = prediction.as_ref().map_or(0.0, Prediction::noise);
     let quantisation = (step > MIN_STEP_RATIO * noise).then_some(Quantisation { step, noise });
-    let lasting = held(recorded, step)
-        .or_else(|| clipped(recorded))
-        .or_else(|| repeated(recorded, quantisation));
-    if lasting.is_some() || ends == Ends::Periods {
-        return lasting.into_iter().collect();
+    if let Some(lasting) = lasting(recorded, step, quantisation) {
+        return lasting;
     }
-    let Some(prediction) = prediction else {
-        return Vec::new();
+    let Some(prediction) = prediction.filter(|_| ends != Ends::Periods) else {
+        return Checked::default();
     };
     let mut found = prediction.jumps();
     if ends == Ends::Rest {
         found.extend(motion_at_ends(cleaned, prediction.median_sigma()));
     }
-    found
+    Checked::of(found)
+}
+
+/// A defect that lasts for many samples.
+fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) -> Option<Checked> {
+    let rate_hz = recorded.rate_hz;
+    let held = held(recorded, step);
+    let limits = limits(&recorded.output);
+    let runs = match held {
+        Some(_) => Vec::new(),
+        None => repeated(recorded, quantisation),
+    };
+    let of_probe = |samples: f64| Defect::Held {
+        samples,
+        probe_hz: rate_hz / samples,
+    };
+    let of_limit = || limits.first().map(|limit| limit.defect(rate_hz));
+    let of_run = || {
+        let run = runs.first()?;
+        Some(run.defect(recorded, quantisation.is_some()))
+    };
+    let defect = held.map(of_probe).or_else(of_limit).or_else(of_run)?;
+    let lost = defect
+        .loses_readings()
+        .then(|| LostReadings::of(recorded, held, &limits, &runs));
+    Some(Checked {
+        defects: vec![defect],
+        lost: lost.flatten(),
+    })
 }

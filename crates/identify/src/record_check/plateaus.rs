@@ -4,6 +4,9 @@
 //! changes meanwhile. An output with a step is equal to itself wherever it moves by less: there the output must also move by several
 //! steps right before and right after the run.
 
+use std::cmp::Reverse;
+use std::ops::Range;
+
 use super::defect::Defect;
 use crate::Signals;
 
@@ -63,13 +66,13 @@ impl Quantisation {
 
 /// Samples of the same value.
 #[derive(Clone, Copy, Debug)]
-struct Run {
-    start: usize,
+pub(super) struct Run {
+    pub(super) start: usize,
     samples: usize,
 }
 
-/// The longest run of equal samples, if it is no chance, and the output moves before and after it by several of its steps.
-pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) -> Option<Defect> {
+/// The runs of equal samples that are no chance, and before and after which the output moves by several of its steps; the longest first.
+pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) -> Vec<Run> {
     let output = &signals.output;
     let runs = output.chunk_by(|a, b| a == b).scan(0, |end, run| {
         *end += run.len();
@@ -79,19 +82,29 @@ pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) ->
             samples: run.len(),
         })
     });
-    let longest = runs
+    let mut runs: Vec<Run> = runs
         .filter(|run| match quantisation {
             Some(q) => run.samples >= MIN_QUANTISED && run.hides_motion(signals, q.step),
             None => run.samples >= MIN_REPEATED && run.input_changes(&signals.input),
         })
-        .max_by_key(|run| run.samples)?;
-    let chance = longest.chance(output, quantisation);
-    (chance < CHANCE).then(|| longest.defect(signals, quantisation.is_some()))
+        .collect();
+    runs.sort_by_key(|run| Reverse(run.samples));
+    let mut others = output.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    let is_no_chance = |run: &Run| {
+        others = others.saturating_sub(run.samples);
+        run.chance(output.len(), others, quantisation) < CHANCE
+    };
+    runs.into_iter().take_while(is_no_chance).collect()
 }
 
 impl Run {
+    /// The samples after the first one, which is a reading.
+    pub(super) fn repetitions(&self) -> Range<usize> {
+        self.start + 1..self.start + self.samples
+    }
+
     /// The run as a defect. A quantised output that came from fast motion is no command at rest.
-    fn defect(&self, signals: &Signals, is_quantised: bool) -> Defect {
+    pub(super) fn defect(&self, signals: &Signals, is_quantised: bool) -> Defect {
         let (time_s, samples) = (self.start as f64 / signals.rate_hz, self.samples);
         let reaches_an_end = self.start == 0 || self.start + samples == signals.len();
         if reaches_an_end && !is_quantised {
@@ -106,13 +119,12 @@ impl Run {
         2 * pairs.filter(|pair| pair[0] != pair[1]).count() >= self.samples
     }
 
-    /// The probability of such a run in the record.
-    fn chance(&self, output: &[f64], quantisation: Option<Quantisation>) -> f64 {
-        let equal = output.windows(2).filter(|pair| pair[0] == pair[1]).count();
-        let others = equal.saturating_sub(self.samples) as f64;
+    /// The probability of such a run in a record of `count` samples, of which `others` outside of longer runs are equal to the one before.
+    fn chance(&self, count: usize, others: usize, quantisation: Option<Quantisation>) -> f64 {
+        let count = count as f64;
         // Of a quantised output, the ratio of the whole record is that of the parts in which it moves by less than one step.
-        let ratio = quantisation.map_or(others / output.len() as f64, |q| q.chance_of_equal());
-        output.len() as f64 * ratio.max(CHANCE).powf(self.samples as f64)
+        let ratio = quantisation.map_or(others as f64 / count, |q| q.chance_of_equal());
+        count * ratio.max(CHANCE).powf(self.samples as f64)
     }
 
     /// Whether the output moves by [`MOVED_STEPS`] right before and right after, each in a quarter of the time of the run, and the
@@ -147,21 +159,41 @@ fn span(samples: &[f64]) -> f64 {
     high - low
 }
 
-/// The output at its largest or smallest value, if it stays there in several places.
-pub(super) fn clipped(signals: &Signals) -> Option<Defect> {
-    let output = &signals.output;
-    let limits = [f64::max, f64::min].map(|extreme| {
-        let first = output.first().copied().unwrap_or(0.0);
-        output.iter().copied().fold(first, extreme)
-    });
-    limits.into_iter().find_map(|value| {
-        let slow = first_plateau(output, value, CLIPPED);
-        let first = slow.or_else(|| first_plateau(output, value, CLIPPED_FAST))?;
-        piles_up(output, value).then(|| Defect::Clipped {
-            time_s: first as f64 / signals.rate_hz,
-            value,
+/// The largest or smallest value of an output that stays there in several places.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Limit {
+    pub(super) value: f64,
+    pub(super) is_upper: bool,
+    /// The first sample of the first plateau.
+    pub(super) first: usize,
+}
+
+impl Limit {
+    pub(super) fn defect(&self, rate_hz: f64) -> Defect {
+        Defect::Clipped {
+            time_s: self.first as f64 / rate_hz,
+            value: self.value,
+        }
+    }
+}
+
+/// The limits at which an output is clipped.
+pub(super) fn limits(output: &[f64]) -> Vec<Limit> {
+    let start = output.first().copied().unwrap_or(0.0);
+    let largest = output.iter().copied().fold(start, f64::max);
+    let smallest = output.iter().copied().fold(start, f64::min);
+    [(largest, true), (smallest, false)]
+        .into_iter()
+        .filter_map(|(value, is_upper)| {
+            let slow = first_plateau(output, value, CLIPPED);
+            let first = slow.or_else(|| first_plateau(output, value, CLIPPED_FAST))?;
+            piles_up(output, value).then_some(Limit {
+                value,
+                is_upper,
+                first,
+            })
         })
-    })
+        .collect()
 }
 
 /// Whether the extreme value of a signal occurs far more often than the value next to it. The flat peaks of a coarsely quantised

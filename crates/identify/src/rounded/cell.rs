@@ -11,7 +11,7 @@
 
 use core::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// From here on, the tail of the normal distribution is computed by its asymptotic series: the next term is below 1e-11.
+/// From here on, the tail of the normal distribution is computed by its asymptotic series: the next term is below 2e-12.
 const FAR: f64 = 30.0;
 /// Beyond this number of standard deviations, a normal number changes a sum of 1e5 probabilities by less than 1e-10.
 const REACH: f64 = 8.0;
@@ -64,7 +64,7 @@ impl Cell {
         let score = if self.near < FAR {
             (density(self.near) - density(self.far)) / self.probability()
         } else {
-            libm::exp(-0.5 * self.near * self.near - log_tail(self.near)) / (2.0 * PI).sqrt()
+            over_tail(self.near)
         };
         if self.is_mirrored { -score } else { score }
     }
@@ -98,6 +98,24 @@ pub(super) fn information(offset: f64, step: f64, sigma: f64) -> f64 {
     part(middle.near, middle.far) + beyond(-middle.near) + beyond(middle.far)
 }
 
+/// ln of the probability of a standard normal number above x.
+pub(super) fn log_tail_of_normal(x: f64) -> f64 {
+    if x < FAR {
+        libm::log(tail(x))
+    } else {
+        log_tail(x)
+    }
+}
+
+/// The density of a standard normal number at x over the probability of one above x.
+pub(super) fn over_tail(x: f64) -> f64 {
+    if x < FAR {
+        density(x) / tail(x)
+    } else {
+        libm::exp(-0.5 * x * x - log_tail(x)) / (2.0 * PI).sqrt()
+    }
+}
+
 /// The probability of a standard normal number above x.
 fn tail(x: f64) -> f64 {
     0.5 * libm::erfc(x * FRAC_1_SQRT_2)
@@ -106,7 +124,8 @@ fn tail(x: f64) -> f64 {
 /// ln of the probability of a standard normal number above a large x.
 fn log_tail(x: f64) -> f64 {
     let square = 1.0 / (x * x);
-    let series = libm::log1p(-square * (1.0 - 3.0 * square * (1.0 - 5.0 * square)));
+    let series =
+        libm::log1p(-square * (1.0 - 3.0 * square * (1.0 - 5.0 * square * (1.0 - 7.0 * square))));
     -0.5 * x * x - libm::log(x * (2.0 * PI).sqrt()) + series
 }
 

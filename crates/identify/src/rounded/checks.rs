@@ -1,27 +1,35 @@
-//! Whether a model describes rounded readings: their scores must be those of independent noise of one standard deviation.
+//! Whether a model describes readings: their scores must be those of independent noise of one standard deviation.
 //!
 //! Unequal steps, another motion of the plant, or a disturbance make the noise seem larger where there are more of them, and scores alike
 //! from one reading to the next.
 
-use super::refine::{FINE, Likeliest, MAX_SIGMA_STEPS, RoundedRecord};
+use super::refine::{FINE, Likeliest, RoundedRecord};
+use crate::record_check::Reading;
 
 /// Number of parts of the record with equal information, each of which has its own noise.
 const PARTS: usize = 6;
 /// Largest decrease of -2 ln P by their own noise: chi-square with one degree of freedom less than parts exceeds it with 0.1 %.
 const MAX_DECREASE: f64 = 20.5;
-/// Largest sum of the products of neighbouring scores, over its standard deviation; noise exceeds it with 0.1 %.
-const MAX_CORRELATION: f64 = 3.3;
-impl RoundedRecord<'_> {
-    /// Whether a model is near enough to the readings that their steps matter.
-    pub(super) fn may_describe(&self, found: &Likeliest) -> bool {
-        found.sigma < MAX_SIGMA_STEPS * self.step
-    }
+/// Scores of readings up to as many places apart are compared.
+const LAGS: usize = 4;
+/// Largest sum of the squares of the correlations at these lags: chi-square with as many degrees of freedom exceeds it with 0.1 %.
+const MAX_CORRELATION: f64 = 18.5;
 
+impl RoundedRecord<'_> {
     /// Whether a model describes the readings.
     pub(super) fn is_described_by(&self, found: &Likeliest) -> bool {
-        self.may_describe(found)
-            && correlation(&found.scores).abs() < MAX_CORRELATION
+        self.is_near(found.sigma)
+            && self.correlation(&found.scores) < MAX_CORRELATION
             && self.decrease_by_parts(found) < MAX_DECREASE
+    }
+
+    /// The sum of the squares of the correlations of the scores at the first lags, each over its standard deviation.
+    fn correlation(&self, scores: &[f64]) -> f64 {
+        let pairs = scores.iter().zip(self.readings);
+        let of_readings = pairs.filter(|(_, reading)| **reading != Reading::Lost);
+        let scores: Vec<f64> = of_readings.map(|(score, _)| *score).collect();
+        let lags = (1..=LAGS).map(|lag| correlation(&scores, lag).powi(2));
+        lags.sum()
     }
 
     /// The decrease of -2 ln P if each part of the record has its own noise.
@@ -58,9 +66,9 @@ fn ends_of_parts(information: &[f64]) -> Vec<usize> {
     ends
 }
 
-/// Sum of the products of neighbouring scores over its standard deviation, if these are independent.
-fn correlation(scores: &[f64]) -> f64 {
-    let products = scores.windows(2).map(|pair| pair[0] * pair[1]);
+/// Sum of the products of scores `lag` places apart over its standard deviation, if these are independent.
+fn correlation(scores: &[f64], lag: usize) -> f64 {
+    let products = scores.windows(lag + 1).map(|part| part[0] * part[lag]);
     let squares: f64 = products.clone().map(|product| product * product).sum();
     if squares > 0.0 {
         products.sum::<f64>() / squares.sqrt()

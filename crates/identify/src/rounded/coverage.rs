@@ -1,19 +1,20 @@
-//! The frequencies up to which rounded readings show the modes of a stage.
+//! The frequencies up to which readings show the modes of a stage.
 //!
-//! Where the output moves by less than a step, readings may not change at all, and a mode there is not seen. A trial mode of residue 1 at a
-//! frequency w gives the standard deviation with which the readings show its residue:
+//! Where the output moves by less than a step, readings may not change at all, and a mode there is not seen; nor is one that a sweep passes
+//! while readings are lost. A trial mode of residue 1 at a frequency w gives the standard deviation with which the readings show its residue:
 //!
 //! ```text
 //! sigma_r = (sum of I o^2/s^2)^-1/2       I: information of a reading, s: noise, o: output of the trial mode near its resonance
 //! seen:     5 sigma_r/(2 zeta w^2) < |G(j w)|                      a mode as narrow as the narrowest one, with a peak as high as the response around w
 //! ```
 //!
-//! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis.
+//! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis. A higher one that is not seen
+//! does no harm if the number of CNMP pairs in the band is the same with it, of either sign.
 
 use nalgebra::Complex;
 
 use super::refine::{Likeliest, RoundedRecord};
-use bench_plant::zeros::ModalSum;
+use bench_plant::zeros::{ModalSum, ModalTerm, cnmp_pairs};
 
 /// Zeros may lie below a mode that is not seen, but not much below it: those beside it, as the response around it is that of other modes.
 const BELOW_UNSEEN: f64 = 0.95;
@@ -29,7 +30,7 @@ const NEAR_RESONANCE: f64 = 0.3;
 const SEEN_SIGMAS: f64 = 5.0;
 
 impl RoundedRecord<'_> {
-    /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen, at most `to_rad_s`.
+    /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen or does no harm, at most `to_rad_s`.
     pub(super) fn seen_up_to_rad_s(
         &self,
         found: &Likeliest,
@@ -44,9 +45,14 @@ impl RoundedRecord<'_> {
             let delay_s = found.parameters.delay_s;
             let output = self.simulation.of_mode(trial_rad_s, zeta, delay_s);
             let sigma_per_kg = found.sigma / information(&output, &found.information).sqrt();
-            let peak = SEEN_SIGMAS * sigma_per_kg / (2.0 * zeta * trial_rad_s * trial_rad_s);
+            let hidden = ModalTerm {
+                omega_rad_s: trial_rad_s,
+                damping_ratio: zeta,
+                residue_per_kg: SEEN_SIGMAS * sigma_per_kg,
+            };
+            let peak = hidden.residue_per_kg / (2.0 * zeta * trial_rad_s * trial_rad_s);
             let is_seen = peak < largest_around(&sum, trial_rad_s);
-            if !is_seen {
+            if !is_seen && !is_harmless(&sum, hidden, to_rad_s) {
                 return Some(from_rad_s.max(BELOW_UNSEEN * seen_rad_s));
             }
             seen_rad_s = trial_rad_s;
@@ -64,6 +70,31 @@ fn information(output: &[f64], of_readings: &[f64]) -> f64 {
     near_resonance
         .map(|(y, information)| y * y * information)
         .sum()
+}
+
+/// Whether a mode of either sign leaves the number of CNMP pairs up to a frequency as it is.
+fn is_harmless(sum: &ModalSum, hidden: ModalTerm, to_rad_s: f64) -> bool {
+    let Some(pairs) = pairs_up_to(sum, to_rad_s) else {
+        return false;
+    };
+    let leaves_pairs = |sign: f64| {
+        let residue_per_kg = sign * hidden.residue_per_kg;
+        let hidden = ModalTerm {
+            residue_per_kg,
+            ..hidden
+        };
+        let terms = sum.terms().iter().copied().chain([hidden]).collect();
+        let with_hidden = ModalSum::new(terms, sum.constant_m_per_n()).ok();
+        with_hidden.and_then(|sum| pairs_up_to(&sum, to_rad_s)) == Some(pairs)
+    };
+    leaves_pairs(1.0) && leaves_pairs(-1.0)
+}
+
+/// The number of CNMP pairs up to a frequency, if it can be computed.
+fn pairs_up_to(sum: &ModalSum, to_rad_s: f64) -> Option<usize> {
+    let mut zeros = sum.damped_zeros().ok()?;
+    zeros.retain(|zero| zero.s.norm() <= to_rad_s);
+    Some(cnmp_pairs(&zeros))
 }
 
 /// The largest magnitude of the response around a frequency.

@@ -19,7 +19,7 @@ impl Order {
     pub(super) fn of(record: &RoundedRecord<'_>, start: ModalParameters) -> Option<Order> {
         let found = record.likeliest(start)?;
         let parameters = found.covariance.nrows() as f64;
-        let samples = record.readings.len() as f64;
+        let samples = record.count() as f64;
         Some(Order {
             cost: parameters * samples.ln() - 2.0 * found.log_probability,
             found,
@@ -37,7 +37,7 @@ impl Order {
         let certainties = sigmas_of_residues(parameters, covariance);
         let modes = certainties.iter().enumerate();
         let (mode, certainty) = modes.min_by(|a, b| a.1.total_cmp(b.1))?;
-        let largest = MAY_BE_NONE * (record.readings.len() as f64).ln();
+        let largest = MAY_BE_NONE * (record.count() as f64).ln();
         let may_be_none = certainties.len() > 1 && certainty * certainty < largest;
         may_be_none.then(|| parameters.without_mode(mode))
     }

@@ -1,19 +1,20 @@
-//! The parameters of greatest likelihood of rounded readings, by scoring (Gauss-Newton steps with the expected information), and the
+//! The parameters of greatest likelihood of readings, by scoring (Gauss-Newton steps with the expected information), and the
 //! standard deviation of the noise before rounding.
 //!
 //! ```text
 //! b = J' g/s        H = J' I J/s^2        step = H^-1 b           J: derivatives, g: scores, I: information of the readings
 //! ```
 //!
-//! The noise follows from the likelihood at each step. As long as the model is wrong, it is that error, many readings are uncertain, and
+//! The noise follows from the likelihood at each step. Of rounded readings, as long as the model is wrong, it is that error, many readings are uncertain, and
 //! the steps are those of least squares; near the end only readings close to an end of their cell matter.
 
 use nalgebra::{DMatrix, DVector};
 
-use super::cell::{Cell, information};
 use super::equations::Equations;
+use super::noise::Noise;
 use super::simulated::{Parts, Simulation};
 use crate::modal::{ModalParameters, Parameter};
+use crate::record_check::Reading;
 
 /// Largest number of steps.
 const MAX_STEPS: usize = 15;
@@ -21,8 +22,10 @@ const MAX_STEPS: usize = 15;
 const DAMPINGS: [f64; 4] = [1e-9, 0.1, 3.0, 100.0];
 /// A smaller gain of ln P is negligible beside the noise of one parameter, 0.5.
 const NEGLIGIBLE_GAIN: f64 = 0.05;
-/// The standard deviation lies between these multiples of the step. Above the second one rounding is noise, and the usual fit serves.
+/// The standard deviation lies between these multiples of the step of rounded readings. Above the second one rounding is noise, and the usual fit serves.
 const SIGMA_STEPS: (f64, f64) = (5e-4, 1.0);
+/// The same as ratios of the range of readings that are not rounded.
+const SIGMA_RATIOS: (f64, f64) = (1e-9, 1.0);
 /// A noise above this ratio of a step is rather an error of the model: as if there were no steps.
 pub(super) const MAX_SIGMA_STEPS: f64 = 0.55;
 /// Standard deviations with this factor are compared first.
@@ -37,13 +40,15 @@ const SIGMA_RATIO: f64 = 1.3;
 /// After as many steps an order that leaves a larger noise than [`MAX_SIGMA_STEPS`] is given up.
 const HOPELESS_STEPS: usize = 3;
 
-/// Rounded readings of the output to a known input.
+/// Readings of the output to a known input.
 #[derive(Clone, Copy)]
 pub(super) struct RoundedRecord<'a> {
     pub(super) simulation: Simulation<'a>,
-    pub(super) readings: &'a [f64],
-    /// The step of the readings.
-    pub(super) step: f64,
+    pub(super) readings: &'a [Reading],
+    /// The step of the readings; `None` if their noise exceeds it.
+    pub(super) step: Option<f64>,
+    /// Least and largest standard deviation.
+    pub(super) sigma_limits: (f64, f64),
 }
 
 /// Constant and slope of the readings that are no response to the input: from the first to the last one the slope changes them by itself.
@@ -97,7 +102,49 @@ struct Climbed {
     sigma: f64,
 }
 
-impl RoundedRecord<'_> {
+impl<'a> RoundedRecord<'a> {
+    pub(super) fn new(
+        simulation: Simulation<'a>,
+        readings: &'a [Reading],
+        step: Option<f64>,
+    ) -> RoundedRecord<'a> {
+        let (ratios, unit) = match step {
+            Some(step) => (SIGMA_STEPS, step),
+            None => (SIGMA_RATIOS, range(readings).max(f64::MIN_POSITIVE)),
+        };
+        RoundedRecord {
+            simulation,
+            readings,
+            step,
+            sigma_limits: (ratios.0 * unit, ratios.1 * unit),
+        }
+    }
+
+    /// The number of samples that are readings.
+    pub(super) fn count(&self) -> usize {
+        let readings = self.readings.iter();
+        readings
+            .filter(|reading| **reading != Reading::Lost)
+            .count()
+    }
+
+    /// Whether the steps of the readings matter beside a noise, if they have steps.
+    pub(super) fn is_near(&self, sigma: f64) -> bool {
+        self.step.is_none_or(|step| sigma < MAX_SIGMA_STEPS * step)
+    }
+
+    /// Whether a model with this noise may be changed to one that is near. The first modes of an output with lost readings are those of a
+    /// response that may be far off.
+    pub(super) fn may_come_near(&self, sigma: f64) -> bool {
+        self.is_near(sigma) || !self.is_whole()
+    }
+
+    /// Whether each sample is a reading with a value.
+    pub(super) fn is_whole(&self) -> bool {
+        let is_value = |reading: &Reading| matches!(reading, Reading::Value(_));
+        self.readings.iter().all(is_value)
+    }
+
     /// The likeliest parameters near `start`; `None` if the readings do not determine them.
     ///
     /// If too few readings are uncertain to measure the noise, it is taken as that with which enough are.
@@ -105,8 +152,8 @@ impl RoundedRecord<'_> {
         let mut trial = self.trial(start, [0.0; 2], &Parts::default());
         trial.drift = self.mean_drift(&trial.output);
         let from = self.trial(trial.parameters, trial.drift, &trial.parts);
-        let least = SIGMA_STEPS.0 * self.step;
-        let found = self.climbed(from, self.step, least);
+        let (least, largest) = self.sigma_limits;
+        let found = self.climbed(from, largest, least);
         let informative = self.informative_sigma(&found);
         if informative <= found.sigma {
             return self.result(found.trial, found.sigma);
@@ -135,7 +182,7 @@ impl RoundedRecord<'_> {
             };
             best = next;
             sigma = sigma_of(&best.output, sigma, ROUGH);
-            let is_hopeless = steps + 1 >= HOPELESS_STEPS && sigma > MAX_SIGMA_STEPS * self.step;
+            let is_hopeless = steps + 1 >= HOPELESS_STEPS && !self.may_come_near(sigma);
             if is_hopeless || gain < NEGLIGIBLE_GAIN {
                 break;
             }
@@ -149,12 +196,12 @@ impl RoundedRecord<'_> {
         }
     }
 
-    /// The noise from that of a model on with which the readings have the least information for its parameters.
+    /// The noise from that of a model on with which rounded readings have the least information for its parameters.
     fn informative_sigma(&self, model: &Climbed) -> f64 {
-        let parameters = model.trial.parameters.free().len() + model.trial.drift.len();
-        let least = MIN_INFORMATION * parameters as f64;
+        let least = MIN_INFORMATION * number_of_parameters(&model.trial) as f64;
         let mut sigma = model.sigma;
-        while sigma < MAX_SIGMA_STEPS * self.step
+        while self.step.is_some()
+            && self.is_near(sigma)
             && self
                 .information(&model.trial.output, sigma)
                 .iter()
@@ -170,7 +217,13 @@ impl RoundedRecord<'_> {
         let equations = self.equations(&best, sigma);
         let log_probability = self.log_probability(&best.output, sigma);
         let free = best.parameters.free();
-        let inverse = equations.inverse()?;
+        // As the variance of errors that are those of N - p data.
+        let number = number_of_parameters(&best) as f64;
+        let information: f64 = equations.information.iter().sum();
+        if information < MIN_INFORMATION * number {
+            return None;
+        }
+        let inverse = equations.inverse()? * (information / (information - number));
         let factor = |i: usize| match free[i] {
             Parameter::Frequency(k) => best.parameters.modes[k].omega_rad_s,
             Parameter::Damping(k) => best.parameters.modes[k].damping_ratio,
@@ -209,8 +262,14 @@ impl RoundedRecord<'_> {
 
     /// The mean difference of the readings from an output.
     fn mean_drift(&self, output: &[f64]) -> Drift {
-        let differences = self.readings.iter().zip(output).map(|(y, m)| y - m);
-        [differences.sum::<f64>() / output.len() as f64, 0.0]
+        let pairs = self.readings.iter().zip(output);
+        let difference = |(reading, m): (&Reading, &f64)| match reading {
+            Reading::Value(y) => Some(y - m),
+            _ => None,
+        };
+        let differences: Vec<f64> = pairs.filter_map(difference).collect();
+        let count = differences.len().max(1) as f64;
+        [differences.iter().sum::<f64>() / count, 0.0]
     }
 
     fn moved(&self, from: &Trial, step: &DVector<f64>) -> Trial {
@@ -226,25 +285,29 @@ impl RoundedRecord<'_> {
     }
 
     pub(super) fn log_probability(&self, output: &[f64], sigma: f64) -> f64 {
+        let noise = self.noise(sigma);
         let pairs = self.readings.iter().zip(output);
         pairs
-            .map(|(reading, y)| self.cell(*reading, *y, sigma).log_probability())
+            .map(|(reading, y)| noise.log_probability(*reading, *y))
             .sum()
     }
 
-    fn cell(&self, reading: f64, output: f64, sigma: f64) -> Cell {
-        Cell::new(reading, output, self.step, sigma)
+    fn noise(&self, sigma: f64) -> Noise {
+        Noise {
+            step: self.step,
+            sigma,
+        }
     }
 
     /// The standard deviation of greatest likelihood near `start`, to about this ratio.
     pub(super) fn likeliest_sigma(&self, output: &[f64], start: f64, ratio: f64) -> f64 {
-        let limits = [SIGMA_STEPS.0 * self.step, SIGMA_STEPS.1 * self.step];
+        let (least, largest) = self.sigma_limits;
         let value = |sigma: f64| (sigma, self.log_probability(output, sigma));
-        let mut best = value(start.clamp(limits[0], limits[1]));
+        let mut best = value(start.clamp(least, largest));
         let mut factor = FIRST_FACTOR;
         while factor > 1.0 + ratio {
             let tried = [best.0 / factor, best.0 * factor];
-            let inside = tried.map(|sigma| sigma.clamp(limits[0], limits[1]));
+            let inside = tried.map(|sigma| sigma.clamp(least, largest));
             let [below, above] = inside.map(value);
             let better = if below.1 > above.1 { below } else { above };
             if better.1 > best.1 {
@@ -258,11 +321,10 @@ impl RoundedRecord<'_> {
 
     fn equations(&self, at: &Trial, sigma: f64) -> Equations {
         let columns = self.columns(at);
-        let scores: Vec<f64> = self
-            .readings
-            .iter()
-            .zip(&at.output)
-            .map(|(reading, y)| self.cell(*reading, *y, sigma).score())
+        let noise = self.noise(sigma);
+        let pairs = self.readings.iter().zip(&at.output);
+        let scores: Vec<f64> = pairs
+            .map(|(reading, y)| noise.score(*reading, *y))
             .collect();
         let information = self.information(&at.output, sigma);
         Equations::new(&columns, scores, information, sigma)
@@ -279,12 +341,28 @@ impl RoundedRecord<'_> {
 
     /// The information of each reading.
     fn information(&self, output: &[f64], sigma: f64) -> Vec<f64> {
-        let of_reading = |(reading, y): (&f64, &f64)| {
-            let steps = (y - reading) / self.step;
-            information((steps - steps.round()) * self.step, self.step, sigma)
-        };
-        self.readings.iter().zip(output).map(of_reading).collect()
+        let noise = self.noise(sigma);
+        let pairs = self.readings.iter().zip(output);
+        pairs
+            .map(|(reading, y)| noise.information(*reading, *y))
+            .collect()
     }
+}
+
+/// The parameters of a model with its drift.
+fn number_of_parameters(model: &Trial) -> usize {
+    model.parameters.free().len() + model.drift.len()
+}
+
+/// The range of the values of readings.
+fn range(readings: &[Reading]) -> f64 {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for reading in readings {
+        if let Reading::Value(y) = reading {
+            (low, high) = (low.min(*y), high.max(*y));
+        }
+    }
+    (high - low).max(0.0)
 }
 
 /// A drift at a sample of the record or after it, of which the record has `count`.

@@ -6,8 +6,8 @@ use super::order::Order;
 use super::refine::{Likeliest, RoundedRecord, drift_at};
 use super::simulated::Simulation;
 use super::{RoundedFit, RoundedOutput};
-use crate::Signals;
 use crate::modal::{ModalFit, ModalParameters, ModelOrder, OneMoreMode};
+use crate::record_check::Reading;
 use bench_plant::SignalPath;
 
 /// Readings that do not change after the last change and this time tell nothing more.
@@ -28,22 +28,21 @@ pub(crate) struct RoundedSearch<'a> {
 }
 
 impl<'a> RoundedSearch<'a> {
-    /// The search in a record whose output has a step.
-    pub(crate) fn new(signals: &'a Signals, step: f64, path: &'a SignalPath) -> Self {
-        let whole = Simulation {
-            path,
-            input: &signals.input,
+    /// The search in readings of the output to a held input, one for each of its samples, with their step if that exceeds their noise.
+    pub(crate) fn new(
+        input: &'a [f64],
+        readings: &'a [Reading],
+        step: Option<f64>,
+        path: &'a SignalPath,
+    ) -> Self {
+        let whole = Simulation { path, input };
+        let end = end_of_changes(readings, REST_S / path.period_s);
+        let until_rest = Simulation {
+            input: &input[..end],
+            ..whole
         };
-        let end = end_of_changes(&signals.output, REST_S * signals.rate_hz);
         RoundedSearch {
-            record: RoundedRecord {
-                simulation: Simulation {
-                    input: &signals.input[..end],
-                    ..whole
-                },
-                readings: &signals.output[..end],
-                step,
-            },
+            record: RoundedRecord::new(until_rest, &readings[..end], step),
             whole,
             best: None,
             next: None,
@@ -53,7 +52,10 @@ impl<'a> RoundedSearch<'a> {
 
     /// Tries the modes of the orders of a response of the record, rising, up to the first that has a larger cost than one of fewer modes.
     pub(crate) fn try_modes(&mut self, orders: Vec<ModalParameters>) {
-        let least = self.best.as_ref().map_or(1, Order::number_of_modes);
+        let least = match &self.best {
+            Some(best) if self.is_grown() => best.number_of_modes(),
+            _ => 1,
+        };
         let starts = starts(orders).into_iter();
         for start in starts.filter(|start| start.modes.len() >= least) {
             let Some(order) = Order::of(&self.record, start) else {
@@ -63,7 +65,7 @@ impl<'a> RoundedSearch<'a> {
             match &self.best {
                 Some(best) if order.cost >= best.cost => {
                     let is_larger = order.number_of_modes() > best.number_of_modes();
-                    if is_larger && self.record.may_describe(&best.found) {
+                    if is_larger && self.record.is_near(best.found.sigma) {
                         self.next = Some(order);
                         return;
                     }
@@ -74,6 +76,12 @@ impl<'a> RoundedSearch<'a> {
                 }
             }
         }
+    }
+
+    /// Whether the modes of each response are added to those before. Lost readings distort the first response, so that its modes may be too
+    /// many.
+    pub(crate) fn is_grown(&self) -> bool {
+        self.record.is_whole()
     }
 
     /// Keeps an order for the stability chart, in place of those with as many modes or more.
@@ -92,7 +100,7 @@ impl<'a> RoundedSearch<'a> {
     /// `None` if all tried models are far from the readings.
     pub(crate) fn unrounded(&self) -> Option<(Vec<f64>, &ModalParameters)> {
         let best = self.best.as_ref()?;
-        let is_near = self.record.may_describe(&best.found);
+        let is_near = self.record.may_come_near(best.found.sigma);
         is_near.then(|| (self.whole_output(&best.found), &best.found.parameters))
     }
 
@@ -140,7 +148,7 @@ impl<'a> RoundedSearch<'a> {
 }
 
 /// The number of samples up to some samples after the last change.
-fn end_of_changes(readings: &[f64], more: f64) -> usize {
+fn end_of_changes(readings: &[Reading], more: f64) -> usize {
     let is_change = |k: &usize| readings[k - 1] != readings[*k];
     let last = (1..readings.len()).rev().find(is_change).unwrap_or(0);
     readings.len().min(last + 1 + more as usize)

@@ -1,5 +1,7 @@
 //! Rounded outputs of exact motions: the modes within their errors, and no modes where the readings are not those of modes.
 
+mod lost;
+
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -8,6 +10,7 @@ use super::*;
 use crate::Signals;
 use crate::modal::ModalParameters;
 use crate::modal::{self, MeasurementChain};
+use crate::record_check::Reading;
 use crate::{EstimatorSettings, Identification, IdentifySettings, response};
 use bench_plant::zeros::ModalTerm;
 use nalgebra::Complex;
@@ -82,9 +85,15 @@ fn signals(output: Vec<f64>) -> Signals {
     }
 }
 
-/// The modes of readings, beginning with a fit to their response.
-fn fitted(readings: Vec<f64>, step: f64) -> Option<RoundedFit> {
-    let signals = signals(readings);
+/// The modes of rounded readings, beginning with a fit to their response.
+fn fitted(values: Vec<f64>, step: f64) -> Option<RoundedFit> {
+    let readings: Vec<Reading> = values.iter().copied().map(Reading::Value).collect();
+    fitted_to(&readings, values, Some(step))
+}
+
+/// The modes of readings, beginning with a fit to the response of an output.
+fn fitted_to(readings: &[Reading], output: Vec<f64>, step: Option<f64>) -> Option<RoundedFit> {
+    let signals = signals(output);
     let frf = response(
         &signals,
         BAND_HZ,
@@ -100,14 +109,14 @@ fn fitted(readings: Vec<f64>, step: f64) -> Option<RoundedFit> {
     };
     let chain = MeasurementChain::Bench(path.clone());
     let orders = modal::rising_orders(&frf.data, &chain, 6).expect("modes");
-    let mut search = RoundedSearch::new(&signals, step, &path);
+    let mut search = RoundedSearch::new(&signals.input, readings, step, &path);
     search.try_modes(orders);
     search.result(BAND_HZ)
 }
 
 /// The errors of w, zeta and r of each mode over their standard deviations.
-fn errors(found: &RoundedFit) -> Vec<f64> {
-    let modes = found.fit.modes();
+fn errors(fit: &crate::modal::ModalFit) -> Vec<f64> {
+    let modes = fit.modes();
     assert_eq!(modes.len(), stage().len());
     let of_mode = |(found, truth): (&crate::modal::FittedMode, ModalTerm)| {
         let over =
@@ -129,7 +138,7 @@ fn errors_are_those_that_the_intervals_state() {
     for seed in 0..12 {
         let (values, step) = noisy(&exact, seed);
         let found = fitted(rounded(&values, step), step).expect("modes");
-        all.extend(errors(&found));
+        all.extend(errors(&found.fit));
         noise.push(found.noise.sigma / (NOISE * step));
     }
     // The sum of the squares of 72 errors, some of which depend on each other: chi-square of 72 lies within 35 and 122 with 99.99 %, of 36
@@ -146,7 +155,7 @@ fn readings_that_are_cut_off_and_not_rounded_have_the_same_modes() {
     let (values, step) = noisy(&motion(&stage(), &sweep()), 7);
     let readings = values.iter().map(|y| step * (y / step).floor()).collect();
     let found = fitted(readings, step).expect("modes");
-    for error in errors(&found) {
+    for error in errors(&found.fit) {
         assert!(error.abs() < 4.0, "{error}");
     }
 }
@@ -233,7 +242,7 @@ fn output_without_noise_has_modes_within_their_errors() {
     let exact = motion(&stage(), &sweep());
     let (_, step) = noisy(&exact, 0);
     let found = fitted(rounded(&exact, step), step).expect("modes");
-    for error in errors(&found) {
+    for error in errors(&found.fit) {
         assert!(error.abs() < 3.0, "{error}");
     }
     let information = found.noise.sigma / step;
@@ -331,7 +340,10 @@ fn identification_of_a_rounded_output_decides_with_the_true_modes() {
         .run(&sweep(), &rounded(&values, step))
         .expect("an analysis");
     let noise = found.rounded.expect("a rounded output");
-    assert!((noise.step / step - 1.0).abs() < 1e-9, "{noise:?}");
+    assert!(
+        (noise.step.expect("a step") / step - 1.0).abs() < 1e-9,
+        "{noise:?}"
+    );
     assert!(
         (noise.sigma / (NOISE * step) - 1.0).abs() < 0.3,
         "{noise:?}"

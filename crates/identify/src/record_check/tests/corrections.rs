@@ -2,7 +2,7 @@
 
 use super::{RATE_HZ, rounded, signals};
 use crate::Signals;
-use crate::record_check::{Corrected, Correction, Ends, defects};
+use crate::record_check::{Corrected, Correction, Ends, check};
 
 /// The noise of the record is 1e-3. The value that a prediction gives for a sample deviates by the errors of both; of four samples those
 /// in the middle, and the sum over the errors that determine a step, have up to three times that: 5 standard deviations.
@@ -91,7 +91,10 @@ fn spikes_and_steps_of_very_different_heights_are_corrected() {
     assert_eq!(corrected.corrections.len(), expected.len());
     for (correction, expected) in corrected.corrections.iter().zip(expected) {
         let (Correction::Spike { time_s, height, .. } | Correction::Step { time_s, height }) =
-            *correction;
+            *correction
+        else {
+            panic!("{correction:?}");
+        };
         assert_eq!(time_s, expected.0);
         assert!(
             (height - expected.1).abs() < LARGEST_DEVIATION,
@@ -118,7 +121,7 @@ fn response_to_a_force_that_is_not_in_the_input_is_not_corrected() {
     let mut outliers = 0;
     for height in (0..40).map(|k| 0.02 * 1.12_f64.powi(k)) {
         let recorded = spoiled(|k, y| y + height * response(k));
-        outliers += usize::from(!defects(&recorded, &recorded, Ends::Rest).is_empty());
+        outliers += usize::from(!check(&recorded, &recorded, Ends::Rest).defects.is_empty());
         assert!(Corrected::of(&recorded).is_none(), "{height}");
     }
     assert!((20..40).contains(&outliers), "{outliers}");
