@@ -223,7 +223,7 @@ def clipped(rng):
     b = Bench(rng)
     y = b.noisy(b.motion())
     limit = rng.uniform(0.4, 0.8) * np.max(abs(y))
-    return b.record(np.clip(y, -limit, limit), causes=["clipped"], model_holds=False)
+    return b.record(np.clip(y, -limit, limit), causes=["clipped"])
 
 
 @kind("spike")
@@ -248,7 +248,7 @@ def stuck(rng):
     y = b.noisy(b.motion())
     at, count = int(rng.uniform(0.2, 0.5) * len(y)), int(rng.uniform(0.05, 0.3) * b.rate)
     y[at : at + count] = y[at]
-    return b.record(y, causes=["stuck", "jump", "spike"], model_holds=False)
+    return b.record(y, causes=["stuck", "jump", "spike"])
 
 
 @kind("slow probe")
@@ -256,7 +256,7 @@ def slow_probe(rng):
     b = Bench(rng)
     every = int(rng.integers(2, 6))
     y = b.noisy(b.motion())
-    return b.record(y[np.arange(len(y)) // every * every], causes=["slow probe"], model_holds=False)
+    return b.record(y[np.arange(len(y)) // every * every], causes=["slow probe"])
 
 
 @kind("velocity, not stated")

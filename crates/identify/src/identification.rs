@@ -13,7 +13,7 @@ use crate::plausibility::{
     undescribed_steps, unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
-use crate::record_check::Ends;
+use crate::record_check::{Correction, Ends};
 use crate::rounded::RoundedFit;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
@@ -227,8 +227,7 @@ impl Identification {
         prepared: &Prepared<'_>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
         if let Some((found, corrections)) = prepared.fit_in_time() {
-            let analysis = self.with_fit_in_time(prepared, found, !corrections.is_empty())?;
-            return Ok(analysis.after(corrections));
+            return self.with_fit_in_time(prepared, found, corrections);
         }
         if let Some(step) = prepared.rounded_step() {
             let analysis = self.analysed(prepared, None)?;
@@ -343,7 +342,7 @@ impl Identification {
         &self,
         prepared: &Prepared<'_>,
         found: RoundedFit,
-        loses_readings: bool,
+        corrections: Vec<Correction>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
         let RoundedFit { fit, output, noise } = found;
         let gap = noise.gap(&fit);
@@ -365,14 +364,17 @@ impl Identification {
         let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
         let is_plausible = why.is_none();
         let verdict = judged(why, &expected, &fit, chain, judged_up_to_rad_s, |_| None)?;
-        let frf = if loses_readings {
-            expected
-        } else {
+        let verdict = verdict
+            .with(Correction::description(&corrections))
+            .with(Some(noise.description()));
+        let frf = if corrections.is_empty() {
             prepared.frf.clone()
+        } else {
+            expected
         };
         Ok(ExternalAnalysis {
             frf,
-            verdict: verdict.with(Some(noise.description())),
+            verdict,
             fit,
             input_path: self.input_path,
             fitted_lag: None,
@@ -383,7 +385,7 @@ impl Identification {
             band_hz,
             judged_up_to_rad_s,
             periodic: None,
-            corrections: Vec::new(),
+            corrections,
             resolution: prepared.resolution,
             rounded: Some(noise),
             clock_skew: None,

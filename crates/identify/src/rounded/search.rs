@@ -78,10 +78,11 @@ impl<'a> RoundedSearch<'a> {
         }
     }
 
-    /// Whether the modes of each response are added to those before. Lost readings distort the first response, so that its modes may be too
-    /// many.
+    /// Whether the modes of the next response are added to those before, which are near the readings. Those of a response that lost
+    /// readings distort may be too many.
     pub(crate) fn is_grown(&self) -> bool {
-        self.record.is_whole()
+        let is_near = |best: &Order| self.record.is_near(best.found.sigma);
+        self.best.as_ref().is_some_and(is_near)
     }
 
     /// Keeps an order for the stability chart, in place of those with as many modes or more.

@@ -107,7 +107,7 @@ impl<'a> ExternalRecord<'a> {
             ("Times", Some(self.times.to_string())),
             ("Resolution", self.analysis.resolution.description()),
             (
-                "Rounding",
+                "Readings",
                 self.analysis.rounded.map(|rounded| rounded.description()),
             ),
             (

@@ -109,6 +109,17 @@ fn late_values_of_a_slow_probe_are_left_out() {
     );
 }
 
+#[test]
+fn rounded_values_of_a_slow_probe_are_used_once() {
+    errors_are_stated(
+        |values, largest| {
+            let held: Vec<f64> = (0..values.len()).map(|k| values[k / 3 * 3]).collect();
+            rounded(&held, STEP * largest)
+        },
+        &[Correction::Held { samples: 3 }],
+    );
+}
+
 /// A rounded output that is clipped.
 #[test]
 fn rounded_samples_at_a_limit_are_used_as_limits() {
