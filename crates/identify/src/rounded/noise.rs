@@ -19,12 +19,22 @@ use crate::record_check::Reading;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Noise {
     /// The step of the output; `None` if its noise exceeds that.
-    pub(super) step: Option<f64>,
+    step: Option<f64>,
     /// The standard deviation.
-    pub(super) sigma: f64,
+    sigma: f64,
+    /// ln(2 pi s^2)/2.
+    log_scale: f64,
 }
 
 impl Noise {
+    pub(super) fn new(step: Option<f64>, sigma: f64) -> Noise {
+        Noise {
+            step,
+            sigma,
+            log_scale: 0.5 * libm::log(TAU * sigma * sigma),
+        }
+    }
+
     /// ln P of a reading.
     pub(super) fn log_probability(self, reading: Reading, true_value: f64) -> f64 {
         match (reading, self.step) {
@@ -33,7 +43,7 @@ impl Noise {
             }
             (Reading::Value(y), None) => {
                 let error = (y - true_value) / self.sigma;
-                -0.5 * (error * error + libm::log(TAU * self.sigma * self.sigma))
+                -0.5 * error * error - self.log_scale
             }
             (Reading::AtLeast(limit), _) => log_tail_of_normal(self.below(limit, true_value)),
             (Reading::AtMost(limit), _) => log_tail_of_normal(self.above(limit, true_value)),
@@ -130,10 +140,7 @@ mod tests {
     #[test]
     fn readings_at_a_limit_are_those_of_mpmath() {
         for (distance, log_probability, score, information) in EXPECTED {
-            let noise = Noise {
-                step: None,
-                sigma: 2e-6,
-            };
+            let noise = Noise::new(None, 2e-6);
             let true_value = 5e-6 - distance * 2e-6;
             let mirrored = (Reading::AtMost(-5e-6), -true_value);
             for (reading, m, sign) in [

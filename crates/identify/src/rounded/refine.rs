@@ -293,10 +293,7 @@ impl<'a> RoundedRecord<'a> {
     }
 
     fn noise(&self, sigma: f64) -> Noise {
-        Noise {
-            step: self.step,
-            sigma,
-        }
+        Noise::new(self.step, sigma)
     }
 
     /// The standard deviation of greatest likelihood near `start`, to about this ratio.
