@@ -17,9 +17,7 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::{Correction, Resolution};
-use bench_identify::{
-    ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, RoundedOutput,
-};
+use bench_identify::{ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, ReadingsFit};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -60,7 +58,7 @@ struct Report {
     /// Standard deviation of the noise of the output before rounding, if the modes are those of the greatest likelihood of its readings.
     noise_before_rounding: Option<f64>,
     #[serde(skip)]
-    rounded: Option<RoundedOutput>,
+    readings_fit: Option<ReadingsFit>,
     /// Spikes and steps of the output that were corrected, and samples that were left out.
     corrections: Vec<Correction>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
@@ -170,9 +168,9 @@ impl Report {
             output_resolution: analysis.resolution.output,
             resolution: analysis.resolution,
             noise_before_rounding: analysis
-                .rounded
-                .and_then(|rounded| rounded.noise_before_rounding()),
-            rounded: analysis.rounded,
+                .readings_fit
+                .and_then(|fit| fit.noise_before_rounding()),
+            readings_fit: analysis.readings_fit,
             corrections: analysis.corrections.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
             clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),
@@ -281,7 +279,7 @@ impl Report {
 
     /// How the modes of readings were found.
     fn readings_text(&self) -> String {
-        let text = self.rounded.map(|rounded| rounded.description());
+        let text = self.readings_fit.map(|fit| fit.description());
         text.map_or_else(String::new, |text| labelled("readings", &text))
     }
 

@@ -3,11 +3,11 @@
 use crate::Frf;
 use crate::clock_skew::ClockSkew;
 use crate::fitted_lag::FittedLag;
+use crate::in_time::ReadingsFit;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::Source;
 use crate::periodic_part::PeriodicPart;
 use crate::record_check::{Correction, Resolution};
-use crate::rounded::RoundedOutput;
 use crate::verdict::{Cnmp, Verdict};
 use bench_plant::{InputKind, OutputKind};
 
@@ -41,7 +41,7 @@ pub struct ExternalAnalysis {
     /// Steps of the values of input and output that exceed their noise.
     pub resolution: Resolution,
     /// How the modes were found in time, if the output has steps above its noise or lost readings, and they describe its readings.
-    pub rounded: Option<RoundedOutput>,
+    pub readings_fit: Option<ReadingsFit>,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
     /// Where the signals come from.

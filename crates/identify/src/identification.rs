@@ -5,6 +5,7 @@ use crate::external_analysis::ExternalAnalysis;
 use crate::external_signals::ExternalSignals;
 use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
+use crate::in_time::TimeFit;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, OtherKind, Source};
 use crate::periodic::Repetition;
@@ -14,7 +15,6 @@ use crate::plausibility::{
 };
 use crate::prepared::{Prepared, Stated};
 use crate::record_check::{Correction, Ends};
-use crate::rounded::RoundedFit;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
@@ -341,10 +341,10 @@ impl Identification {
     fn with_fit_in_time(
         &self,
         prepared: &Prepared<'_>,
-        found: RoundedFit,
+        found: TimeFit,
         corrections: Vec<Correction>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        let RoundedFit { fit, output, noise } = found;
+        let TimeFit { fit, output, noise } = found;
         let gap = noise.gap(&fit);
         let (low_hz, high_hz) = prepared.band_hz;
         let seen_hz = if gap.is_none() {
@@ -387,7 +387,7 @@ impl Identification {
             periodic: None,
             corrections,
             resolution: prepared.resolution,
-            rounded: Some(noise),
+            readings_fit: Some(noise),
             clock_skew: None,
             is_explained: false,
             is_plausible,
@@ -453,7 +453,7 @@ impl Identification {
             judged_up_to_rad_s,
             periodic: prepared.periodic.clone(),
             corrections: Vec::new(),
-            rounded: None,
+            readings_fit: None,
             resolution: prepared.resolution,
             clock_skew,
             is_explained,

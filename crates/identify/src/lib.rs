@@ -16,7 +16,7 @@
 //! | the estimator that the configuration selects | [`response`] |
 //! | the response while a run goes on | [`GrowingResponse`] |
 //! | defects of an external record | [`record_check`] |
-//! | an output with steps above its noise | [`RoundedOutput`] |
+//! | an output with steps above its noise, or with samples that are no readings | [`ReadingsFit`] |
 //! | the band that an input excites | [`excited_band_hz`] |
 //! | averages of repetitions, of periods, of segments | [`repeated`], [`periodic`], [`welch`] |
 //! | the periods in which a plant settles | [`settling`] |
@@ -51,6 +51,7 @@ pub mod frf_value;
 mod growing;
 mod identification;
 mod identify_response;
+mod in_time;
 mod independent;
 mod local_model;
 mod mean;
@@ -66,7 +67,6 @@ mod profile;
 pub mod record_check;
 mod remedies;
 pub mod repeated;
-mod rounded;
 pub mod scatter;
 mod settings;
 mod signals;
@@ -86,12 +86,12 @@ pub use frf::{Frf, FrfDatum, FrfPoint, PHASE_SIGMA_LIMIT_RAD, Unit, best_of, wra
 pub use growing::{GrowingPoint, GrowingResponse};
 pub use identification::{Identification, IdentificationError};
 pub use identify_response::{ResponseAnalysis, ResponseError, ResponseIdentification};
+pub use in_time::ReadingsFit;
 pub use local_model::{joint, local};
 pub use multisine_lines::distortion::{distortion_ratio, with_distortion};
 pub use multisine_lines::{harmonics, linearity, periodic, settling};
 pub(crate) use noise_parts::{NoiseParts, PowerDatum};
 pub use periodic_part::{Distortion, DistortionSource, PeriodicPart};
-pub use rounded::RoundedOutput;
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
 pub use timing::{resampling, setpoint_timing};

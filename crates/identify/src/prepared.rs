@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use crate::external_signals::ExternalSignals;
+use crate::in_time::{TimeFit, TimeSearch};
 use crate::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
 use crate::observation::{Observation, OtherKind, PART_MODES, Source, describes, fit_part, part};
@@ -12,7 +13,6 @@ use crate::plausibility::cut_within_excitation;
 use crate::record_check::{
     Checked, Correction, Defect, Ends, LostReadings, Reading, Resolution, StrayLine,
 };
-use crate::rounded::{RoundedFit, RoundedSearch};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{OutputKind, SignalPath};
 
@@ -137,7 +137,7 @@ impl<'a> Prepared<'a> {
     /// its readings; with what is left out.
     ///
     /// Of a rounded output all readings are tried first: modes may describe those that seem to be repeated.
-    pub(super) fn fit_in_time(&self) -> Option<(RoundedFit, Vec<Correction>)> {
+    pub(super) fn fit_in_time(&self) -> Option<(TimeFit, Vec<Correction>)> {
         let path = self.simulated_path()?;
         let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
         let tries_all = self.step().is_some() && (is_sound || self.lost.is_some());
@@ -165,9 +165,9 @@ impl<'a> Prepared<'a> {
 
     /// The search begins with a few modes of the response, which steps and lost readings distort, and goes on with those of the response of
     /// the expected output.
-    fn fit_of_readings(&self, readings: &[Reading], path: &SignalPath) -> Option<RoundedFit> {
+    fn fit_of_readings(&self, readings: &[Reading], path: &SignalPath) -> Option<TimeFit> {
         let input = &self.record.signals.input;
-        let mut search = RoundedSearch::new(input, readings, self.step(), path);
+        let mut search = TimeSearch::new(input, readings, self.step(), path);
         let mut orders =
             modal::rising_orders(&part(&self.frf.data), &self.assumed, PART_MODES).ok()?;
         for _ in 0..MAX_RESPONSES {

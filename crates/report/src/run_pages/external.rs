@@ -108,7 +108,7 @@ impl<'a> ExternalRecord<'a> {
             ("Resolution", self.analysis.resolution.description()),
             (
                 "Readings",
-                self.analysis.rounded.map(|rounded| rounded.description()),
+                self.analysis.readings_fit.map(|fit| fit.description()),
             ),
             (
                 "Corrected",

@@ -3,7 +3,7 @@
 //! Unequal steps, another motion of the plant, or a disturbance make the noise seem larger where there are more of them, and scores alike
 //! from one reading to the next.
 
-use super::refine::{FINE, Likeliest, RoundedRecord};
+use super::refine::{FINE, Likeliest, TimeRecord};
 use crate::record_check::Reading;
 
 /// Number of parts of the record with equal information, each of which has its own noise.
@@ -15,7 +15,7 @@ const LAGS: usize = 4;
 /// Largest sum of the squares of the correlations at these lags: chi-square with as many degrees of freedom exceeds it with 0.1 %.
 const MAX_CORRELATION: f64 = 18.5;
 
-impl RoundedRecord<'_> {
+impl TimeRecord<'_> {
     /// Whether a model describes the readings.
     pub(super) fn is_described_by(&self, found: &Likeliest) -> bool {
         self.is_near(found.sigma)
@@ -38,7 +38,7 @@ impl RoundedRecord<'_> {
         let mut gain = 0.0;
         let mut begin = 0;
         for end in ends_of_parts(&found.information) {
-            let part = RoundedRecord {
+            let part = TimeRecord {
                 readings: &self.readings[begin..end],
                 ..*self
             };

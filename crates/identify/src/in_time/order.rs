@@ -1,6 +1,6 @@
 //! A number of modes with its likeliest parameters and its cost.
 
-use super::refine::{Likeliest, RoundedRecord};
+use super::refine::{Likeliest, TimeRecord};
 use crate::modal::{ModalParameters, sigmas_of_residues};
 
 /// Three parameters of a mode, and a factor of 3 because the square of a certainty is only about the gain of -2 ln P.
@@ -16,7 +16,7 @@ pub(super) struct Order {
 
 impl Order {
     /// The likeliest parameters near `start`; `None` if the readings do not determine them.
-    pub(super) fn of(record: &RoundedRecord<'_>, start: ModalParameters) -> Option<Order> {
+    pub(super) fn of(record: &TimeRecord<'_>, start: ModalParameters) -> Option<Order> {
         let found = record.likeliest(start)?;
         let parameters = found.covariance.nrows() as f64;
         let samples = record.count() as f64;
@@ -28,7 +28,7 @@ impl Order {
 
     /// The parameters without the mode of the least certain residue, if the cost may be less then: by about the parameters of a mode times
     /// ln N, less the square of the residue over its standard deviation.
-    fn with_one_less(&self, record: &RoundedRecord<'_>) -> Option<ModalParameters> {
+    fn with_one_less(&self, record: &TimeRecord<'_>) -> Option<ModalParameters> {
         let Likeliest {
             parameters,
             covariance,
@@ -44,7 +44,7 @@ impl Order {
 
     /// The order without its least certain modes, as long as the cost decreases: a fit to the response may begin with modes that rounding
     /// shows. With the order of one more mode, if there were any.
-    pub(super) fn pruned(&self, record: &RoundedRecord<'_>) -> (Order, Option<Order>) {
+    pub(super) fn pruned(&self, record: &TimeRecord<'_>) -> (Order, Option<Order>) {
         let (mut least, mut larger) = (self.clone(), None);
         while let Some(fewer) = least.with_one_less(record) {
             match Order::of(record, fewer) {

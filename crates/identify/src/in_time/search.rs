@@ -3,9 +3,9 @@
 use core::f64::consts::TAU;
 
 use super::order::Order;
-use super::refine::{Likeliest, RoundedRecord, drift_at};
+use super::refine::{Likeliest, TimeRecord, drift_at};
 use super::simulated::Simulation;
-use super::{RoundedFit, RoundedOutput};
+use super::{ReadingsFit, TimeFit};
 use crate::modal::{ModalFit, ModalParameters, ModelOrder, OneMoreMode};
 use crate::record_check::Reading;
 use bench_plant::SignalPath;
@@ -14,9 +14,9 @@ use bench_plant::SignalPath;
 const REST_S: f64 = 0.2;
 
 /// The search for the modes of a rounded output.
-pub(crate) struct RoundedSearch<'a> {
+pub(crate) struct TimeSearch<'a> {
     /// The record up to its rest.
-    record: RoundedRecord<'a>,
+    record: TimeRecord<'a>,
     /// The simulation of the record with its rest.
     whole: Simulation<'a>,
     /// The order of least cost.
@@ -27,7 +27,7 @@ pub(crate) struct RoundedSearch<'a> {
     tried: Vec<ModelOrder>,
 }
 
-impl<'a> RoundedSearch<'a> {
+impl<'a> TimeSearch<'a> {
     /// The search in readings of the output to a held input, one for each of its samples, with their step if that exceeds their noise.
     pub(crate) fn new(
         input: &'a [f64],
@@ -41,8 +41,8 @@ impl<'a> RoundedSearch<'a> {
             input: &input[..end],
             ..whole
         };
-        RoundedSearch {
-            record: RoundedRecord::new(until_rest, &readings[..end], step),
+        TimeSearch {
+            record: TimeRecord::new(until_rest, &readings[..end], step),
             whole,
             best: None,
             next: None,
@@ -116,7 +116,7 @@ impl<'a> RoundedSearch<'a> {
     }
 
     /// The modes, if they describe the readings, and the order of one more mode has a larger cost.
-    pub(crate) fn result(&self, band_hz: (f64, f64)) -> Option<RoundedFit> {
+    pub(crate) fn result(&self, band_hz: (f64, f64)) -> Option<TimeFit> {
         let best = self.best.as_ref()?;
         if !self.record.is_described_by(&best.found) {
             return None;
@@ -128,9 +128,9 @@ impl<'a> RoundedSearch<'a> {
             .record
             .seen_up_to_rad_s(&found, (first_rad_s, TAU * band_hz.1));
         let seen_up_to_hz = seen_rad_s? / TAU;
-        Some(RoundedFit {
+        Some(TimeFit {
             output: self.whole_output(&found),
-            noise: RoundedOutput {
+            noise: ReadingsFit {
                 step: self.record.step,
                 sigma: found.sigma,
                 seen_up_to_hz,

@@ -25,20 +25,20 @@ mod simulated;
 mod tests;
 
 use crate::modal::ModalFit;
-pub(crate) use search::RoundedSearch;
+pub(crate) use search::TimeSearch;
 
 /// The modes of greatest likelihood of the readings of an output.
 #[derive(Debug)]
-pub(crate) struct RoundedFit {
+pub(crate) struct TimeFit {
     pub(crate) fit: ModalFit,
     /// The expected values of the output before rounding, also where readings are lost.
     pub(crate) output: Vec<f64>,
-    pub(crate) noise: RoundedOutput,
+    pub(crate) noise: ReadingsFit,
 }
 
 /// Step and noise of an output whose modes are found in time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RoundedOutput {
+pub struct ReadingsFit {
     /// The step in the unit of the output, if it exceeds the noise.
     pub step: Option<f64>,
     /// Standard deviation of the noise before rounding, in the unit of the output.
@@ -47,7 +47,7 @@ pub struct RoundedOutput {
     pub seen_up_to_hz: f64,
 }
 
-impl RoundedOutput {
+impl ReadingsFit {
     /// Why no verdict follows, if a mode lies above a range in which the readings would not show one.
     pub(crate) fn gap(&self, fit: &ModalFit) -> Option<String> {
         let frequencies = fit

@@ -42,7 +42,7 @@ const HOPELESS_STEPS: usize = 3;
 
 /// Readings of the output to a known input.
 #[derive(Clone, Copy)]
-pub(super) struct RoundedRecord<'a> {
+pub(super) struct TimeRecord<'a> {
     pub(super) simulation: Simulation<'a>,
     pub(super) readings: &'a [Reading],
     /// The step of the readings; `None` if their noise exceeds it.
@@ -102,17 +102,17 @@ struct Climbed {
     sigma: f64,
 }
 
-impl<'a> RoundedRecord<'a> {
+impl<'a> TimeRecord<'a> {
     pub(super) fn new(
         simulation: Simulation<'a>,
         readings: &'a [Reading],
         step: Option<f64>,
-    ) -> RoundedRecord<'a> {
+    ) -> TimeRecord<'a> {
         let (ratios, unit) = match step {
             Some(step) => (SIGMA_STEPS, step),
             None => (SIGMA_RATIOS, range(readings).max(f64::MIN_POSITIVE)),
         };
-        RoundedRecord {
+        TimeRecord {
             simulation,
             readings,
             step,

@@ -86,13 +86,13 @@ fn signals(output: Vec<f64>) -> Signals {
 }
 
 /// The modes of rounded readings, beginning with a fit to their response.
-fn fitted(values: Vec<f64>, step: f64) -> Option<RoundedFit> {
+fn fitted(values: Vec<f64>, step: f64) -> Option<TimeFit> {
     let readings: Vec<Reading> = values.iter().copied().map(Reading::Value).collect();
     fitted_to(&readings, values, Some(step))
 }
 
 /// The modes of readings, beginning with a fit to the response of an output.
-fn fitted_to(readings: &[Reading], output: Vec<f64>, step: Option<f64>) -> Option<RoundedFit> {
+fn fitted_to(readings: &[Reading], output: Vec<f64>, step: Option<f64>) -> Option<TimeFit> {
     let signals = signals(output);
     let frf = response(
         &signals,
@@ -109,7 +109,7 @@ fn fitted_to(readings: &[Reading], output: Vec<f64>, step: Option<f64>) -> Optio
     };
     let chain = MeasurementChain::Bench(path.clone());
     let orders = modal::rising_orders(&frf.data, &chain, 6).expect("modes");
-    let mut search = RoundedSearch::new(&signals.input, readings, step, &path);
+    let mut search = TimeSearch::new(&signals.input, readings, step, &path);
     search.try_modes(orders);
     search.result(BAND_HZ)
 }
@@ -339,7 +339,7 @@ fn identification_of_a_rounded_output_decides_with_the_true_modes() {
     let found = identification
         .run(&sweep(), &rounded(&values, step))
         .expect("an analysis");
-    let noise = found.rounded.expect("a rounded output");
+    let noise = found.readings_fit.expect("a rounded output");
     assert!(
         (noise.step.expect("a step") / step - 1.0).abs() < 1e-9,
         "{noise:?}"

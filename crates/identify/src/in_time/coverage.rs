@@ -13,7 +13,7 @@
 
 use nalgebra::Complex;
 
-use super::refine::{Likeliest, RoundedRecord};
+use super::refine::{Likeliest, TimeRecord};
 use bench_plant::zeros::{ModalSum, ModalTerm, cnmp_pairs};
 
 /// Zeros may lie below a mode that is not seen, but not much below it: those beside it, as the response around it is that of other modes.
@@ -29,7 +29,7 @@ const NEAR_RESONANCE: f64 = 0.3;
 /// A residue of as many standard deviations is seen.
 const SEEN_SIGMAS: f64 = 5.0;
 
-impl RoundedRecord<'_> {
+impl TimeRecord<'_> {
     /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen or does no harm, at most `to_rad_s`.
     pub(super) fn seen_up_to_rad_s(
         &self,
