@@ -87,23 +87,22 @@ impl ClockSkew {
         // The turn of a datum is an approximation: the plant responds for a while after t(f). Of a small rest the error is small.
         let mut before: Option<ModalFit> = None;
         for _ in 0..MAX_CORRECTIONS {
-            let corrected = ExternalSignals {
-                signals: &skew.corrected(record.signals),
-                ..record
-            };
-            let turned = turned(corrected)?;
+            let corrected = skew.corrected(record.signals);
+            let turned = turned(record.with_signals(&corrected))?;
             let part = turned.thinned(FITTED_DATA);
-            let fit = part.few_modes()?;
+            let Some(fit) = part.few_modes() else {
+                // Modes in the place of the rest of the turn are not determined.
+                skew.ratio = after(skew.ratio, part.rest_of_large_modes()?);
+                before = None;
+                continue;
+            };
             let is_stuck = |before: &ModalFit| !describes(&fit) && !is_progress(before, &fit);
             if before.as_ref().is_some_and(is_stuck) {
                 return None;
             }
             let used = if describes(&fit) { turned } else { part };
             let rest = used.refined(&fit.parameters, 0.0)?;
-            skew.ratio = Estimate {
-                value: (1.0 + skew.ratio.value) * (1.0 + rest.value) - 1.0,
-                sigma: rest.sigma,
-            };
+            skew.ratio = after(skew.ratio, rest);
             let is_found = describes(&fit) && rest.value.abs() < NEGLIGIBLE_SIGMAS * rest.sigma;
             before = Some(fit);
             if is_found {
@@ -115,16 +114,20 @@ impl ClockSkew {
         (is_described && is_certain).then_some(skew)
     }
 
-    /// The record with the output at the times of the input.
+    /// The record with the output at the times of the input, up to the last reading of the output: after it, resampling would repeat that
+    /// reading with its noise, which is taken for a spike.
     pub(super) fn corrected(&self, signals: &Signals) -> Signals {
         let period_s = 1.0 / signals.rate_hz;
+        let last = signals.len().saturating_sub(1) as f64 * (1.0 + self.ratio.value);
+        let count = signals.len().min(last as usize + 1);
         let mut readings = Readings::default();
         for (k, output) in signals.output.iter().enumerate() {
             readings.push(k as f64 * period_s * (1.0 + self.ratio.value), *output);
         }
         Signals {
-            output: readings.at_regular_times(0.0, period_s, signals.len()),
-            ..signals.clone()
+            rate_hz: signals.rate_hz,
+            input: signals.input[..count].to_vec(),
+            output: readings.at_regular_times(0.0, period_s, count),
         }
     }
 
@@ -189,6 +192,14 @@ impl ClockSkew {
             ppm.value.abs(),
             ppm.half_width_95()
         )
+    }
+}
+
+/// The ratio of a record, of which a rest was found after a correction.
+fn after(corrected: Estimate, rest: Estimate) -> Estimate {
+    Estimate {
+        value: (1.0 + corrected.value) * (1.0 + rest.value) - 1.0,
+        sigma: rest.sigma,
     }
 }
 
@@ -316,6 +327,14 @@ impl<'a> TurnedData<'a> {
     /// A few modes of the data as they are.
     fn few_modes(&self) -> Option<ModalFit> {
         modal::fit_few(&self.data, self.chain, &Residues::Real, FITTED_MODES).ok()
+    }
+
+    /// The ratio near zero with which modes describe the data best but for the smaller errors of [`RELATIVE_ERRORS`]: modes that are
+    /// larger than the rest of the turn.
+    fn rest_of_large_modes(&self) -> Option<Estimate> {
+        let [.., relative_error] = RELATIVE_ERRORS;
+        let inexact = self.with_relative_error(relative_error);
+        inexact.refined(&inexact.few_modes()?.parameters, 0.0)
     }
 
     /// The ratio of least chi^2 near one.

@@ -41,6 +41,18 @@ impl<'a> ExternalSignals<'a> {
         }
     }
 
+    /// The record with other signals of the same times, which may end before.
+    pub(super) fn with_signals<'b>(&self, signals: &'b Signals) -> ExternalSignals<'b>
+    where
+        'a: 'b,
+    {
+        ExternalSignals {
+            signals,
+            reference: self.reference.map(|reference| &reference[..signals.len()]),
+            ends: self.ends,
+        }
+    }
+
     pub(super) fn check(&self) -> Result<(), IdentifyError> {
         self.signals.check()?;
         match self.reference {

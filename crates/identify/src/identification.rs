@@ -268,22 +268,19 @@ impl Identification {
     /// The analysis of a record with its output at the times of the input, if these differ, and if modes describe the response then.
     fn with_one_clock(
         &self,
-        prepared: &Prepared<'_>,
+        recorded: &Prepared<'_>,
     ) -> Result<Option<ExternalAnalysis>, IdentificationError> {
         // A resampled output has no steps by which its errors could be known.
-        let has_steps = prepared.resolution.output.is_some();
-        if self.repetition.is_some() || has_steps || !prepared.is_sound() {
+        let has_steps = recorded.resolution.output.is_some();
+        if self.repetition.is_some() || has_steps || !recorded.is_sound() {
             return Ok(None);
         }
-        let record = prepared.record;
-        let Some(skew) = ClockSkew::find(record, prepared.band_hz, &prepared.assumed) else {
+        let record = recorded.record;
+        let Some(skew) = ClockSkew::find(record, recorded.band_hz, &recorded.assumed) else {
             return Ok(None);
         };
-        let corrected = ExternalSignals {
-            signals: &skew.corrected(record.signals),
-            ..record
-        };
-        let Ok(prepared) = self.prepared(corrected) else {
+        let corrected = skew.corrected(record.signals);
+        let Ok(prepared) = self.prepared(record.with_signals(&corrected)) else {
             return Ok(None);
         };
         let analysis = self.analysed(&prepared, Some(skew))?;

@@ -171,3 +171,30 @@ fn lost_samples_are_no_difference_of_clocks() {
     );
     assert_eq!(found.clock_skew, None, "{}", found.verdict.why);
 }
+
+/// The output of a fast clock ends before the input: there is nothing to be resampled after its last reading.
+#[test]
+fn a_corrected_record_ends_with_the_last_reading() {
+    // Of 60 000 samples that are 1e-3 too early, the last one was read 60 samples before that of the input.
+    let mut input = input();
+    input.resize(60_000, 0.0);
+    let skew = ClockSkew {
+        ratio: Estimate {
+            value: -1e-3,
+            sigma: 1e-6,
+        },
+        duration_s: input.len() as f64 / RATE_HZ,
+    };
+    let times = (0..input.len()).map(|k| k as f64 / RATE_HZ * (1.0 - 1e-3));
+    let times_s: Vec<f64> = times.collect();
+    let signals = Signals {
+        rate_hz: RATE_HZ,
+        output: output(&input, &times_s, &MODES, 9),
+        input,
+    };
+    let corrected = skew.corrected(&signals);
+    let record = ExternalSignals::new(&corrected, None, None);
+    assert_eq!(record.defects(&record), []);
+    assert_eq!(corrected.output.len(), 59_940);
+    assert_eq!(corrected.input[..], signals.input[..59_940]);
+}
