@@ -8,6 +8,7 @@ use crate::fitted_lag::FittedLag;
 use crate::in_time::TimeFit;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, OtherKind, Source};
+use crate::other_kind::clear_kind;
 use crate::periodic::Repetition;
 use crate::plausibility::{
     OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
@@ -244,6 +245,7 @@ impl Identification {
         let analysis = self.with_other_model(record, analysis, complex_model)?;
         // Complex residues are tried first: a small difference of the clocks easily takes their place.
         let is_open = analysis.verdict.cnmp == Cnmp::Undecided
+            && !analysis.is_explained
             && analysis.fitted_lag.is_none()
             && analysis.has_real_residues();
         if is_open
@@ -265,7 +267,8 @@ impl Identification {
         Prepared::of(record, self.source(), stated)
     }
 
-    /// The analysis of a record with its output at the times of the input, if these differ, and if modes describe the response then.
+    /// The analysis of a record with its output at the times of the input, if these differ, and if modes describe the response then, but
+    /// not that of the record as another kind of output.
     fn with_one_clock(
         &self,
         recorded: &Prepared<'_>,
@@ -289,7 +292,13 @@ impl Identification {
             fit.is_sum_of_few_modes() && skew.is_confirmed(fit, record, data, &analysis.chain)
         });
         // The turn that two clocks cause may also describe a part of complex residues, and leave an implausible response.
-        Ok((is_confirmed && analysis.is_plausible).then_some(analysis))
+        let is_likely = is_confirmed && analysis.is_plausible && !self.is_other_kind(recorded);
+        Ok(is_likely.then_some(analysis))
+    }
+
+    /// Whether the output is clearly of a kind that the user does not state. With it the response needs no other explanation.
+    fn is_other_kind(&self, prepared: &Prepared<'_>) -> bool {
+        self.output_kind.is_none() && clear_kind(&prepared.with_few_modes()).is_some()
     }
 
     /// The analysis with a lag that is not stated, or with complex residues, as `model` finds them, if modes with real ones do not describe

@@ -194,7 +194,7 @@ fn a_corrected_record_ends_with_the_last_reading() {
     };
     let corrected = skew.corrected(&signals);
     let record = ExternalSignals::new(&corrected, None, None);
-    assert_eq!(record.defects(&record), []);
+    assert_eq!(record.checked(&record).defects, []);
     assert_eq!(corrected.output.len(), 59_940);
     assert_eq!(corrected.input[..], signals.input[..59_940]);
 }
