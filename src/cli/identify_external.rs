@@ -55,7 +55,7 @@ struct Report {
     output_resolution: Option<f64>,
     #[serde(skip)]
     resolution: Resolution,
-    /// Standard deviation of the noise of the output before rounding, if the modes are those of the greatest likelihood of its readings.
+    /// Standard deviation of the noise of the output before rounding, if the modes are those of the greatest likelihood of its rounded readings.
     noise_before_rounding: Option<f64>,
     #[serde(skip)]
     readings_fit: Option<ReadingsFit>,

@@ -55,10 +55,12 @@ pub struct ExternalAnalysis {
 }
 
 impl ExternalAnalysis {
-    /// The analysis of a record in which spikes and steps were corrected before, or samples left out.
-    pub(super) fn after(self, corrections: Vec<Correction>) -> ExternalAnalysis {
+    /// The analysis of a record in which spikes and steps were corrected before.
+    pub(super) fn after(self, mut corrections: Vec<Correction>) -> ExternalAnalysis {
+        let verdict = self.verdict.with(Correction::description(&corrections));
+        corrections.extend(self.corrections);
         ExternalAnalysis {
-            verdict: self.verdict.with(Correction::description(&corrections)),
+            verdict,
             corrections,
             ..self
         }

@@ -16,17 +16,17 @@ use crate::record_check::{
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{OutputKind, SignalPath};
 
-/// Number of responses with whose modes the search for those of a rounded output begins.
+/// Number of responses with whose modes the search in time begins.
 const MAX_RESPONSES: usize = 4;
 
-/// Number of modes that the search for those of a rounded output adds by one response.
+/// Number of modes that the search in time adds by one response.
 const MORE_MODES: usize = 4;
 
 /// Readings are left, but no modes describe them.
 const NO_MODES_OF_READINGS: &str = "no sum of modes describes the other readings";
 
 /// Readings are left, but they have no simulation.
-const HOLD_MAY_HELP: &str = "a verdict from the other readings needs a position from rest to rest, and --hold zoh if each sample of the input is held until the next one";
+const HOLD_MAY_HELP: &str = "a verdict from the other readings needs a position from rest to rest, without --reference and --period, and --hold zoh if each sample of the input is held until the next one";
 
 /// What the user states of external signals.
 pub(super) struct Stated {

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis. A higher one that is not seen
-//! does no harm if the number of CNMP pairs in the band is the same with it, of either sign.
+//! does no harm if the number of CNMP pairs in the band is the same with it, of either sign, and with any residue up to 5 sigma_r: a large
+//! hidden mode may have none where a smaller one has a pair.
 
 use nalgebra::Complex;
 
@@ -26,6 +27,10 @@ const AROUND: f64 = 1.1;
 const NODES: usize = 11;
 /// Near its resonance the output of a mode is above this ratio of its largest value.
 const NEAR_RESONANCE: f64 = 0.3;
+/// A hidden mode with a peak below this ratio of the response around it has its zeros beside its pole.
+const LEAST_HIDDEN: f64 = 0.1;
+/// Below this ratio of the two, nothing is known of a hidden mode.
+const MIN_HIDDEN_RATIO: f64 = 1e-6;
 /// A residue of as many standard deviations is seen.
 const SEEN_SIGMAS: f64 = 5.0;
 
@@ -52,7 +57,8 @@ impl TimeRecord<'_> {
             };
             let peak = hidden.residue_per_kg / (2.0 * zeta * trial_rad_s * trial_rad_s);
             let is_seen = peak < largest_around(&sum, trial_rad_s);
-            if !is_seen && !is_harmless(&sum, hidden, to_rad_s) {
+            let least = LEAST_HIDDEN * largest_around(&sum, trial_rad_s) / peak;
+            if !is_seen && !is_harmless(&sum, hidden, least, to_rad_s) {
                 return Some(from_rad_s.max(BELOW_UNSEEN * seen_rad_s));
             }
             seen_rad_s = trial_rad_s;
@@ -72,13 +78,14 @@ fn information(output: &[f64], of_readings: &[f64]) -> f64 {
         .sum()
 }
 
-/// Whether a mode of either sign leaves the number of CNMP pairs up to a frequency as it is.
-fn is_harmless(sum: &ModalSum, hidden: ModalTerm, to_rad_s: f64) -> bool {
+/// Whether a mode of either sign, with any residue from a ratio `least` of that of `hidden` up to it, leaves the number of CNMP pairs up to
+/// a frequency as it is.
+fn is_harmless(sum: &ModalSum, hidden: ModalTerm, least: f64, to_rad_s: f64) -> bool {
     let Some(pairs) = pairs_up_to(sum, to_rad_s) else {
         return false;
     };
-    let leaves_pairs = |sign: f64| {
-        let residue_per_kg = sign * hidden.residue_per_kg;
+    let leaves_pairs = |ratio: f64| {
+        let residue_per_kg = ratio * hidden.residue_per_kg;
         let hidden = ModalTerm {
             residue_per_kg,
             ..hidden
@@ -87,7 +94,10 @@ fn is_harmless(sum: &ModalSum, hidden: ModalTerm, to_rad_s: f64) -> bool {
         let with_hidden = ModalSum::new(terms, sum.constant_m_per_n()).ok();
         with_hidden.and_then(|sum| pairs_up_to(&sum, to_rad_s)) == Some(pairs)
     };
-    leaves_pairs(1.0) && leaves_pairs(-1.0)
+    let is_possible = hidden.residue_per_kg.is_finite() && least > MIN_HIDDEN_RATIO;
+    let halved = std::iter::successors(Some(1.0), |ratio| Some(0.5 * ratio));
+    let mut ratios = halved.take_while(|ratio| *ratio >= least);
+    is_possible && ratios.all(|ratio| leaves_pairs(ratio) && leaves_pairs(-ratio))
 }
 
 /// The number of CNMP pairs up to a frequency, if it can be computed.

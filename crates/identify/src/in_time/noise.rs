@@ -80,14 +80,14 @@ impl Noise {
         }
     }
 
-    /// By how many standard deviations the true value is below the lower end of the readings at an upper limit.
+    /// By how many standard deviations the true value is below an upper limit.
     fn below(self, limit: f64, true_value: f64) -> f64 {
-        (limit - 0.5 * self.step.unwrap_or(0.0) - true_value) / self.sigma
+        (limit - true_value) / self.sigma
     }
 
-    /// By how many standard deviations the true value is above the upper end of the readings at a lower limit.
+    /// By how many standard deviations the true value is above a lower limit.
     fn above(self, limit: f64, true_value: f64) -> f64 {
-        (true_value - limit - 0.5 * self.step.unwrap_or(0.0)) / self.sigma
+        (true_value - limit) / self.sigma
     }
 }
 

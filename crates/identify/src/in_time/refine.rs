@@ -37,7 +37,7 @@ pub(super) const FINE: f64 = 0.02;
 const MIN_INFORMATION: f64 = 5.0;
 /// A noise with too little information is increased by this factor.
 const SIGMA_RATIO: f64 = 1.3;
-/// After as many steps an order that leaves a larger noise than [`MAX_SIGMA_STEPS`] is given up.
+/// After as many steps an order that leaves a larger noise than [`MAX_SIGMA_STEPS`] is given up, if no reading is lost.
 const HOPELESS_STEPS: usize = 3;
 
 /// Readings of the output to a known input.

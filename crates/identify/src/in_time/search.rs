@@ -1,4 +1,4 @@
-//! The search for the number of modes of a rounded output.
+//! The search for the number of modes of an output that is rounded, or of which readings are lost.
 
 use core::f64::consts::TAU;
 
@@ -12,8 +12,10 @@ use bench_plant::SignalPath;
 
 /// Readings that do not change after the last change and this time tell nothing more.
 const REST_S: f64 = 0.2;
+/// Modes are looked for from this ratio of the first frequency on, or from the beginning of the band.
+const BELOW_FIRST: f64 = 0.1;
 
-/// The search for the modes of a rounded output.
+/// The search for the modes of readings.
 pub(crate) struct TimeSearch<'a> {
     /// The record up to its rest.
     record: TimeRecord<'a>,
@@ -78,8 +80,8 @@ impl<'a> TimeSearch<'a> {
         }
     }
 
-    /// Whether the modes of the next response are added to those before, which are near the readings. Those of a response that lost
-    /// readings distort may be too many.
+    /// Whether the modes of the next response are added to those before. Those of a rounded output that are far from its readings may be too
+    /// many.
     pub(crate) fn is_grown(&self) -> bool {
         let is_near = |best: &Order| self.record.is_near(best.found.sigma);
         self.best.as_ref().is_some_and(is_near)
@@ -124,9 +126,15 @@ impl<'a> TimeSearch<'a> {
         let (Order { cost, found }, larger) = best.pruned(&self.record);
         let next = larger.as_ref().or(self.next.as_ref())?;
         let first_rad_s = found.parameters.modes.first()?.omega_rad_s;
+        // Lost readings may hide a mode below the first one as well.
+        let from_rad_s = if self.record.is_whole() {
+            first_rad_s
+        } else {
+            first_rad_s.min((TAU * band_hz.0).max(BELOW_FIRST * first_rad_s))
+        };
         let seen_rad_s = self
             .record
-            .seen_up_to_rad_s(&found, (first_rad_s, TAU * band_hz.1));
+            .seen_up_to_rad_s(&found, (from_rad_s, TAU * band_hz.1));
         let seen_up_to_hz = seen_rad_s? / TAU;
         Some(TimeFit {
             output: self.whole_output(&found),

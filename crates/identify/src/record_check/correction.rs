@@ -51,7 +51,7 @@ pub enum Correction {
         /// The height.
         height: f64,
     },
-    /// Samples that repeat the one before them, because the probe was stuck, were left out.
+    /// Samples of the same value, because the probe was stuck or lost its target, were left out.
     Repeated {
         /// Time of the first one.
         time_s: f64,
@@ -108,7 +108,7 @@ impl fmt::Display for Correction {
                 };
                 write!(
                     f,
-                    "{samples} samples of the output{more}, the first one at {time_s:.4} s, repeat the one before them and were left out; check the probe and its connection"
+                    "{samples} samples of the output{more}, the first one at {time_s:.4} s, have the same value as those around them and were left out; check the probe and its connection"
                 )
             }
             Correction::Clipped {

@@ -29,7 +29,13 @@ const MIN_AGREEING: usize = 3;
 /// motion, neighbouring values may be equal.
 const MIN_CHANGE_STEPS: f64 = 1.5;
 
-/// A change of the output.
+/// This ratio of the changes comes at one phase of a slow probe. By chance 64 changes do so with probability 2^-60.
+const MIN_IN_PHASE: f64 = 0.98;
+const MIN_CHANGES_IN_PHASE: usize = 64;
+/// Largest number of samples for each value that is looked for by the phase.
+const MAX_SAMPLES_IN_PHASE: usize = 64;
+
+/// A change of a signal.
 #[derive(Clone, Copy, Debug)]
 struct Change {
     sample: usize,
@@ -49,6 +55,34 @@ struct Window {
 /// The samples for each value of an output that changes less often than it is logged, where its values have this step.
 pub(super) fn held(signals: &Signals, step: f64) -> Option<f64> {
     let changes = changes(&signals.output);
+    held_in_windows(&changes, step).or_else(|| held_in_phase(changes, step, &signals.input))
+}
+
+/// A whole number of samples for each value if nearly all changes of the output by more than a step come at one phase of it, but not those of
+/// the input. A coarse output may have the same value twice wherever it turns, so that its windows are not regular.
+fn held_in_phase(mut output: Vec<Change>, step: f64, input: &[f64]) -> Option<f64> {
+    output.retain(|change| change.height > MIN_CHANGE_STEPS * step);
+    if output.len() < MIN_CHANGES_IN_PHASE {
+        return None;
+    }
+    let input = changes(input);
+    let samples = (2..=MAX_SAMPLES_IN_PHASE)
+        .rev()
+        .find(|samples| are_in_phase(&output, *samples) && !are_in_phase(&input, *samples))?;
+    Some(samples as f64)
+}
+
+/// Whether nearly all changes come at one phase of a number of samples.
+fn are_in_phase(changes: &[Change], samples: usize) -> bool {
+    let mut counts = vec![0; samples];
+    for change in changes {
+        counts[change.sample % samples] += 1;
+    }
+    let most = counts.into_iter().max().unwrap_or(0);
+    most as f64 >= MIN_IN_PHASE * changes.len() as f64
+}
+
+fn held_in_windows(changes: &[Change], step: f64) -> Option<f64> {
     let windows = changes.chunks_exact(WINDOW).map(Window::of);
     let mut moving: Vec<Window> = windows
         .filter(|window| window.height > MIN_CHANGE_STEPS * step)
@@ -66,8 +100,8 @@ pub(super) fn held(signals: &Signals, step: f64) -> Option<f64> {
     is_held.then(|| sum / agreeing.len() as f64)
 }
 
-fn changes(output: &[f64]) -> Vec<Change> {
-    let pairs = output.windows(2).enumerate();
+fn changes(samples: &[f64]) -> Vec<Change> {
+    let pairs = samples.windows(2).enumerate();
     let changed = pairs.filter(|(_, pair)| pair[0] != pair[1]);
     let change = |(k, pair): (usize, &[f64])| Change {
         sample: k + 1,

@@ -1,7 +1,7 @@
 //! What is left of an output some of whose samples are no readings: stuck ones, those at a limit, and those that a slow probe repeats.
 //!
 //! ```text
-//! sample of a probe that is stuck, or has no new value    lost: it tells nothing of the output
+//! sample of a probe that is stuck, or has no new value    lost: it tells nothing of the output (nor does the first one, as of a dropout to 0)
 //! sample at the upper (lower) limit of a clipped output   at least (at most) this
 //! other sample                                            its value
 //! ```
@@ -9,7 +9,6 @@
 use super::correction::Correction;
 use super::defect::WHOLE;
 use super::plateaus::{Limit, Run};
-use crate::Signals;
 
 /// At most this ratio of the changes of a slow probe lie between its readings, because a value was late.
 const MAX_LATE_RATIO: f64 = 0.02;
@@ -36,31 +35,39 @@ pub struct LostReadings {
     pub corrections: Vec<Correction>,
 }
 
+/// The output of a record.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Channel {
+    pub(super) rate_hz: f64,
+    /// The step of its values; 0 without one.
+    pub(super) step: f64,
+    /// Whether values are equal because of the step.
+    pub(super) has_step: bool,
+}
+
 impl LostReadings {
     /// The readings with what is known to be lost; `None` if nothing is. `held` is the number of samples for each value of a slow probe.
     pub(super) fn of(
-        recorded: &Signals,
+        output: &[f64],
+        channel: Channel,
         held: Option<f64>,
         limits: &[Limit],
         runs: &[Run],
     ) -> Option<LostReadings> {
-        let rate_hz = recorded.rate_hz;
         let mut lost = LostReadings {
-            readings: recorded
-                .output
-                .iter()
-                .copied()
-                .map(Reading::Value)
-                .collect(),
+            readings: output.iter().copied().map(Reading::Value).collect(),
             corrections: Vec::new(),
         };
         if let Some(samples) = held {
-            lost.keep_changes(&recorded.output, samples)?;
+            lost.keep_changes(output, samples)?;
         }
         for limit in limits {
-            lost.set_limit(limit, rate_hz);
+            lost.set_limit(limit, channel);
         }
-        lost.leave_out(runs, rate_hz);
+        if let Some(samples) = held.filter(|_| !channel.has_step) {
+            lost.leave_out_old(samples.round() as usize);
+        }
+        lost.leave_out(runs, channel.rate_hz);
         (!lost.corrections.is_empty()).then_some(lost)
     }
 
@@ -81,7 +88,6 @@ impl LostReadings {
             return None;
         }
         for (k, reading) in self.readings.iter_mut().enumerate() {
-            // The first value of the record is that of its first sample, or of one before.
             let is_new = k % every == phase;
             let is_late = (k + 1..output.len().min(k + every)).any(|later| is_change(&later));
             if !is_new || is_late {
@@ -92,28 +98,40 @@ impl LostReadings {
         Some(())
     }
 
-    /// Of the samples at a limit only that is known.
-    fn set_limit(&mut self, limit: &Limit, rate_hz: f64) {
-        let beyond = if limit.is_upper {
-            Reading::AtLeast(limit.value)
-        } else {
-            Reading::AtMost(limit.value)
-        };
-        let mut samples = 0;
-        for reading in &mut self.readings {
-            if *reading == Reading::Value(limit.value) {
-                *reading = beyond;
-                samples += 1;
+    /// Leaves out the values of a slow probe that are equal to the one before, `every` samples earlier. Without a step they are no new ones.
+    fn leave_out_old(&mut self, every: usize) {
+        for k in (every..self.readings.len()).rev() {
+            let is_value = matches!(self.readings[k], Reading::Value(_));
+            if is_value && self.readings[k] == self.readings[k - every] {
+                self.readings[k] = Reading::Lost;
             }
         }
+    }
+
+    /// Of the samples at a limit only that is known: with a step, the true value is less than half of it below an upper limit.
+    fn set_limit(&mut self, limit: &Limit, channel: Channel) {
+        let beyond = if limit.is_upper {
+            Reading::AtLeast(limit.value - 0.5 * channel.step)
+        } else {
+            Reading::AtMost(limit.value + 0.5 * channel.step)
+        };
+        let at_limit = |reading: &Reading| *reading == Reading::Value(limit.value);
+        let Some(first) = self.readings.iter().position(at_limit) else {
+            return;
+        };
+        let mut samples = 0;
+        for reading in self.readings.iter_mut().filter(|reading| at_limit(reading)) {
+            *reading = beyond;
+            samples += 1;
+        }
         self.corrections.push(Correction::Clipped {
-            time_s: limit.first as f64 / rate_hz,
+            time_s: first as f64 / channel.rate_hz,
             value: limit.value,
             samples,
         });
     }
 
-    /// Leaves out the samples that repeat the first one of a run. A run at a limit is no repetition.
+    /// Leaves out the samples of runs. Those of a run at a limit are kept.
     fn leave_out(&mut self, runs: &[Run], rate_hz: f64) {
         let is_value = |run: &&Run| matches!(self.readings[run.start], Reading::Value(_));
         let mut runs: Vec<Run> = runs.iter().filter(is_value).copied().collect();
@@ -123,11 +141,11 @@ impl LostReadings {
         };
         let mut samples = 0;
         for run in &runs {
-            self.readings[run.repetitions()].fill(Reading::Lost);
-            samples += run.repetitions().len();
+            self.readings[run.range()].fill(Reading::Lost);
+            samples += run.range().len();
         }
         self.corrections.push(Correction::Repeated {
-            time_s: (first.start + 1) as f64 / rate_hz,
+            time_s: first.start as f64 / rate_hz,
             samples,
             places: runs.len(),
         });

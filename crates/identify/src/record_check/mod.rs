@@ -21,6 +21,7 @@ pub use defect::Defect;
 use ends::motion_at_ends;
 pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};
 use held::held;
+use lost::Channel;
 pub use lost::{LostReadings, Reading};
 use plateaus::{Quantisation, limits, repeated};
 use prediction::Prediction;
@@ -72,7 +73,10 @@ pub fn check(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Checked {
 fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) -> Option<Checked> {
     let rate_hz = recorded.rate_hz;
     let held = held(recorded, step);
-    let limits = limits(&recorded.output);
+    // A slow probe holds each of its values, so that the samples between them are no plateau.
+    let every = held.map_or(1, |samples| samples.round().max(1.0) as usize);
+    let values: Vec<f64> = recorded.output.iter().copied().step_by(every).collect();
+    let limits = limits(&values);
     let runs = match held {
         Some(_) => Vec::new(),
         None => repeated(recorded, quantisation),
@@ -82,6 +86,11 @@ fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) ->
         probe_hz: rate_hz / samples,
     };
     let of_limit = || limits.first().map(|limit| limit.defect(rate_hz));
+    let channel = Channel {
+        rate_hz,
+        step,
+        has_step: quantisation.is_some(),
+    };
     let of_run = || {
         let run = runs.first()?;
         Some(run.defect(recorded, quantisation.is_some()))
@@ -89,7 +98,7 @@ fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) ->
     let defect = held.map(of_probe).or_else(of_limit).or_else(of_run)?;
     let lost = defect
         .loses_readings()
-        .then(|| LostReadings::of(recorded, held, &limits, &runs));
+        .then(|| LostReadings::of(&recorded.output, channel, held, &limits, &runs));
     Some(Checked {
         defects: vec![defect],
         lost: lost.flatten(),

@@ -98,9 +98,8 @@ pub(super) fn repeated(signals: &Signals, quantisation: Option<Quantisation>) ->
 }
 
 impl Run {
-    /// The samples after the first one, which is a reading.
-    pub(super) fn repetitions(&self) -> Range<usize> {
-        self.start + 1..self.start + self.samples
+    pub(super) fn range(&self) -> Range<usize> {
+        self.start..self.start + self.samples
     }
 
     /// The run as a defect. A quantised output that came from fast motion is no command at rest.

@@ -269,6 +269,23 @@ fn probe_slower_than_the_log_is_found_with_its_rate() {
     }
 }
 
+/// In slow motion neighbouring values of the probe are equal: half of all windows have one such pair or more.
+#[test]
+fn coarse_values_of_a_slow_probe_are_found_by_their_phase() {
+    for samples in [2, 3, 7] {
+        let mut signals = rounded_to(20.0, signals());
+        let values = signals.output.clone();
+        signals.output = (0..values.len())
+            .map(|k| values[k / samples * samples])
+            .collect();
+        let found = found_in(&signals, Ends::Rest);
+        assert!(
+            matches!(found[..], [Defect::Held { samples: held, .. }] if held == samples as f64),
+            "{samples}: {found:?}"
+        );
+    }
+}
+
 #[test]
 fn ramp_of_an_encoder_is_no_slow_probe() {
     let mut signals = signals();

@@ -5,7 +5,6 @@ use crate::ExternalAnalysis;
 use crate::record_check::Correction;
 use crate::verdict::Cnmp;
 
-/// Noise as a ratio of the largest amplitude: that of [`noisy`].
 const SEEDS: u64 = 8;
 
 /// The output of the stage with noise and without rounding, and its largest value.
@@ -43,8 +42,8 @@ fn errors_are_stated(spoil: impl Fn(Vec<f64>, f64) -> Vec<f64>, expected: &[Corr
 #[test]
 fn stuck_samples_are_left_out() {
     let repeated = Correction::Repeated {
-        time_s: 6.002,
-        samples: 149 + 59,
+        time_s: 6.0,
+        samples: 150 + 60,
         places: 2,
     };
     let stick = |mut values: Vec<f64>, _| {
@@ -57,6 +56,23 @@ fn stuck_samples_are_left_out() {
     errors_are_stated(stick, &[repeated]);
     let (values, largest) = output(0);
     assert_eq!(identified(&stick(values, largest)).corrections, [repeated]);
+}
+
+/// A probe that loses its target reads 0, so that the first one of the equal samples is no reading either.
+#[test]
+fn dropouts_to_zero_are_left_out() {
+    let repeated = Correction::Repeated {
+        time_s: 0.0,
+        samples: 0,
+        places: 0,
+    };
+    let drop_out = |mut values: Vec<f64>, _| {
+        for start in [2500, 3100, 4700] {
+            values[start..start + 40].fill(0.0);
+        }
+        values
+    };
+    errors_are_stated(drop_out, &[repeated]);
 }
 
 #[test]
