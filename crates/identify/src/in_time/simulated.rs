@@ -171,7 +171,7 @@ impl Simulation<'_> {
     fn delayed(&self, mode: &Mode, delay_s: f64) -> Vec<f64> {
         // A step of the search may try any delay.
         let duration_s = self.input.len() as f64 * self.path.period_s;
-        if !(delay_s < duration_s) {
+        if delay_s.is_nan() || delay_s >= duration_s {
             return vec![0.0; self.input.len()];
         }
         let path = SignalPath {
