@@ -1,5 +1,7 @@
 //! The analysis of external signals: response, modes and verdict, and what was done to get them.
 
+use core::f64::consts::TAU;
+
 use crate::Frf;
 use crate::clock_skew::ClockSkew;
 use crate::fitted_lag::FittedLag;
@@ -7,6 +9,7 @@ use crate::in_time::ReadingsFit;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::Source;
 use crate::periodic_part::PeriodicPart;
+use crate::prepared::Prepared;
 use crate::record_check::{Correction, Resolution};
 use crate::verdict::{Cnmp, Verdict};
 use bench_plant::{InputKind, OutputKind};
@@ -54,7 +57,43 @@ pub struct ExternalAnalysis {
     pub(super) cautions: Vec<String>,
 }
 
+/// Modes of a record with their verdict.
+pub(super) struct Judged {
+    pub(super) frf: Frf,
+    pub(super) fit: Result<ModalFit, FitError>,
+    pub(super) chain: MeasurementChain,
+    pub(super) band_hz: (f64, f64),
+    pub(super) verdict: Verdict,
+    pub(super) is_plausible: bool,
+}
+
 impl ExternalAnalysis {
+    /// The analysis of a record that is used as it is, with its stated input path.
+    pub(super) fn of(prepared: &Prepared<'_>, judged: Judged) -> ExternalAnalysis {
+        let source = prepared.source;
+        ExternalAnalysis {
+            frf: judged.frf,
+            fit: judged.fit,
+            verdict: judged.verdict,
+            input_path: source.input_path,
+            fitted_lag: None,
+            input_kind: source.input_kind,
+            output_kind: prepared.stated.unwrap_or_default(),
+            chain: judged.chain,
+            band_hz: judged.band_hz,
+            judged_up_to_rad_s: TAU * judged.band_hz.1,
+            periodic: prepared.periodic.clone(),
+            corrections: Vec::new(),
+            resolution: prepared.resolution,
+            readings_fit: None,
+            clock_skew: None,
+            source,
+            is_explained: false,
+            is_plausible: judged.is_plausible,
+            cautions: Vec::new(),
+        }
+    }
+
     /// The analysis of a record in which spikes and steps were corrected before.
     pub(super) fn after(self, mut corrections: Vec<Correction>) -> ExternalAnalysis {
         let verdict = self.verdict.with(Correction::description(&corrections));

@@ -1,7 +1,9 @@
 //! From two signals to modes and verdict: force and displacement or similar quantities, without a model of the stage.
 
+use core::f64::consts::TAU;
+
 use crate::ClockSkew;
-use crate::external_analysis::ExternalAnalysis;
+use crate::external_analysis::{ExternalAnalysis, Judged};
 use crate::external_signals::ExternalSignals;
 use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
@@ -367,9 +369,9 @@ impl Identification {
         })
         .or(gap);
         let expected = prepared.response_of(output)?;
-        let judged_up_to_rad_s = 2.0 * std::f64::consts::PI * band_hz.1;
         let is_plausible = why.is_none();
-        let verdict = judged(why, &expected, &fit, chain, judged_up_to_rad_s, |_| None)?;
+        let up_to_rad_s = TAU * band_hz.1;
+        let verdict = judged(why, &expected, &fit, chain, up_to_rad_s, |_| None)?;
         let verdict = verdict
             .with(Correction::description(&corrections))
             .with(Some(noise.description()));
@@ -378,26 +380,18 @@ impl Identification {
         } else {
             expected
         };
-        Ok(ExternalAnalysis {
+        let judged = Judged {
             frf,
-            verdict,
             fit,
-            input_path: self.input_path,
-            fitted_lag: None,
-            source: prepared.source,
-            input_kind: self.input_kind,
-            output_kind: self.output_kind.unwrap_or_default(),
             chain: chain.clone(),
             band_hz,
-            judged_up_to_rad_s,
-            periodic: None,
-            corrections,
-            resolution: prepared.resolution,
-            readings_fit: Some(noise),
-            clock_skew: None,
-            is_explained: false,
+            verdict,
             is_plausible,
-            cautions: Vec::new(),
+        };
+        Ok(ExternalAnalysis {
+            corrections,
+            readings_fit: Some(noise),
+            ..ExternalAnalysis::of(prepared, judged)
         })
     }
 
@@ -420,7 +414,6 @@ impl Identification {
             Some(skew) => fit.map(|fit| skew.widened(fit, cleaned, &frf.data, &chain)),
             None => fit,
         };
-        let judged_up_to_rad_s = prepared.judged_up_to_rad_s();
         let observation = Observation {
             source,
             fit: &fit,
@@ -436,7 +429,8 @@ impl Identification {
         let is_explained = known.is_some() || prepared.cut.is_some();
         let why = known.or_else(|| implausible(&observation));
         let is_plausible = why.is_none();
-        let verdict = judged(why, frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
+        let up_to_rad_s = TAU * prepared.band_hz.1;
+        let verdict = judged(why, frf, &fit, &chain, up_to_rad_s, |verdict| {
             hint(verdict, cleaned, &fit, &prepared.resolution)
         })?;
         let verdict = match &prepared.cut {
@@ -445,26 +439,22 @@ impl Identification {
         };
         let cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
         let input_path = self.input_path;
-        Ok(ExternalAnalysis {
+        let judged = Judged {
             frf: frf.clone(),
-            verdict: verdict.with(listed(&cautions)),
             fit,
+            chain,
+            band_hz: prepared.band_hz,
+            verdict: verdict.with(listed(&cautions)),
+            is_plausible,
+        };
+        Ok(ExternalAnalysis {
             input_path: lag.map_or(input_path, |lag| lag.in_path(input_path)),
             fitted_lag: lag,
             source,
-            input_kind: self.input_kind,
-            output_kind: self.output_kind.unwrap_or_default(),
-            chain,
-            band_hz: prepared.band_hz,
-            judged_up_to_rad_s,
-            periodic: prepared.periodic.clone(),
-            corrections: Vec::new(),
-            readings_fit: None,
-            resolution: prepared.resolution,
             clock_skew,
             is_explained,
-            is_plausible,
             cautions,
+            ..ExternalAnalysis::of(prepared, judged)
         })
     }
 

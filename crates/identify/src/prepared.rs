@@ -55,7 +55,7 @@ pub(super) struct Prepared<'a> {
     pub(super) band_hz: (f64, f64),
     pub(super) source: Source,
     /// The kind of the output, if the user states it.
-    stated: Option<OutputKind>,
+    pub(super) stated: Option<OutputKind>,
     /// The chain of an output of the stated kind, or of a position.
     pub(super) assumed: MeasurementChain,
     other_kind: OtherKind,
@@ -128,9 +128,13 @@ impl<'a> Prepared<'a> {
 
     /// The step of a sound output that can be simulated, if its noise does not make the rounding errors a noise.
     pub(super) fn rounded_step(&self) -> Option<f64> {
-        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
-        let can_be_simulated = is_sound && self.simulated_path().is_some();
+        let can_be_simulated = self.is_undisturbed() && self.simulated_path().is_some();
         self.step().filter(|_| can_be_simulated)
+    }
+
+    /// Whether the output has no defect and no stray line.
+    fn is_undisturbed(&self) -> bool {
+        self.defects.is_empty() && self.stray_lines.is_empty()
     }
 
     /// The modes of the greatest likelihood of the readings of an output that is rounded, or of which readings are lost, if they describe
@@ -139,15 +143,14 @@ impl<'a> Prepared<'a> {
     /// Of a rounded output all readings are tried first: modes may describe those that seem to be repeated.
     pub(super) fn fit_in_time(&self) -> Option<(TimeFit, Vec<Correction>)> {
         let path = self.simulated_path()?;
-        let is_sound = self.defects.is_empty() && self.stray_lines.is_empty();
-        let tries_all = self.step().is_some() && (is_sound || self.lost.is_some());
-        let all_readings = || {
-            let output = self.record.signals.output.iter();
-            output.copied().map(Reading::Value).collect::<Vec<_>>()
-        };
-        let of_all = tries_all.then(|| self.fit_of_readings(&all_readings(), path));
-        if let Some(found) = of_all.flatten() {
-            return Some((found, Vec::new()));
+        let tries_all =
+            self.step().is_some() && (self.is_undisturbed() || self.lost.is_some());
+        if tries_all {
+            let output = self.record.signals.output.iter().copied();
+            let readings: Vec<Reading> = output.map(Reading::Value).collect();
+            if let Some(found) = self.fit_of_readings(&readings, path) {
+                return Some((found, Vec::new()));
+            }
         }
         let lost = self.lost.as_ref()?;
         let found = self.fit_of_readings(&lost.readings, path)?;
@@ -178,7 +181,7 @@ impl<'a> Prepared<'a> {
             let (output, modes) = search.unrounded()?;
             let data = part(&self.response_of(output).ok()?.data);
             let max_modes = modes.modes.len() + MORE_MODES;
-            orders = if search.is_grown() {
+            orders = if search.adds_modes() {
                 modal::grown_orders(&data, &self.assumed, modes, max_modes).ok()?
             } else {
                 modal::rising_orders(&data, &self.assumed, PART_MODES).ok()?
@@ -215,11 +218,6 @@ impl<'a> Prepared<'a> {
             ..self.record
         };
         record.response(self.band_hz)
-    }
-
-    /// The verdict covers modes and zeros up to here, the end of the band, in rad/s.
-    pub(super) fn judged_up_to_rad_s(&self) -> f64 {
-        2.0 * std::f64::consts::PI * self.band_hz.1
     }
 
     /// Whether a few modes describe a part of the response.

@@ -55,7 +55,7 @@ impl<'a> TimeSearch<'a> {
     /// Tries the modes of the orders of a response of the record, rising, up to the first that has a larger cost than one of fewer modes.
     pub(crate) fn try_modes(&mut self, orders: Vec<ModalParameters>) {
         let least = match &self.best {
-            Some(best) if self.is_grown() => best.number_of_modes(),
+            Some(best) if self.adds_modes() => best.number_of_modes(),
             _ => 1,
         };
         let starts = starts(orders).into_iter();
@@ -82,7 +82,7 @@ impl<'a> TimeSearch<'a> {
 
     /// Whether the modes of the next response are added to those before. Those of a rounded output that are far from its readings may be too
     /// many.
-    pub(crate) fn is_grown(&self) -> bool {
+    pub(crate) fn adds_modes(&self) -> bool {
         let is_near = |best: &Order| self.record.is_near(best.found.sigma);
         self.best.as_ref().is_some_and(is_near)
     }
