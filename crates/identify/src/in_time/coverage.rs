@@ -9,8 +9,8 @@
 //! ```
 //!
 //! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis. A higher one that is not seen
-//! does no harm if the number of CNMP pairs in the band is the same with it, of either sign, and with any residue up to 5 sigma_r: a large
-//! hidden mode may have none where a smaller one has a pair.
+//! has no effect on the verdict if the number of CNMP pairs in the band is the same with it, of either sign, and with any residue up to
+//! 5 sigma_r: a large hidden mode may have none where a smaller one has a pair.
 
 use nalgebra::Complex;
 
@@ -35,7 +35,7 @@ const MIN_HIDDEN_RATIO: f64 = 1e-6;
 const SEEN_SIGMAS: f64 = 5.0;
 
 impl TimeRecord<'_> {
-    /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen or does no harm, at most `to_rad_s`.
+    /// The frequency in rad/s up to which a mode from `from_rad_s` on is seen or has no effect on the verdict, at most `to_rad_s`.
     pub(super) fn seen_up_to_rad_s(
         &self,
         found: &Likeliest,
@@ -56,9 +56,10 @@ impl TimeRecord<'_> {
                 residue_per_kg: SEEN_SIGMAS * sigma_per_kg,
             };
             let peak = hidden.residue_per_kg / (2.0 * zeta * trial_rad_s * trial_rad_s);
-            let is_seen = peak < largest_around(&sum, trial_rad_s);
-            let least = LEAST_HIDDEN * largest_around(&sum, trial_rad_s) / peak;
-            if !is_seen && !is_harmless(&sum, hidden, least, to_rad_s) {
+            let around = largest_around(&sum, trial_rad_s);
+            let is_seen = peak < around;
+            let least = LEAST_HIDDEN * around / peak;
+            if !is_seen && !keeps_pairs(&sum, hidden, least, to_rad_s) {
                 return Some(from_rad_s.max(BELOW_UNSEEN * seen_rad_s));
             }
             seen_rad_s = trial_rad_s;
@@ -80,24 +81,30 @@ fn information(output: &[f64], of_readings: &[f64]) -> f64 {
 
 /// Whether a mode of either sign, with any residue from a ratio `least` of that of `hidden` up to it, leaves the number of CNMP pairs up to
 /// a frequency as it is.
-fn is_harmless(sum: &ModalSum, hidden: ModalTerm, least: f64, to_rad_s: f64) -> bool {
+fn keeps_pairs(sum: &ModalSum, hidden: ModalTerm, least: f64, to_rad_s: f64) -> bool {
+    if !hidden.residue_per_kg.is_finite() || least <= MIN_HIDDEN_RATIO {
+        return false;
+    }
     let Some(pairs) = pairs_up_to(sum, to_rad_s) else {
         return false;
     };
-    let leaves_pairs = |ratio: f64| {
+    let halved = std::iter::successors(Some(1.0), |ratio| Some(0.5 * ratio));
+    let ratios = halved.take_while(|ratio| *ratio >= least);
+    ratios.flat_map(|ratio| [ratio, -ratio]).all(|ratio| {
         let residue_per_kg = ratio * hidden.residue_per_kg;
-        let hidden = ModalTerm {
+        let mode = ModalTerm {
             residue_per_kg,
             ..hidden
         };
-        let terms = sum.terms().iter().copied().chain([hidden]).collect();
-        let with_hidden = ModalSum::new(terms, sum.constant_m_per_n()).ok();
-        with_hidden.and_then(|sum| pairs_up_to(&sum, to_rad_s)) == Some(pairs)
-    };
-    let is_possible = hidden.residue_per_kg.is_finite() && least > MIN_HIDDEN_RATIO;
-    let halved = std::iter::successors(Some(1.0), |ratio| Some(0.5 * ratio));
-    let mut ratios = halved.take_while(|ratio| *ratio >= least);
-    is_possible && ratios.all(|ratio| leaves_pairs(ratio) && leaves_pairs(-ratio))
+        pairs_with(sum, mode, to_rad_s) == Some(pairs)
+    })
+}
+
+/// The number of CNMP pairs up to a frequency with one more mode, if it can be computed.
+fn pairs_with(sum: &ModalSum, mode: ModalTerm, to_rad_s: f64) -> Option<usize> {
+    let terms = sum.terms().iter().copied().chain([mode]).collect();
+    let with_mode = ModalSum::new(terms, sum.constant_m_per_n()).ok()?;
+    pairs_up_to(&with_mode, to_rad_s)
 }
 
 /// The number of CNMP pairs up to a frequency, if it can be computed.
@@ -118,4 +125,27 @@ fn largest_around(sum: &ModalSum, omega_rad_s: f64) -> f64 {
 fn least_damping(found: &Likeliest) -> f64 {
     let modes = found.parameters.modes.iter();
     modes.map(|mode| mode.damping_ratio).fold(1.0, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With damping ratios of 0.01, modes at 100 and 300 rad/s of residue 1, and one at 250 rad/s: by the roots of its numerator
+    /// (numpy.roots) the sum has a CNMP pair with residues of -1/16 to -1, and none with -2 to -64, or with a positive one.
+    #[test]
+    fn hidden_mode_may_change_the_number_of_pairs_by_a_smaller_residue_only() {
+        let mode = |omega_rad_s, residue_per_kg| ModalTerm {
+            omega_rad_s,
+            damping_ratio: 0.01,
+            residue_per_kg,
+        };
+        let sum = ModalSum::new(vec![mode(100.0, 1.0), mode(300.0, 1.0)], 0.0).expect("modes");
+        let hidden = mode(250.0, 64.0);
+        for (least, expected) in [(1.0 / 32.0, true), (1.0 / 64.0, false), (1e-3, false)] {
+            assert_eq!(keeps_pairs(&sum, hidden, least, 1e3), expected, "{least}");
+        }
+        // The same mode may not be known at all.
+        assert!(!keeps_pairs(&sum, hidden, 1e-7, 1e3));
+    }
 }
