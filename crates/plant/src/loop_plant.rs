@@ -278,7 +278,7 @@ impl LoopPlant {
     }
 
     /// The readings of all ticks from rest, in metres, of a known sequence of commands in amperes: those of
-    /// [`LoopPlant::reading_m`] and [`LoopPlant::step`] at each tick but for rounding, four times as fast for one mode. With an advance, which
+    /// [`LoopPlant::reading_m`] and [`LoopPlant::step`] at each tick but for rounding, and faster. With an advance, which
     /// a loop cannot read, they are the readings that belong to the response.
     pub fn readings_m(&self, commands_a: &[f64]) -> Vec<f64> {
         let mut readings_m = vec![0.0; commands_a.len() + BLOCK + self.longest()];

@@ -139,7 +139,7 @@ impl Listeners {
         if self.have_default {
             return Ok(());
         }
-        NO_LISTENER.store(self.count == 0, Ordering::SeqCst);
+        NO_LISTENER.store(true, Ordering::SeqCst);
         for number in stop_signals() {
             register_conditional_default(number, &NO_LISTENER)?;
         }

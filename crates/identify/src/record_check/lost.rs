@@ -45,15 +45,21 @@ pub(super) struct Channel {
     pub(super) has_step: bool,
 }
 
+/// Samples of an output that are no readings.
+#[derive(Clone, Debug)]
+pub(super) struct NoReadings {
+    /// The number of samples for each value of a slow probe.
+    pub(super) held: Option<f64>,
+    /// The limits of a clipped output.
+    pub(super) limits: Vec<Limit>,
+    /// Samples that repeat the one before.
+    pub(super) runs: Vec<Run>,
+}
+
 impl LostReadings {
-    /// The readings with what is known to be lost; `None` if nothing is. `held` is the number of samples for each value of a slow probe.
-    pub(super) fn of(
-        output: &[f64],
-        channel: Channel,
-        held: Option<f64>,
-        limits: &[Limit],
-        runs: &[Run],
-    ) -> Option<LostReadings> {
+    /// The readings with what is known to be lost; `None` if nothing is.
+    pub(super) fn of(output: &[f64], channel: Channel, none: &NoReadings) -> Option<LostReadings> {
+        let held = none.held;
         let mut lost = LostReadings {
             readings: output.iter().copied().map(Reading::Value).collect(),
             corrections: Vec::new(),
@@ -61,13 +67,13 @@ impl LostReadings {
         if let Some(samples) = held {
             lost.keep_changes(output, samples)?;
         }
-        for limit in limits {
+        for limit in &none.limits {
             lost.set_limit(limit, channel);
         }
         if let Some(samples) = held.filter(|_| !channel.has_step) {
             lost.leave_out_old(samples.round() as usize);
         }
-        lost.leave_out(runs, channel.rate_hz);
+        lost.leave_out(&none.runs, channel.rate_hz);
         (!lost.corrections.is_empty()).then_some(lost)
     }
 

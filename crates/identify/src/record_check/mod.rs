@@ -21,7 +21,7 @@ pub use defect::Defect;
 use ends::motion_at_ends;
 pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};
 use held::held;
-use lost::Channel;
+use lost::{Channel, NoReadings};
 pub use lost::{LostReadings, Reading};
 use plateaus::{Quantisation, limits, repeated};
 use prediction::Prediction;
@@ -69,36 +69,43 @@ pub fn check(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Checked {
     Checked::of(found)
 }
 
-/// A defect that lasts for many samples.
-fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) -> Option<Checked> {
-    let rate_hz = recorded.rate_hz;
+/// The samples of an output that are no readings.
+fn no_readings(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) -> NoReadings {
     let held = held(recorded, step);
     // A slow probe holds each of its values, so that the samples between them are no plateau.
     let every = held.map_or(1, |samples| samples.round().max(1.0) as usize);
     let values: Vec<f64> = recorded.output.iter().copied().step_by(every).collect();
-    let limits = limits(&values);
     let runs = match held {
         Some(_) => Vec::new(),
         None => repeated(recorded, quantisation),
     };
-    let of_probe = |samples: f64| Defect::Held {
-        samples,
-        probe_hz: rate_hz / samples,
-    };
-    let of_limit = || limits.first().map(|limit| limit.defect(rate_hz));
+    NoReadings {
+        held,
+        limits: limits(&values),
+        runs,
+    }
+}
+
+/// A defect that lasts for many samples.
+fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) -> Option<Checked> {
+    let rate_hz = recorded.rate_hz;
     let channel = Channel {
         rate_hz,
         step,
         has_step: quantisation.is_some(),
     };
-    let of_run = || {
-        let run = runs.first()?;
-        Some(run.defect(recorded, quantisation.is_some()))
+    let none = no_readings(recorded, step, quantisation);
+    let defect = if let Some(samples) = none.held {
+        let probe_hz = rate_hz / samples;
+        Defect::Held { samples, probe_hz }
+    } else if let Some(limit) = none.limits.first() {
+        limit.defect(rate_hz)
+    } else {
+        none.runs.first()?.defect(recorded, channel.has_step)
     };
-    let defect = held.map(of_probe).or_else(of_limit).or_else(of_run)?;
     let lost = defect
         .loses_readings()
-        .then(|| LostReadings::of(&recorded.output, channel, held, &limits, &runs));
+        .then(|| LostReadings::of(&recorded.output, channel, &none));
     Some(Checked {
         defects: vec![defect],
         lost: lost.flatten(),
