@@ -8,28 +8,26 @@ See results.py for the arguments.
 import sys
 
 import numpy as np
-from results import code, compare_with_simulation, current_off, failures, folder, frf, goes_on, must, must_agree, recording, report, whole
+from results import code, compare_with_simulation, current_off, failures, folder, frf, goes_on, must, over_simulation, recording, report, whole
 
 
 def compare_under_control():
-    """Compares the plant measured in closed loop with that of the open loop, outside of the modes, whose peaks the averaging of
-    the open-loop estimate lowers.
+    """Compares the plant measured in closed loop with the simulation, outside of the modes, whose peaks the averaging of the estimate
+    of the simulated chirp lowers.
 
-    The probe has its own clock, so the age of its readings differs between runs: one delay is fitted.
+    Measured in 10 sweeps: at most 0.3 to 0.6 %, and a median of 0.03 %. In one of 10 the emulated probe sends when a command arrives
+    (see `must_agree`): at most 1.3 % and a median of 0.06 %. The largest deviation is then that near 36 Hz, where the command is
+    small.
     """
     swept = report("swept")
     must(code("swept") in (0, 3) and swept["outcome"] == "completed", "the sweep under control completes")
     must(swept["lost_records"] == 0, "no record is lost")
-    f, opened = frf(folder / report("chirp")["frf_csv"])
-    g, closed = frf(folder / swept["frf_csv"])
+    f, closed = frf(folder / swept["frf_csv"])
     band = (f >= 2.0) & (f <= 75.0) & (np.abs(f / 29.3 - 1) > 0.2)
-    near = np.array([np.argmin(np.abs(g - frequency)) for frequency in f[band]])
-    ratio = closed[near] / opened[band]
-    older_s = -np.median(np.unwrap(np.angle(ratio)) / (2 * np.pi * f[band]))
-    ratio *= np.exp(2j * np.pi * f[band] * older_s)
-    print(f"        {band.sum()} frequencies, readings {older_s * 1e6:.1f} us older")
-    must(abs(older_s) < 1e-3, "by less than a period of the probe")
-    must_agree(f[band], ratio, "the plant is that of the open loop")
+    deviation = np.abs(over_simulation(f[band], closed[band]) - 1)
+    median, largest = 100 * np.median(deviation), 100 * np.max(deviation)
+    what = "the plant is that of the pure simulation from 2 to 75 Hz, outside of the mode at 29.3 Hz"
+    must(median < 0.2 and largest < 3.0, f"{what}: within {largest:.3f} %, median {median:.3f} %")
 
 
 def fault_to_zero(name):
