@@ -146,12 +146,15 @@ impl<'a> Prediction<'a> {
         &self.error[k..end]
     }
 
-    /// Whether an outlier matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy.
+    /// Whether an outlier matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy. A
+    /// jump of less than [`DEFECT_SIGMAS`] of the output that does not explain the errors is none: after a hammer, errors of the prediction
+    /// itself exceed the noise.
     fn has_effect(&self, outlier: &Outlier) -> bool {
         let Outlier { place, height, .. } = outlier;
         let exceeds_steps = height.abs() > MIN_STEPS * self.step;
         if place.shape == Shape::Step {
-            return exceeds_steps;
+            let is_large = height.abs() > DEFECT_SIGMAS * self.noise();
+            return exceeds_steps && (outlier.is_explained || is_large);
         }
         let sigma = self.sigma[place.at / BLOCK];
         exceeds_steps
