@@ -84,7 +84,7 @@ class Bench:
     def __init__(self, rng, seconds=None, top_ratio=3.0):
         self.rng = rng
         self.modes, (self.low, self.high) = stage(rng, FAMILIES[int(rng.integers(len(FAMILIES)))])
-        self.rate = float(rng.choice([r for r in (500, 1000, 2000) if r > top_ratio * self.high]))
+        self.rate = float(rng.choice([r for r in (500, 1000, 2000) if r > top_ratio * self.high] or [4000]))
         self.seconds = seconds or float(rng.choice([20, 30]))
         self.amplitude = float(rng.uniform(0.02, 0.1))
         self.u = sweep(self.rate, self.seconds, self.low, self.high, self.amplitude)
