@@ -46,9 +46,6 @@ use bench_base::decimal::Decimal;
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
 
-/// A CNMP pair that the phase does not confirm, because the response around it is noise, lies this many standard deviations off the
-/// axis: a fit is then extrapolated, and errors of the model count as well as noise.
-const UNCONFIRMED_SIGMAS: f64 = 6.0;
 /// The phase confirms pairs that turn it by at least this angle each, half of a full turn, in degrees.
 const CONFIRMED_DEG: f64 = 180.0;
 /// A zero whose distance from the imaginary axis exceeds this ratio of its frequency has another one nearer to its mirror image than that.
@@ -159,7 +156,6 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
         .or_else(|| uncertain_side(&zeros, input.certainty))
         .or_else(|| mode_more.map(uncertain_mode_reason))
-        .or_else(|| unconfirmed_in_a_misfit(input.fit, &zeros, phase_drop))
         .or_else(|| only_of_the_chain(&zeros, &of_stage));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
@@ -302,12 +298,12 @@ fn evaluate(
         (Cnmp::Undecided, disagreement(phase_drop))
     } else if pairs == 0 {
         (Cnmp::Excluded, excluded(zeros))
-    } else if let Some(zero) = unconfirmed(zeros, pairs, phase_drop) {
+    } else if let Some(zero) = unconfirmed(zeros, phase_drop) {
         (Cnmp::Undecided, unconfirmed_reason(zero))
     } else if signs.is_some_and(|signs| !has_opposite_neighbours(signs)) {
         (Cnmp::Undecided, NO_OPPOSITE_NEIGHBOURS.into())
     } else {
-        (Cnmp::Detected, detected(pairs, signs, phase_drop))
+        (Cnmp::Detected, detected(pairs, signs, phase_drop.drop_deg))
     }
 }
 
@@ -359,36 +355,14 @@ fn disagreement(phase_drop: PhaseDrop) -> String {
     )
 }
 
-/// A CNMP pair that is neither confirmed by the phase nor far from the axis.
-fn unconfirmed(
-    zeros: &[UncertainZero],
-    pairs: usize,
-    phase_drop: PhaseDrop,
-) -> Option<&UncertainZero> {
-    if is_confirmed(pairs, phase_drop) {
+/// The first CNMP zero, if the phase does not turn as the CNMP pairs turn it, as far as it can be followed: the response around a pair is
+/// then noise. At no distance from the axis do such zeros give a verdict, because the fit is extrapolated to them, and what it does not
+/// describe may cause them (a cut record, a filter in the channel, the steps of a coarse probe).
+fn unconfirmed(zeros: &[UncertainZero], phase_drop: PhaseDrop) -> Option<&UncertainZero> {
+    if phase_drop.predicted_deg >= CONFIRMED_DEG * cnmp_pairs(zeros) as f64 {
         return None;
     }
-    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
-    cnmp.find(|zero| zero.s.re < UNCONFIRMED_SIGMAS * zero.real_part().sigma)
-}
-
-/// Whether the phase turns as these pairs turn it, as far as it can be followed.
-fn is_confirmed(pairs: usize, phase_drop: PhaseDrop) -> bool {
-    phase_drop.predicted_deg >= CONFIRMED_DEG * pairs as f64
-}
-
-/// CNMP zeros that the phase does not confirm, of a fit that leaves more than noise: what it does not describe, as the steps of a coarse
-/// probe, may cause them.
-fn unconfirmed_in_a_misfit(
-    fit: &ModalFit,
-    zeros: &[UncertainZero],
-    phase_drop: Option<PhaseDrop>,
-) -> Option<String> {
-    if fit.leaves_noise() || is_confirmed(cnmp_pairs(zeros), phase_drop?) {
-        return None;
-    }
-    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
-    cnmp.next().map(unconfirmed_reason)
+    zeros.iter().find(|zero| zero.kind == ZeroKind::Cnmp)
 }
 
 /// The zeros that a mechanical system can have. Without damping they are symmetric about the imaginary axis, and damping moves them by
@@ -429,22 +403,15 @@ fn unconfirmed_reason(zero: &UncertainZero) -> String {
     )
 }
 
-fn detected(pairs: usize, signs: Option<&[f64]>, phase_drop: PhaseDrop) -> String {
+fn detected(pairs: usize, signs: Option<&[f64]>, drop_deg: f64) -> String {
     let plural = if pairs == 1 { "" } else { "s" };
     let of_signs = signs.map_or_else(String::new, |signs| {
         let symbol = |residue: &f64| Sign::of(*residue).symbol();
         let signs: String = signs.iter().map(symbol).collect();
         format!(", residues of opposite signs ({signs})")
     });
-    let found = format!("{pairs} pair{plural} of CNMP zeros{of_signs}");
-    if !is_confirmed(pairs, phase_drop) {
-        return format!(
-            "{found}; the response around the zeros is noise, so that the phase does not confirm them"
-        );
-    }
     format!(
-        "{found}, and {:.0} degrees more phase lag than a minimum-phase system of this magnitude",
-        phase_drop.drop_deg
+        "{pairs} pair{plural} of CNMP zeros{of_signs}, and {drop_deg:.0} degrees more phase lag than a minimum-phase system of this magnitude"
     )
 }
 
