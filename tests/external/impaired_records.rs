@@ -7,7 +7,7 @@ use crate::external::python;
 /// The seed is not one that was used for development.
 const SEED: &str = "20261128";
 /// Records of which a verdict is expected.
-const DECIDABLE: [&str; 9] = [
+const DECIDABLE: [&str; 13] = [
     "plain",
     "inverted sensor",
     "delay",
@@ -17,6 +17,10 @@ const DECIDABLE: [&str; 9] = [
     "stated velocity",
     "rate that drifts, true times",
     "coarse resolution",
+    "hammer",
+    "digital filter of first order that is not given",
+    "one damper",
+    "lag of the drive that is not given",
 ];
 /// Records with a defect that is to be named.
 const DEFECTS: [&str; 8] = [

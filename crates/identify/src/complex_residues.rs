@@ -7,10 +7,14 @@
 //! Every sum of modes with real residues is one with complex residues, so that the data decide. Complex residues are accepted if
 //!
 //! 1. they leave noise as the residual, and do not nearly cancel;
-//! 2. they need no more modes than real residues that describe the data and, where those leave noise as well, fewer parameters;
+//! 2. they need no more modes than real residues that describe the data, and 2 N chi^2 + k ln 2N with N data and k parameters is smaller
+//!    (Bayesian information criterion);
 //! 3. real residues and a delay in their place, with as many modes, describe the data significantly worse;
-//! 4. they are not those of another kind of output: with r = 0 for all modes it is a velocity;
-//! 5. no mode is heavily damped: such a mode takes the place of a filter, and the zeros near it are none of the stage.
+//! 4. they are not those of another kind of output: with r = 0 for all modes it is a velocity.
+//!
+//! A filter between input and output turns the residues of the stage, each by another angle, and adds its own poles. Modes with the damping
+//! of a filter take the place of these. The zeros are then those of the product of stage and filter: of a low-pass filter, which has none
+//! in the band, they are those of the stage.
 //!
 //! The delay of the result is that with the smallest imaginary parts.
 //!
@@ -25,7 +29,7 @@ use crate::modal::{
 
 /// Largest number of modes with complex residues. More are a sign of something else, and take long.
 const MAX_MODES: usize = 8;
-/// A mode of a flexure with a damper has less.
+/// A mode of a flexure with a damper has less, the pole of a filter more.
 const MAX_DAMPING_RATIO: f64 = 0.3;
 /// Beside the ln 2N of each rate (Bayesian information criterion), chi^2 must decrease by the square of 5 standard deviations.
 const CERTAIN_DECREASE: f64 = 25.0;
@@ -45,9 +49,14 @@ impl ModalFit {
 
     /// Whether no mode has the damping of a filter.
     fn is_lightly_damped(&self) -> bool {
-        let modes = self.modes();
-        let mut dampings = modes.iter().map(|mode| mode.damping_ratio.value);
-        dampings.all(|damping| damping < MAX_DAMPING_RATIO)
+        self.filter_modes().is_empty()
+    }
+
+    /// The modes that have the damping of a filter, in the place of one between input and output.
+    pub(crate) fn filter_modes(&self) -> Vec<FittedMode> {
+        let mut modes = self.modes();
+        modes.retain(|mode| mode.damping_ratio.value >= MAX_DAMPING_RATIO);
+        modes
     }
 
     /// The parameters without the modes that have the damping of a filter.
@@ -55,6 +64,10 @@ impl ModalFit {
         let is_light = |k: &usize| self.parameters.modes[*k].damping_ratio < MAX_DAMPING_RATIO;
         let light: Vec<usize> = (0..self.parameters.modes.len()).filter(is_light).collect();
         self.parameters.selected(&light)
+    }
+
+    pub(crate) fn number_of_modes(&self) -> usize {
+        self.parameters.modes.len()
     }
 
     /// Number of parameters that were fitted.
@@ -69,32 +82,53 @@ pub(crate) fn fit_complex(
     chain: &MeasurementChain,
     real: &Result<ModalFit, FitError>,
 ) -> Option<ModalFit> {
-    chain.derivative()?;
+    if real.as_ref().is_ok_and(ModalFit::is_of_a_stage) {
+        return None;
+    }
+    better_complex(data, chain, real)
+}
+
+/// The fit with complex residues, if it describes the data better than one with real ones, even if that is one of a stage.
+pub(crate) fn better_complex(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    real: &Result<ModalFit, FitError>,
+) -> Option<ModalFit> {
     let max_modes = match real {
-        Ok(fit) if fit.is_of_a_stage() => return None,
         Ok(fit) if fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM => fit.parameters.modes.len(),
         Ok(_) => MAX_MODES,
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
-    let max_modes = max_modes.min(MAX_MODES);
-    let complex = fit_few(data, chain, &Residues::complex(), max_modes).ok()?;
-    (is_simpler(&complex, real) && is_accepted(&complex, data, chain)).then_some(complex)
+    let complex = complex_modes(data, chain, max_modes)?;
+    let is_better = |real: &ModalFit| is_clearly_better(&complex, real, data.len());
+    real.as_ref().map_or(true, is_better).then_some(complex)
 }
 
-/// Whether complex residues have fewer parameters than real ones that leave noise as well.
-fn is_simpler(complex: &ModalFit, real: &Result<ModalFit, FitError>) -> bool {
-    match real {
-        Ok(real) if real.leaves_noise() => {
-            complex.number_of_parameters() < real.number_of_parameters()
-        }
-        _ => true,
-    }
+/// The fit with complex residues and at most a number of modes, if it is accepted.
+pub(crate) fn complex_modes(
+    data: &[FrfDatum],
+    chain: &MeasurementChain,
+    max_modes: usize,
+) -> Option<ModalFit> {
+    chain.derivative()?;
+    let complex = fit_few(data, chain, &Residues::complex(), max_modes.min(MAX_MODES)).ok()?;
+    is_accepted(&complex, data, chain).then_some(complex)
+}
+
+/// Whether a fit of N data has a Bayesian information criterion 2 N chi^2 + k ln 2N that is clearly smaller than that of another one.
+pub(crate) fn is_clearly_better(fit: &ModalFit, other: &ModalFit, data: usize) -> bool {
+    let values = 2.0 * data as f64;
+    let criterion = |fit: &ModalFit| {
+        values * fit.chi2_per_freedom + fit.number_of_parameters() as f64 * values.ln()
+    };
+    criterion(fit) + CERTAIN_DECREASE < criterion(other)
 }
 
 /// Whether the modes describe the data, and real residues do not.
 pub(crate) fn is_accepted(complex: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> bool {
-    complex.is_of_a_stage()
+    complex.is_sum_of_few_modes()
+        && complex.undetermined_modes().is_none()
         && !complex.modes().iter().all(is_mostly_imaginary)
         && is_better_than_real(&complex.parameters, data, chain)
 }

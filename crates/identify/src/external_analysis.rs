@@ -120,12 +120,10 @@ impl ExternalAnalysis {
         }
     }
 
-    /// The number of fitted modes; without a fit as if there were any number.
-    pub(super) fn number_of_modes(&self) -> usize {
-        match &self.fit {
-            Ok(fit) => fit.parameters.modes.len(),
-            Err(_) => usize::MAX,
-        }
+    /// The number of fitted parameters; without a fit as if there were any number.
+    pub(super) fn number_of_parameters(&self) -> usize {
+        let fit = self.fit.as_ref();
+        fit.map_or(usize::MAX, ModalFit::number_of_parameters)
     }
 
     pub(super) fn has_real_residues(&self) -> bool {

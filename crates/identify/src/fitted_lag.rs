@@ -128,7 +128,9 @@ fn fit_with(seen: &Observation<'_>, residues: Residues, max_modes: usize) -> Opt
     let lag_is_certain = lag.value > CERTAIN_SIGMAS * lag.sigma;
     let is_accepted = match unknown.residues {
         Residues::Real => fit.is_of_a_stage(),
-        Residues::Complex(_) => complex_residues::is_accepted(&fit, data, &chain),
+        Residues::Complex(_) => {
+            fit.is_of_a_stage() && complex_residues::is_accepted(&fit, data, &chain)
+        }
     };
     (lag_is_certain && is_accepted && is_simpler(&fit, seen.fit)).then_some(FitThroughLag {
         lag: FittedLag { lag_s: lag },

@@ -22,6 +22,9 @@ use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
 
+/// A delay that grows by less than this ratio of a sample during the record is no cause of an undecided verdict: two clocks that differ by
+/// 20 ppm, as those of two instruments, change it by more in 8 s at 1 kHz.
+const LEAST_GROWTH_SAMPLES: f64 = 0.15;
 /// The caution of a verdict from a record in motion.
 const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
 
@@ -238,7 +241,8 @@ impl Identification {
         }
         let record = prepared.record;
         // Many modes would be fitted to the turn of two clocks in vain.
-        let compares_first = !prepared.few_modes_describe();
+        let compares_first =
+            !prepared.few_modes_describe() && !prepared.complex_residues_describe();
         if compares_first && let Some(analysis) = self.with_one_clock(prepared)? {
             return Ok(analysis);
         }
@@ -248,12 +252,11 @@ impl Identification {
         // Complex residues are tried first: a small difference of the clocks easily takes their place.
         let is_open = analysis.verdict.cnmp == Cnmp::Undecided
             && !analysis.is_explained
-            && analysis.fitted_lag.is_none()
-            && analysis.has_real_residues();
+            && analysis.fitted_lag.is_none();
         if is_open
             && !compares_first
             && let Some(corrected) = self.with_one_clock(prepared)?
-            && corrected.number_of_modes() < analysis.number_of_modes()
+            && corrected.number_of_parameters() < analysis.number_of_parameters()
         {
             return Ok(corrected);
         }
@@ -295,7 +298,10 @@ impl Identification {
         });
         // The turn that two clocks cause may also describe a part of complex residues, and leave an implausible response.
         let is_likely = is_confirmed && analysis.is_plausible && !self.is_other_kind(recorded);
-        Ok(is_likely.then_some(analysis))
+        // A small turn describes a part of anything.
+        let is_small = skew.growth_s().abs() * self.rate_hz < LEAST_GROWTH_SAMPLES;
+        let helps = !is_small || analysis.verdict.cnmp != Cnmp::Undecided;
+        Ok((is_likely && helps).then_some(analysis))
     }
 
     /// Whether the output is clearly of a kind that the user does not state. With it the response needs no other explanation.
@@ -311,7 +317,8 @@ impl Identification {
         analysis: ExternalAnalysis,
         model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        if analysis.is_explained || analysis.fitted_lag.is_some() {
+        let is_other = analysis.fitted_lag.is_some() || !analysis.has_real_residues();
+        if analysis.is_explained || is_other {
             return Ok(analysis);
         }
         let ExternalAnalysis { frf, chain, .. } = &analysis;
@@ -329,6 +336,7 @@ impl Identification {
         let Some(OtherModel { fit, chain, lag }) = model(&observation) else {
             return Ok(analysis);
         };
+        let fit = Ok(fit);
         let up_to_rad_s = analysis.judged_up_to_rad_s;
         let verdict = judged(None, frf, &fit, &chain, up_to_rad_s, |verdict| {
             hint(verdict, record, &fit, &analysis.resolution)

@@ -222,19 +222,23 @@ impl ResponseIdentification {
             ..with_few
         };
         let known = known_cause(&observation);
+        let is_other = fit
+            .as_ref()
+            .is_ok_and(|fit| !fit.parameters.has_real_residues());
         let other = match (&known, first_lag) {
-            (None, None) => lag_model(&observation).or_else(|| complex_model(&observation)),
+            (None, None) if !is_other => {
+                lag_model(&observation).or_else(|| complex_model(&observation))
+            }
             _ => None,
         };
         let why = match other {
             Some(_) => None,
             None => known.or_else(|| implausible(&observation)),
         };
-        let OtherModel { fit, chain, lag } = other.unwrap_or(OtherModel {
-            fit,
-            chain,
-            lag: first_lag,
-        });
+        let (fit, chain, lag) = match other {
+            Some(OtherModel { fit, chain, lag }) => (Ok(fit), chain, lag),
+            None => (fit, chain, first_lag),
+        };
         let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
             response_hint(verdict, &fit)
         })?;

@@ -9,7 +9,7 @@ use bench_plant::OutputKind;
 use nalgebra::Complex;
 
 use crate::chi2_limits::NOISE_CHI2;
-use crate::complex_residues::fit_complex;
+use crate::complex_residues::{better_complex, is_clearly_better};
 use crate::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
 use crate::{Estimate, FrfDatum};
@@ -97,17 +97,20 @@ pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
         .then(|| format!("{SWAPPED}; {}", seen.remedies.swapped))
 }
 
-/// Whether modes of the assumed kind with complex residues describe a part of the data with fewer parameters than those of another kind.
-/// (They can be those of an acceleration as well, but need more parameters for it.)
+/// Whether modes of the assumed kind with complex residues describe a part of the data better than those of another kind. (They can be
+/// those of an acceleration as well, but need more parameters for it.)
 fn complex_residues_are_simpler(
     data: &[FrfDatum],
     chain: &MeasurementChain,
     real: &Result<ModalFit, FitError>,
     other: &ModalFit,
 ) -> bool {
-    let complex = fit_complex(&part(data), chain, real);
+    let data = part(data);
+    let complex = better_complex(&data, chain, real);
     complex.is_some_and(|fit| {
-        !vanishes(&fit) && fit.number_of_parameters() < other.number_of_parameters()
+        let is_smaller = fit.number_of_parameters() < other.number_of_parameters();
+        let is_better = is_smaller || is_clearly_better(&fit, other, data.len());
+        !vanishes(&fit) && (is_better || !other.is_of_a_stage())
     })
 }
 

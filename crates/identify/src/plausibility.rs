@@ -77,36 +77,49 @@ pub(super) fn due_to_cut(verdict: Verdict, cut: &str) -> Verdict {
 
 /// What describes a response that modes with real residues do not.
 pub(super) struct OtherModel {
-    pub(super) fit: Result<ModalFit, FitError>,
+    pub(super) fit: ModalFit,
     pub(super) chain: MeasurementChain,
     /// A lag that was fitted.
     pub(super) lag: Option<FittedLag>,
 }
 
+impl OtherModel {
+    pub(super) fn number_of_modes(&self) -> usize {
+        self.fit.number_of_modes()
+    }
+}
+
 /// Modes with a lag that is not stated, if they describe the data, and are plausible.
 pub(super) fn lag_model(seen: &Observation<'_>) -> Option<OtherModel> {
     let FitThroughLag { lag, chain, fit } = fit_through_lag(seen)?;
-    plausible(seen, Ok(fit), chain, Some(lag))
+    plausible(seen, fit, chain, Some(lag))
 }
 
 /// Modes with complex residues, if modes with real ones do not describe the data, and if they are plausible.
 pub(super) fn complex_model(seen: &Observation<'_>) -> Option<OtherModel> {
     let fit = fit_complex(&seen.frf.data, seen.chain, seen.fit)?;
-    plausible(seen, Ok(fit), seen.chain.clone(), None)
+    with_complex_residues(seen, fit)
+}
+
+/// Modes with complex residues, if they are plausible.
+pub(super) fn with_complex_residues(seen: &Observation<'_>, fit: ModalFit) -> Option<OtherModel> {
+    plausible(seen, fit, seen.chain.clone(), None)
 }
 
 fn plausible(
     seen: &Observation<'_>,
-    fit: Result<ModalFit, FitError>,
+    fit: ModalFit,
     chain: MeasurementChain,
     lag: Option<FittedLag>,
 ) -> Option<OtherModel> {
+    let fitted = Ok(fit);
     let with_fit = Observation {
-        fit: &fit,
+        fit: &fitted,
         chain: &chain,
         ..*seen
     };
     let is_plausible = implausible(&with_fit).is_none();
+    let fit = fitted.ok()?;
     is_plausible.then_some(OtherModel { fit, chain, lag })
 }
 

@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::complex_residues::better_complex;
 use crate::external_signals::ExternalSignals;
 use crate::in_time::{TimeFit, TimeSearch};
 use crate::modal::{self, FitError, MeasurementChain, ModalFit};
@@ -143,8 +144,7 @@ impl<'a> Prepared<'a> {
     /// Of a rounded output all readings are tried first: modes may describe those that seem to be repeated.
     pub(super) fn fit_in_time(&self) -> Option<(TimeFit, Vec<Correction>)> {
         let path = self.simulated_path()?;
-        let tries_all =
-            self.step().is_some() && (self.is_undisturbed() || self.lost.is_some());
+        let tries_all = self.step().is_some() && (self.is_undisturbed() || self.lost.is_some());
         if tries_all {
             let output = self.record.signals.output.iter().copied();
             let readings: Vec<Reading> = output.map(Reading::Value).collect();
@@ -223,6 +223,12 @@ impl<'a> Prepared<'a> {
     /// Whether a few modes describe a part of the response.
     pub(super) fn few_modes_describe(&self) -> bool {
         self.few.as_ref().is_ok_and(describes)
+    }
+
+    /// Whether a few modes with complex residues describe a part of the response.
+    pub(super) fn complex_residues_describe(&self) -> bool {
+        let data = part(&self.frf.data);
+        self.is_sound() && better_complex(&data, &self.assumed, &self.few).is_some()
     }
 
     /// As many modes as are significant. Many modes would be fitted to a defect or to a missing end, of which the few are kept.

@@ -416,6 +416,16 @@ impl MeasurementChain {
         }
     }
 
+    /// Data that were measured through this chain without hold, motor, amplifier and delays, as a position whatever the output is, in m/N.
+    /// Aliases remain.
+    pub(crate) fn without_chain(&self, data: &[FrfDatum], delay_s: f64) -> Vec<Complex<f64>> {
+        let freed = data.iter().map(|datum| {
+            let s = Complex::new(0.0, datum.omega_rad_s());
+            datum.response / self.continuous_response(s, delay_s)
+        });
+        freed.collect()
+    }
+
     /// The response of the mechanics alone in m/N, a position whatever the output is, of data that were measured through this chain: without hold, motor, amplifier and
     /// delays, and without the aliases that the fit `through_chain`, of the mechanics `fitted`, has at the data.
     ///

@@ -170,7 +170,9 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         zeros,
         phase_drop,
     };
-    let verdict = verdict.with(is_complex.then(|| COMPLEX_RESIDUES.into()));
+    let verdict = verdict
+        .with(is_complex.then(|| COMPLEX_RESIDUES.into()))
+        .with(filter_modes(input.fit));
     Ok(verdict.with(left_out(input.fit)))
 }
 
@@ -178,6 +180,27 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
 fn certain_signs(input: &VerdictInput<'_>) -> Option<Vec<f64>> {
     let is_real = input.fit.parameters.has_real_residues();
     is_real.then(|| signs_of(input))
+}
+
+/// The modes with complex residues that take the place of a filter, as a caution.
+fn filter_modes(fit: &ModalFit) -> Option<String> {
+    if fit.parameters.has_real_residues() {
+        return None;
+    }
+    let modes: Vec<String> = fit.filter_modes().iter().map(described).collect();
+    (!modes.is_empty()).then(|| {
+        format!(
+            "the mode {} is not one of the stage, but takes the place of a filter or a delay between input and output",
+            modes.join(", and that ")
+        )
+    })
+}
+
+/// A mode by frequency and damping.
+fn described(mode: &FittedMode) -> String {
+    let frequency_hz = mode.frequency_hz().value;
+    let damping_ratio = mode.damping_ratio.value;
+    format!("at {frequency_hz:.0} Hz with a damping ratio of {damping_ratio:.2}")
 }
 
 /// The frequencies that are not fitted, as a caution.

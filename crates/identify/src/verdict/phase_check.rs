@@ -59,6 +59,9 @@ fn last_rad_s(input: &VerdictInput<'_>, modes: &[FittedMode], zeros: &[Uncertain
 }
 
 /// The smoothed data beside the fit, both of the mechanics alone. Data that are not significant have the value of the fit.
+///
+/// Aliases of modes with real residues are those of the stage. Complex ones may take the place of a digital filter, which has no
+/// response between the samples: a zero of theirs of which the samples show nothing is none of the stage.
 fn curve(input: &VerdictInput<'_>) -> Result<PhaseCurve, PlantError> {
     let parameters = &input.fit.parameters;
     let used = input.fit.used_data(input.frf_data);
@@ -69,12 +72,15 @@ fn curve(input: &VerdictInput<'_>) -> Result<PhaseCurve, PlantError> {
         .iter()
         .map(|omega| sum.response(Complex::new(0.0, *omega)))
         .collect();
-    let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
-    let through_chain = input.fit.response(input.chain, &frequency_hz);
     let delay_s = parameters.delay_s;
-    let mut measured = input
-        .chain
-        .mechanics(&data, delay_s, &fitted, &through_chain);
+    let mut measured = if parameters.has_real_residues() {
+        let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
+        let through_chain = input.fit.response(input.chain, &frequency_hz);
+        let chain = input.chain;
+        chain.mechanics(&data, delay_s, &fitted, &through_chain)
+    } else {
+        input.chain.without_chain(&data, delay_s)
+    };
     for ((measured, fitted), datum) in measured.iter_mut().zip(&fitted).zip(&data) {
         if !is_significant(datum) {
             *measured = *fitted;
