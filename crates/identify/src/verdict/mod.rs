@@ -46,7 +46,7 @@ use bench_base::decimal::Decimal;
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
 
-/// The phase confirms pairs that turn it by at least this angle each, half of a full turn, in degrees.
+/// The phase confirms a pair that turns it by at least this angle where it is followed, half of a full turn, in degrees.
 const CONFIRMED_DEG: f64 = 180.0;
 /// A zero whose distance from the imaginary axis exceeds this ratio of its frequency has another one nearer to its mirror image than that.
 const MIRROR_RATIO: f64 = 0.2;
@@ -190,8 +190,8 @@ fn filter_modes(fit: &ModalFit) -> Option<String> {
     let modes: Vec<String> = fit.filter_modes().iter().map(described).collect();
     (!modes.is_empty()).then(|| {
         format!(
-            "the mode {} is not one of the stage, but takes the place of a filter or a delay between input and output",
-            modes.join(", and that ")
+            "so strongly damped, unless a brake acts on the stage, are poles of a filter between input and output or what takes the place of a delay: {}",
+            modes.join(", ")
         )
     })
 }
@@ -200,7 +200,7 @@ fn filter_modes(fit: &ModalFit) -> Option<String> {
 fn described(mode: &FittedMode) -> String {
     let frequency_hz = mode.frequency_hz().value;
     let damping_ratio = mode.damping_ratio.value;
-    format!("at {frequency_hz:.0} Hz with a damping ratio of {damping_ratio:.2}")
+    format!("{frequency_hz:.2} Hz (damping ratio {damping_ratio:.2})")
 }
 
 /// The frequencies that are not fitted, as a caution.
@@ -318,7 +318,7 @@ fn evaluate(
     let pairs = cnmp_pairs(zeros);
     let agrees = phase_drop.deviation_deg() <= MAX_PHASE_DEVIATION_DEG;
     if !agrees {
-        (Cnmp::Undecided, disagreement(phase_drop))
+        (Cnmp::Undecided, disagreement(phase_drop, signs.is_none()))
     } else if pairs == 0 {
         (Cnmp::Excluded, excluded(zeros))
     } else if let Some(zero) = unconfirmed(zeros, phase_drop) {
@@ -370,22 +370,26 @@ fn cnmp_pairs(zeros: &[UncertainZero]) -> usize {
     pairs.count()
 }
 
-fn disagreement(phase_drop: PhaseDrop) -> String {
+/// Of complex residues the phase is that of the samples, in which a digital filter has no zeros between them.
+fn disagreement(phase_drop: PhaseDrop, is_complex: bool) -> String {
+    let remedy = if is_complex {
+        "record signals without a filter, or increase the amplitude between the modes"
+    } else {
+        "increase the amplitude between the modes, or the duration"
+    };
     format!(
-        "the zeros of the fit predict {:.0} degrees more phase lag than a minimum-phase system of this magnitude, the measured response has {:.0}; increase the amplitude between the modes, or the duration",
+        "the zeros of the fit predict {:.0} degrees more phase lag than a minimum-phase system of this magnitude, the measured response has {:.0}; {remedy}",
         Decimal(phase_drop.predicted_deg),
         Decimal(phase_drop.drop_deg)
     )
 }
 
-/// The first CNMP zero, if the phase does not turn as the CNMP pairs turn it, as far as it can be followed: the response around a pair is
-/// then noise. At no distance from the axis do such zeros give a verdict, because the fit is extrapolated to them, and what it does not
-/// describe may cause them (a cut record, a filter in the channel, the steps of a coarse probe).
+/// The first CNMP zero around which the phase cannot be followed, because the response is noise. At no distance from the axis does such a
+/// zero give a verdict: the fit is extrapolated to it, and what it does not describe may cause it (a cut record, a filter in the channel, the
+/// steps of a coarse probe).
 fn unconfirmed(zeros: &[UncertainZero], phase_drop: PhaseDrop) -> Option<&UncertainZero> {
-    if phase_drop.predicted_deg >= CONFIRMED_DEG * cnmp_pairs(zeros) as f64 {
-        return None;
-    }
-    zeros.iter().find(|zero| zero.kind == ZeroKind::Cnmp)
+    let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
+    cnmp.find(|zero| phase_drop.lag_deg(zero.s) < CONFIRMED_DEG)
 }
 
 /// The zeros that a mechanical system can have. Without damping they are symmetric about the imaginary axis, and damping moves them by

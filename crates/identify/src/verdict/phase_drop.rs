@@ -34,12 +34,24 @@ pub struct PhaseDrop {
     pub drop_deg: f64,
     /// The phase drop that the right-half-plane zeros of the fit predict, in degrees.
     pub predicted_deg: f64,
+    /// The lower and the upper frequency in rad/s.
+    pub followed_rad_s: (f64, f64),
 }
 
 impl PhaseDrop {
     /// Deviation of the measured from the predicted phase drop in degrees.
     pub fn deviation_deg(&self) -> f64 {
         (self.drop_deg - self.predicted_deg).abs()
+    }
+
+    /// The lag between the two frequencies of a zero in the right half plane beyond that of its mirror image, in degrees.
+    pub(super) fn lag_deg(&self, zero: Complex<f64>) -> f64 {
+        let (from_rad_s, to_rad_s) = self.followed_rad_s;
+        let roots = Roots {
+            poles: Vec::new(),
+            zeros: vec![zero],
+        };
+        roots.all_pass_lag(from_rad_s, to_rad_s).to_degrees()
     }
 }
 
@@ -108,6 +120,7 @@ pub(super) fn phase_drop(curve: &PhaseCurve, roots: &Roots, from: usize, to: usi
     PhaseDrop {
         drop_deg: (minimum - measured).to_degrees(),
         predicted_deg: roots.all_pass_lag(omega[from], omega[to]).to_degrees(),
+        followed_rad_s: (omega[from], omega[to]),
     }
 }
 

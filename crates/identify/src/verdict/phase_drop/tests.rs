@@ -319,6 +319,7 @@ fn deviation_is_the_distance_of_measured_and_predicted_phase_drop() {
         let drop = PhaseDrop {
             drop_deg,
             predicted_deg,
+            followed_rad_s: (0.0, 0.0),
         };
         assert_eq!(drop.deviation_deg(), deviation_deg);
     }

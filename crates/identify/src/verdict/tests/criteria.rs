@@ -36,6 +36,7 @@ fn phase_drop(predicted_deg: f64, excess_deg: f64) -> PhaseDrop {
     PhaseDrop {
         drop_deg: predicted_deg + excess_deg,
         predicted_deg,
+        followed_rad_s: (50.0, 200.0),
     }
 }
 
@@ -81,6 +82,7 @@ fn reasons_have_no_negative_zero() {
     let of_phases = |predicted_deg: f64, drop_deg: f64| {
         let phase_drop = PhaseDrop {
             predicted_deg,
+            followed_rad_s: (50.0, 200.0),
             drop_deg,
         };
         evaluate(&[left_zero()], Some(&OPPOSITE), phase_drop).1
@@ -109,18 +111,44 @@ fn reasons_have_no_negative_zero() {
     );
 }
 
+/// From 50 rad/s to 100 + d the zero at 1 + 100 j turns the phase by 2 (atan(d) + atan(50)) + 2 (atan(200 + d) - atan(150)): 180 degrees with
+/// d = 0.0183.
 #[test]
-fn phase_confirms_pairs_that_turn_it_by_half_a_turn_each() {
-    // Three standard deviations off the axis: certain on its side.
-    let near = cnmp_zero(1.0 / 3.0);
-    for pairs in [1, 2] {
-        let zeros = vec![near; pairs];
-        let cnmp_at =
-            |predicted_deg| evaluate(&zeros, Some(&OPPOSITE), phase_drop(predicted_deg, 0.0)).0;
-        let limit_deg = 180.0 * pairs as f64;
-        assert_eq!(cnmp_at(limit_deg), Cnmp::Detected, "{pairs}");
-        assert_eq!(cnmp_at(limit_deg - 0.1), Cnmp::Undecided, "{pairs}");
-    }
+fn phase_confirms_a_pair_that_turns_it_by_half_a_turn_where_it_is_followed() {
+    let zeros = [cnmp_zero(1.0 / 3.0)];
+    let cnmp_up_to = |to_rad_s| {
+        let followed = PhaseDrop {
+            followed_rad_s: (50.0, to_rad_s),
+            ..phase_drop(180.0, 0.0)
+        };
+        evaluate(&zeros, Some(&OPPOSITE), followed).0
+    };
+    assert_eq!(cnmp_up_to(100.02), Cnmp::Detected);
+    assert_eq!(cnmp_up_to(100.01), Cnmp::Undecided);
+}
+
+/// A real zero and a pair that the phase confirms do not stand for another pair.
+#[test]
+fn phase_confirms_each_pair_by_itself() {
+    let real = UncertainZero {
+        s: Complex::new(100.0, 0.0),
+        kind: ZeroKind::Rnmp,
+        ..cnmp_zero(0.0)
+    };
+    let beyond = UncertainZero {
+        s: Complex::new(1.0, 250.0),
+        ..cnmp_zero(0.0)
+    };
+    let zeros = [real, cnmp_zero(0.0), beyond];
+    let (cnmp, why) = evaluate(&zeros, Some(&OPPOSITE), phase_drop(720.0, 0.0));
+    assert_eq!(cnmp, Cnmp::Undecided);
+    // |1 + 250 j| is 39.79 Hz.
+    assert!(
+        why.starts_with("the fit has CNMP zeros at 39.79 Hz"),
+        "{why}"
+    );
+    let (cnmp, _) = evaluate(&zeros[..2], Some(&OPPOSITE), phase_drop(720.0, 0.0));
+    assert_eq!(cnmp, Cnmp::Detected);
 }
 
 /// A lag that is not stated gave complex residues with a zero at 1136 +- 1225j rad/s, of a stage whose zeros all lie left of the axis.
@@ -202,7 +230,6 @@ fn reason_of_a_detection_states_pairs_signs_and_phase() {
         why(1, 350.0),
         "1 pair of CNMP zeros, residues of opposite signs (+-+), and 354 degrees more phase lag than a minimum-phase system of this magnitude"
     );
-    // Half a turn for each pair confirms them.
     assert!(why(1, 180.0).contains("and 184 degrees more phase lag"));
     assert!(why(2, 360.0).contains("and 364 degrees more phase lag"));
 }
