@@ -7,8 +7,8 @@
 //! Every sum of modes with real residues is one with complex residues, so that the data decide. Complex residues are accepted if
 //!
 //! 1. they leave noise as the residual, and do not nearly cancel;
-//! 2. they need no more modes than real residues that describe the data, and 2 N chi^2 + k ln 2N with N data and k parameters is smaller
-//!    (Bayesian information criterion);
+//! 2. they need no more modes than real residues that describe the data, and where these leave noise as well, fewer parameters; of a part of
+//!    the data 2 N chi^2 + k ln 2N, with N data and k parameters, must be smaller (Bayesian information criterion);
 //! 3. real residues and a delay in their place, with as many modes, describe the data significantly worse;
 //! 4. they are not those of another kind of output: with r = 0 for all modes it is a velocity.
 //!
@@ -31,7 +31,7 @@ use crate::modal::{
 const MAX_MODES: usize = 8;
 /// A mode of a flexure with a damper has less, the pole of a filter more.
 const MAX_DAMPING_RATIO: f64 = 0.3;
-/// Beside the ln 2N of each rate (Bayesian information criterion), chi^2 must decrease by the square of 5 standard deviations.
+/// With more parameters, chi^2 must decrease by the square of 5 standard deviations beside the ln 2N of each (Bayesian information criterion).
 const CERTAIN_DECREASE: f64 = 25.0;
 
 impl ModalFit {
@@ -85,23 +85,18 @@ pub(crate) fn fit_complex(
     if real.as_ref().is_ok_and(ModalFit::is_of_a_stage) {
         return None;
     }
-    better_complex(data, chain, real)
+    let complex = complex_modes(data, chain, max_modes(real)?)?;
+    is_simpler(&complex, real).then_some(complex)
 }
 
-/// The fit with complex residues, if it describes the data better than one with real ones, even if that is one of a stage.
+/// The fit of a part of the data with complex residues, if it describes them better than one with real ones, even if that is one of a stage.
 pub(crate) fn better_complex(
-    data: &[FrfDatum],
+    part: &[FrfDatum],
     chain: &MeasurementChain,
     real: &Result<ModalFit, FitError>,
 ) -> Option<ModalFit> {
-    let max_modes = match real {
-        Ok(fit) if fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM => fit.parameters.modes.len(),
-        Ok(_) => MAX_MODES,
-        Err(FitError::Undetermined { modes }) => *modes,
-        Err(_) => return None,
-    };
-    let complex = complex_modes(data, chain, max_modes)?;
-    let is_better = |real: &ModalFit| is_clearly_better(&complex, real, data.len());
+    let complex = complex_modes(part, chain, max_modes(real)?)?;
+    let is_better = |real: &ModalFit| is_clearly_better(&complex, real, part.len());
     real.as_ref().map_or(true, is_better).then_some(complex)
 }
 
@@ -116,13 +111,43 @@ pub(crate) fn complex_modes(
     is_accepted(&complex, data, chain).then_some(complex)
 }
 
-/// Whether a fit of N data has a Bayesian information criterion 2 N chi^2 + k ln 2N that is clearly smaller than that of another one.
-pub(crate) fn is_clearly_better(fit: &ModalFit, other: &ModalFit, data: usize) -> bool {
-    let values = 2.0 * data as f64;
-    let criterion = |fit: &ModalFit| {
-        values * fit.chi2_per_freedom + fit.number_of_parameters() as f64 * values.ln()
+/// Largest number of modes with complex residues in place of real ones.
+fn max_modes(real: &Result<ModalFit, FitError>) -> Option<usize> {
+    match real {
+        Ok(fit) if fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM => Some(fit.number_of_modes()),
+        Ok(_) => Some(MAX_MODES),
+        Err(FitError::Undetermined { modes }) => Some(*modes),
+        Err(_) => None,
+    }
+}
+
+/// Whether complex residues have fewer parameters than real ones that leave noise as well.
+fn is_simpler(complex: &ModalFit, real: &Result<ModalFit, FitError>) -> bool {
+    match real {
+        Ok(real) if real.leaves_noise() => {
+            complex.number_of_parameters() < real.number_of_parameters()
+        }
+        _ => true,
+    }
+}
+
+/// Whether a fit of a part of N data has a smaller Bayesian information criterion 2 N chi^2 + k ln 2N than another fit of them; with more
+/// parameters, a clearly smaller one. (Of many data, those of each fit are merged around its own poles, and chi^2 cannot be compared.)
+pub(crate) fn is_clearly_better(fit: &ModalFit, other: &ModalFit, part_data: usize) -> bool {
+    let values = 2.0 * part_data as f64;
+    let [fitted, others] = [fit, other].map(|fit| {
+        let parameters = fit.number_of_parameters() as f64;
+        (
+            parameters,
+            values * fit.chi2_per_freedom + parameters * values.ln(),
+        )
+    });
+    let margin = if fitted.0 > others.0 {
+        CERTAIN_DECREASE
+    } else {
+        0.0
     };
-    criterion(fit) + CERTAIN_DECREASE < criterion(other)
+    fitted.1 + margin < others.1
 }
 
 /// Whether the modes describe the data, and real residues do not.

@@ -120,7 +120,7 @@ impl ExternalAnalysis {
         }
     }
 
-    /// The number of fitted parameters; without a fit as if there were any number.
+    /// The number of fitted parameters of the modes; without a fit as if there were any number.
     pub(super) fn number_of_parameters(&self) -> usize {
         let fit = self.fit.as_ref();
         fit.map_or(usize::MAX, ModalFit::number_of_parameters)

@@ -3,19 +3,22 @@
 //!
 //! ```text
 //! few modes --not those of a stage--> a lag? --no--> another kind? --no--> complex residues? --no--> all modes
-//!      '--those of a stage--------------------------------------------------------------------------^
+//!      '--those of a stage---------------------------------------------------------^
 //! ```
-
-use core::cell::LazyCell;
 
 use bench_plant::OutputKind;
 
 use crate::complex_residues::{better_complex, complex_modes, is_clearly_better};
 use crate::fitted_lag::{FittedLag, is_looked_for};
-use crate::modal::{FitError, MeasurementChain, ModalFit};
-use crate::observation::{Observation, PART_MODES, Source, describes, part};
+use crate::modal::{self, FitError, MeasurementChain, ModalFit, Residues};
+use crate::observation::{Observation, PART_MODES, Source, part};
 use crate::other_kind::clear_kind;
 use crate::plausibility::{OtherModel, lag_model, with_complex_residues};
+
+/// Largest number of real modes of a part that are compared with complex residues.
+const MORE_MODES: usize = 2 * PART_MODES;
+/// Number of modes so small that a part of the data does not show them, but all data do.
+const SMALL_MODES: usize = 2;
 
 /// The modes of a response, or why none can be fitted, and how it was observed.
 pub(super) struct FirstFit {
@@ -37,31 +40,25 @@ impl FirstFit {
         is_sound: bool,
         all_modes: impl FnOnce() -> Result<ModalFit, FitError>,
     ) -> FirstFit {
-        // Complex residues of a part cost little, and show whether those of all data are worth their time.
         let complex = is_sound.then(|| complex_part(seen)).flatten();
-        let most = complex
-            .as_ref()
-            .map_or(usize::MAX, ModalFit::number_of_modes);
         let looks_for_lag = is_sound && is_looked_for(seen);
-        let lag = match looks_for_lag.then(|| lag_model(seen)).flatten() {
-            Some(lag) if lag.number_of_modes() <= most => return FirstFit::by(lag, seen.source),
-            lag => lag,
-        };
+        if looks_for_lag && let Some(lag) = lag_model(seen) {
+            return FirstFit::by(simplest(seen, lag, complex), seen.source);
+        }
         let source = Source {
             fits_lag: seen.source.fits_lag && !looks_for_lag,
             ..seen.source
         };
         let clear_kind = clear_kind(seen);
-        let all_modes = LazyCell::new(all_modes);
-        if clear_kind.is_none() {
-            let complex = complex.and_then(|_| complex_of_all(seen, &all_modes));
-            if let Some(model) = complex.or(lag) {
-                return FirstFit::by(model, source);
-            }
+        if clear_kind.is_none()
+            && let Some(part) = complex
+            && let Some(model) = complex_of_all(seen, &part)
+        {
+            return FirstFit::by(model, source);
         }
         let fit = match clear_kind {
             Some(_) => seen.fit.clone(),
-            None => all_modes.clone(),
+            None => all_modes(),
         };
         FirstFit {
             fit,
@@ -84,23 +81,32 @@ impl FirstFit {
     }
 }
 
-/// A part of the response with complex residues, if they describe it better than a few real ones.
+/// A part of the response with complex residues, if they describe it better than real ones. It costs little, and shows whether complex
+/// residues of all data are worth their time. A few real ones may be too few for a stage of many modes, so that more are tried.
 fn complex_part(seen: &Observation<'_>) -> Option<ModalFit> {
-    better_complex(&part(&seen.frf.data), seen.chain, seen.fit)
+    let part = part(&seen.frf.data);
+    let complex = better_complex(&part, seen.chain, seen.fit)?;
+    let are_enough = |few: &ModalFit| few.number_of_modes() < PART_MODES;
+    if seen.fit.as_ref().is_ok_and(are_enough) {
+        return Some(complex);
+    }
+    let more = modal::fit_few(&part, seen.chain, &Residues::Real, MORE_MODES);
+    let is_better = |more: &ModalFit| is_clearly_better(&complex, more, part.len());
+    more.as_ref().map_or(true, is_better).then_some(complex)
 }
 
-/// The whole response with complex residues. As many real ones as are allowed for a part may describe it because the stage has more, so that
-/// they are compared with `all_modes`.
-fn complex_of_all<F: FnOnce() -> Result<ModalFit, FitError>>(
-    seen: &Observation<'_>,
-    all_modes: &LazyCell<Result<ModalFit, FitError>, F>,
-) -> Option<OtherModel> {
-    let data = &seen.frf.data;
-    let complex = complex_modes(data, seen.chain, PART_MODES)?;
-    let may_have_more = |few: &ModalFit| describes(few) && few.number_of_modes() == PART_MODES;
-    let is_better = |real: &ModalFit| is_clearly_better(&complex, real, data.len());
-    if seen.fit.as_ref().is_ok_and(may_have_more) && !all_modes.as_ref().map_or(true, is_better) {
-        return None;
-    }
+/// The whole response with complex residues, by about as many modes as a part of it.
+fn complex_of_all(seen: &Observation<'_>, part: &ModalFit) -> Option<OtherModel> {
+    let max_modes = part.number_of_modes() + SMALL_MODES;
+    let complex = complex_modes(&seen.frf.data, seen.chain, max_modes)?;
     with_complex_residues(seen, complex)
+}
+
+/// A lag, or complex residues with fewer modes than it.
+fn simplest(seen: &Observation<'_>, lag: OtherModel, complex: Option<ModalFit>) -> OtherModel {
+    let most = lag.fit.number_of_modes();
+    let fewer = complex.filter(|part| part.number_of_modes() < most);
+    let complex = fewer.and_then(|part| complex_of_all(seen, &part));
+    let fewer = complex.filter(|complex| complex.fit.number_of_modes() < most);
+    fewer.unwrap_or(lag)
 }

@@ -22,9 +22,9 @@ use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
 
-/// A delay that grows by less than this ratio of a sample during the record is no cause of an undecided verdict: two clocks that differ by
-/// 20 ppm, as those of two instruments, change it by more in 8 s at 1 kHz.
-const LEAST_GROWTH_SAMPLES: f64 = 0.15;
+/// Least angle in radians by which the delay between two clocks turns the response at the end of the band. Clocks of two instruments differ
+/// by some 20 ppm, which is 0.25 rad at 100 Hz after 20 s. A filter may seem to be a difference of 1 or 2 ppm.
+const LEAST_TURN_RAD: f64 = 0.15;
 /// The caution of a verdict from a record in motion.
 const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
 
@@ -256,7 +256,8 @@ impl Identification {
         if is_open
             && !compares_first
             && let Some(corrected) = self.with_one_clock(prepared)?
-            && corrected.number_of_parameters() < analysis.number_of_parameters()
+            // The ratio of the clocks is one more.
+            && corrected.number_of_parameters() + 1 < analysis.number_of_parameters()
         {
             return Ok(corrected);
         }
@@ -287,6 +288,10 @@ impl Identification {
         let Some(skew) = ClockSkew::find(record, recorded.band_hz, &recorded.assumed) else {
             return Ok(None);
         };
+        // A small turn describes a part of anything.
+        if skew.growth_s().abs() * TAU * recorded.band_hz.1 < LEAST_TURN_RAD {
+            return Ok(None);
+        }
         let corrected = skew.corrected(record.signals);
         let Ok(prepared) = self.prepared(record.with_signals(&corrected)) else {
             return Ok(None);
@@ -298,10 +303,7 @@ impl Identification {
         });
         // The turn that two clocks cause may also describe a part of complex residues, and leave an implausible response.
         let is_likely = is_confirmed && analysis.is_plausible && !self.is_other_kind(recorded);
-        // A small turn describes a part of anything.
-        let is_small = skew.growth_s().abs() * self.rate_hz < LEAST_GROWTH_SAMPLES;
-        let helps = !is_small || analysis.verdict.cnmp != Cnmp::Undecided;
-        Ok((is_likely && helps).then_some(analysis))
+        Ok(is_likely.then_some(analysis))
     }
 
     /// Whether the output is clearly of a kind that the user does not state. With it the response needs no other explanation.

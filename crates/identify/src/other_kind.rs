@@ -31,7 +31,7 @@ const SWAPPED: &str =
     "modes describe the response from output to input, but not that from input to output";
 
 /// The kind of an output that is clearly of another kind than assumed: few modes do not describe it, and half as many of that kind do, or
-/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not with fewer parameters. If few modes describe
+/// fewer to its noise, or as many far better, and complex residues of the assumed kind do not better. If few modes describe
 /// the data, it is clear only if they are suspect, and fewer of that kind leave noise. `seen` with few modes of a part of the data.
 pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
     let (few, data) = (seen.fit, &seen.frf.data);
@@ -53,7 +53,7 @@ pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
     } else {
         saves_modes || 2 * other_modes <= PART_MODES || few.as_ref().is_ok_and(is_far_better)
     };
-    let is_simplest = is_clear && !complex_residues_are_simpler(data, seen.chain, few, other);
+    let is_simplest = is_clear && !complex_residues_are_better(data, seen.chain, few, other);
     is_simplest.then_some(*kind)
 }
 
@@ -85,7 +85,7 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
         return None;
     }
     let (kind, other) = other_kind(seen)?;
-    let is_simplest = !complex_residues_are_simpler(&seen.frf.data, seen.chain, seen.fit, other);
+    let is_simplest = !complex_residues_are_better(&seen.frf.data, seen.chain, seen.fit, other);
     is_simplest.then(|| give_kind(assumed, *kind))
 }
 
@@ -99,7 +99,7 @@ pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
 
 /// Whether modes of the assumed kind with complex residues describe a part of the data better than those of another kind. (They can be
 /// those of an acceleration as well, but need more parameters for it.)
-fn complex_residues_are_simpler(
+fn complex_residues_are_better(
     data: &[FrfDatum],
     chain: &MeasurementChain,
     real: &Result<ModalFit, FitError>,

@@ -83,12 +83,6 @@ pub(super) struct OtherModel {
     pub(super) lag: Option<FittedLag>,
 }
 
-impl OtherModel {
-    pub(super) fn number_of_modes(&self) -> usize {
-        self.fit.number_of_modes()
-    }
-}
-
 /// Modes with a lag that is not stated, if they describe the data, and are plausible.
 pub(super) fn lag_model(seen: &Observation<'_>) -> Option<OtherModel> {
     let FitThroughLag { lag, chain, fit } = fit_through_lag(seen)?;

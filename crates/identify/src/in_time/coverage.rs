@@ -82,10 +82,8 @@ fn information(output: &[f64], of_readings: &[f64]) -> f64 {
 /// Whether a mode of either sign, with any residue from a ratio `least` of that of `hidden` up to it, leaves the number of CNMP pairs up to
 /// a frequency as it is.
 fn keeps_pairs(sum: &ModalSum, hidden: ModalTerm, least: f64, to_rad_s: f64) -> bool {
-    if !hidden.residue_per_kg.is_finite() || least <= MIN_HIDDEN_RATIO {
-        return false;
-    }
-    let Some(pairs) = pairs_up_to(sum, to_rad_s) else {
+    let is_possible = hidden.residue_per_kg.is_finite() && least > MIN_HIDDEN_RATIO;
+    let (true, Some(pairs)) = (is_possible, pairs_up_to(sum, to_rad_s)) else {
         return false;
     };
     let halved = std::iter::successors(Some(1.0), |ratio| Some(0.5 * ratio));

@@ -58,8 +58,12 @@ pub(super) struct NoReadings {
 
 impl LostReadings {
     /// The readings with what is known to be lost; `None` if nothing is.
-    pub(super) fn of(output: &[f64], channel: Channel, none: &NoReadings) -> Option<LostReadings> {
-        let held = none.held;
+    pub(super) fn of(
+        output: &[f64],
+        channel: Channel,
+        samples: &NoReadings,
+    ) -> Option<LostReadings> {
+        let held = samples.held;
         let mut lost = LostReadings {
             readings: output.iter().copied().map(Reading::Value).collect(),
             corrections: Vec::new(),
@@ -67,13 +71,13 @@ impl LostReadings {
         if let Some(samples) = held {
             lost.keep_changes(output, samples)?;
         }
-        for limit in &none.limits {
+        for limit in &samples.limits {
             lost.set_limit(limit, channel);
         }
         if let Some(samples) = held.filter(|_| !channel.has_step) {
             lost.leave_out_old(samples.round() as usize);
         }
-        lost.leave_out(&none.runs, channel.rate_hz);
+        lost.leave_out(&samples.runs, channel.rate_hz);
         (!lost.corrections.is_empty()).then_some(lost)
     }
 

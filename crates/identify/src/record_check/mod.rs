@@ -94,18 +94,20 @@ fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) ->
         step,
         has_step: quantisation.is_some(),
     };
-    let none = no_readings(recorded, step, quantisation);
-    let defect = if let Some(samples) = none.held {
-        let probe_hz = rate_hz / samples;
-        Defect::Held { samples, probe_hz }
-    } else if let Some(limit) = none.limits.first() {
+    let samples = no_readings(recorded, step, quantisation);
+    let defect = if let Some(every) = samples.held {
+        Defect::Held {
+            samples: every,
+            probe_hz: rate_hz / every,
+        }
+    } else if let Some(limit) = samples.limits.first() {
         limit.defect(rate_hz)
     } else {
-        none.runs.first()?.defect(recorded, channel.has_step)
+        samples.runs.first()?.defect(recorded, channel.has_step)
     };
     let lost = defect
         .loses_readings()
-        .then(|| LostReadings::of(&recorded.output, channel, &none));
+        .then(|| LostReadings::of(&recorded.output, channel, &samples));
     Some(Checked {
         defects: vec![defect],
         lost: lost.flatten(),
