@@ -78,6 +78,11 @@ pub trait ExcitationDesign {
         true
     }
 
+    /// The amplitude in amperes of an excitation that has the same one at all frequencies, to be planned with the model.
+    fn one_amplitude_a(&mut self) -> Option<&mut f64> {
+        None
+    }
+
     /// Whether its amplitude is planned with the model unless the user gives one.
     fn is_shaped_by_default(&self) -> bool {
         false

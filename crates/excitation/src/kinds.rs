@@ -70,6 +70,15 @@ macro_rules! excitations {
                     }
                 })
             }
+
+            /// The amplitude in amperes of a kind that has the same one at all frequencies. That of a kind of another crate is planned
+            /// there.
+            pub fn one_amplitude_a(&mut self, kind: ExcitationKind) -> Option<&mut f64> {
+                match kind {
+                    ExcitationKind::Chirp | ExcitationKind::Own => None,
+                    $(ExcitationKind::$kind => self.$table.one_amplitude_a(),)*
+                }
+            }
         }
     };
 }

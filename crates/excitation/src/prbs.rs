@@ -89,6 +89,10 @@ impl ExcitationDesign for PrbsSettings {
         false
     }
 
+    fn one_amplitude_a(&mut self) -> Option<&mut f64> {
+        Some(&mut self.amplitude_a)
+    }
+
     fn is_broadband(&self) -> bool {
         true
     }

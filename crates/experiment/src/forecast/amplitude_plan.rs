@@ -18,6 +18,9 @@ const GRID: usize = 4000;
 /// An FRF must reach the ends of the band up to this ratio. It is constant beyond its own ends.
 const END_RATIO: f64 = 1.1;
 
+/// A shaped sweep may move the stage by this part of the soft limit.
+const SWEEP_RATIO: f64 = 2.0 / 3.0;
+
 /// Frequency in hertz and |G| in metres per ampere, by rising frequency.
 type Gain = Vec<(f64, f64)>;
 
@@ -54,9 +57,9 @@ impl fmt::Display for ResponseSource {
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum AmplitudePlanError {
-    /// The excitation has the same amplitude at all frequencies.
+    /// The excitation has the same amplitude at all frequencies, which the source does not plan.
     #[error(
-        "the excitation has the same amplitude at all frequencies; set {0}, or choose another kind of excitation"
+        "the excitation has the same amplitude at all frequencies, which --shape does not plan from this source; set {0}, or choose another kind of excitation"
     )]
     OneAmplitude(&'static str),
     /// The FRF cannot be read.
@@ -90,17 +93,21 @@ pub fn default_amplitude(config: Config) -> Result<Config, AmplitudePlanError> {
 }
 
 /// Plans an amplitude over frequency that moves the stage by `shape.travel_m` at all frequencies, as far as the current
-/// suffices.
+/// suffices. An excitation that has one amplitude moves it by at most as much, by the model.
+///
+/// A sweep that passes a mode quickly moves the stage further than a steady sine. All amplitudes are then lowered until it stays within
+/// the soft limit by [`SWEEP_RATIO`], or within `shape.travel_m` if that is more.
 ///
 /// # Errors
-/// If the excitation has one amplitude only, or the response cannot be read or computed over the whole band.
+/// If the excitation has one amplitude only and the source is a measured response, or the response cannot be read or computed over the
+/// whole band.
 pub fn shape_amplitude(
     mut config: Config,
     source: &ResponseSource,
 ) -> Result<Config, AmplitudePlanError> {
     let design = chosen(&config)?.design;
     if !design.has_amplitude_curve() {
-        return Err(AmplitudePlanError::OneAmplitude(design.amplitude_key()));
+        return shape_one_amplitude(config, source);
     }
     let span = design.max_span().unwrap_or(f64::INFINITY);
     let is_broadband = design.is_broadband();
@@ -111,8 +118,39 @@ pub fn shape_amplitude(
     let travel_m = shape_travel_m(&config);
     let limit = CurrentLimit::new(&config.excitation_limits(), config.shape.current_ratio);
     config.chirp.amplitude = shaped_amplitude(&gain, travel_m, limit, span);
-    if is_broadband {
-        limit_travel(&mut config, travel_m)?;
+    let most_m = if is_broadband {
+        travel_m
+    } else {
+        travel_m.max(SWEEP_RATIO * config.interlock.soft_limit_m)
+    };
+    limit_travel(&mut config, most_m)?;
+    Ok(config)
+}
+
+/// The largest amplitude at all frequencies that moves the stage by at most `shape.travel_m` in the model, within the limits of the
+/// current.
+fn shape_one_amplitude(
+    mut config: Config,
+    source: &ResponseSource,
+) -> Result<Config, AmplitudePlanError> {
+    let kind = config.excitation.kind;
+    let key = chosen(&config)?.design.amplitude_key();
+    let refused = AmplitudePlanError::OneAmplitude(key);
+    let (limits, ratio) = (config.excitation_limits(), config.shape.current_ratio);
+    let travel_m = shape_travel_m(&config);
+    match (source, config.excitations.one_amplitude_a(kind)) {
+        (ResponseSource::Model, Some(amplitude_a)) => *amplitude_a = 1.0,
+        _ => return Err(refused),
+    }
+    let per_ampere = extremes(&chosen(&config)?.build(), &config)?;
+    let largest_a = [
+        travel_m / per_ampere.travel_m,
+        ratio * limits.peak_current_a.min(limits.amplifier_current_a) / per_ampere.current_a,
+        ratio * limits.continuous_current_a / per_ampere.thermal_current_a,
+        ratio * limits.slew_a_per_s / per_ampere.slew_a_per_s,
+    ];
+    if let Some(amplitude_a) = config.excitations.one_amplitude_a(kind) {
+        *amplitude_a = largest_a.into_iter().fold(f64::INFINITY, f64::min);
     }
     Ok(config)
 }
