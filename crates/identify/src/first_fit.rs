@@ -3,16 +3,17 @@
 //!
 //! ```text
 //! few modes --not those of a stage--> a lag? --no--> another kind? --no--> complex residues? --no--> all modes
-//!      '--those of a stage---------------------------------------------------------^
+//!      '--those of a stage-------------------------------^
 //! ```
 
 use bench_plant::OutputKind;
 
-use crate::complex_residues::{better_complex, complex_modes, is_clearly_better};
+use crate::complex_residues::{complex_modes, is_clearly_better};
 use crate::fitted_lag::{FittedLag, is_looked_for};
 use crate::modal::{self, FitError, MeasurementChain, ModalFit, Residues};
-use crate::observation::{Observation, PART_MODES, Source, part};
+use crate::observation::{Observation, Source};
 use crate::other_kind::clear_kind;
+use crate::part::{PART_MODES, Part};
 use crate::plausibility::{OtherModel, lag_model, with_complex_residues};
 
 /// Largest number of real modes of a part that are compared with complex residues.
@@ -40,7 +41,7 @@ impl FirstFit {
         is_sound: bool,
         all_modes: impl FnOnce() -> Result<ModalFit, FitError>,
     ) -> FirstFit {
-        let complex = is_sound.then(|| complex_part(seen)).flatten();
+        let complex = is_sound.then(|| complex_part(seen.part)).flatten();
         let looks_for_lag = is_sound && is_looked_for(seen);
         if looks_for_lag && let Some(lag) = lag_model(seen) {
             return FirstFit::by(simplest(seen, lag, complex), seen.source);
@@ -52,7 +53,7 @@ impl FirstFit {
         let clear_kind = clear_kind(seen);
         if clear_kind.is_none()
             && let Some(part) = complex
-            && let Some(model) = complex_of_all(seen, &part)
+            && let Some(model) = complex_of_all(seen, part)
         {
             return FirstFit::by(model, source);
         }
@@ -83,15 +84,14 @@ impl FirstFit {
 
 /// A part of the response with complex residues, if they describe it better than real ones. It costs little, and shows whether complex
 /// residues of all data are worth their time. A few real ones may be too few for a stage of many modes, so that more are tried.
-fn complex_part(seen: &Observation<'_>) -> Option<ModalFit> {
-    let part = part(&seen.frf.data);
-    let complex = better_complex(&part, seen.chain, seen.fit)?;
+fn complex_part(part: &Part) -> Option<&ModalFit> {
+    let complex = part.complex()?;
     let are_enough = |few: &ModalFit| few.number_of_modes() < PART_MODES;
-    if seen.fit.as_ref().is_ok_and(are_enough) {
+    if part.few().as_ref().is_ok_and(are_enough) {
         return Some(complex);
     }
-    let more = modal::fit_few(&part, seen.chain, &Residues::Real, MORE_MODES);
-    let is_better = |more: &ModalFit| is_clearly_better(&complex, more, part.len());
+    let more = modal::fit_few(&part.data, &part.chain, &Residues::Real, MORE_MODES);
+    let is_better = |more: &ModalFit| is_clearly_better(complex, more, part.data.len());
     more.as_ref().map_or(true, is_better).then_some(complex)
 }
 
@@ -102,11 +102,14 @@ fn complex_of_all(seen: &Observation<'_>, part: &ModalFit) -> Option<OtherModel>
     with_complex_residues(seen, complex)
 }
 
-/// A lag, or complex residues with fewer modes than it.
-fn simplest(seen: &Observation<'_>, lag: OtherModel, complex: Option<ModalFit>) -> OtherModel {
-    let most = lag.fit.number_of_modes();
-    let fewer = complex.filter(|part| part.number_of_modes() < most);
-    let complex = fewer.and_then(|part| complex_of_all(seen, &part));
-    let fewer = complex.filter(|complex| complex.fit.number_of_modes() < most);
-    fewer.unwrap_or(lag)
+/// A lag, or complex residues, if a part of the response and the whole one have fewer modes with them.
+fn simplest(seen: &Observation<'_>, lag: OtherModel, part: Option<&ModalFit>) -> OtherModel {
+    let with_lag = lag.fit.number_of_modes();
+    let Some(part) = part.filter(|part| part.number_of_modes() < with_lag) else {
+        return lag;
+    };
+    match complex_of_all(seen, part) {
+        Some(complex) if complex.fit.number_of_modes() < with_lag => complex,
+        _ => lag,
+    }
 }

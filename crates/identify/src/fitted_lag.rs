@@ -26,7 +26,8 @@ use crate::frf::with_relative_error;
 use crate::modal::{
     self, FitError, InputPath, MeasurementChain, ModalFit, ModalParameters, Nearest, Residues,
 };
-use crate::observation::{Observation, PART_MODES, Source, describes, part};
+use crate::observation::{Observation, Source, describes};
+use crate::part::{PART_MODES, part};
 use crate::profile::{self, is_progress};
 use crate::{Estimate, FrfDatum};
 use bench_plant::{InputKind, OutputKind};

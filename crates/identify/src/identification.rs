@@ -9,8 +9,9 @@ use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
 use crate::in_time::TimeFit;
 use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
-use crate::observation::{Observation, OtherKind, Source};
+use crate::observation::{Observation, Source};
 use crate::other_kind::clear_kind;
+use crate::part::Part;
 use crate::periodic::Repetition;
 use crate::plausibility::{
     OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
@@ -281,7 +282,8 @@ impl Identification {
     ) -> Result<Option<ExternalAnalysis>, IdentificationError> {
         // A resampled output has no steps by which its errors could be known.
         let has_steps = recorded.resolution.output.is_some();
-        if self.repetition.is_some() || has_steps || !recorded.is_sound() {
+        let can_be_found = self.repetition.is_none() && !has_steps && recorded.is_sound();
+        if !can_be_found || self.is_other_kind(recorded) {
             return Ok(None);
         }
         let record = recorded.record;
@@ -302,7 +304,7 @@ impl Identification {
             fit.is_sum_of_few_modes() && skew.is_confirmed(fit, record, data, &analysis.chain)
         });
         // The turn that two clocks cause may also describe a part of complex residues, and leave an implausible response.
-        let is_likely = is_confirmed && analysis.is_plausible && !self.is_other_kind(recorded);
+        let is_likely = is_confirmed && analysis.is_plausible;
         Ok(is_likely.then_some(analysis))
     }
 
@@ -319,8 +321,8 @@ impl Identification {
         analysis: ExternalAnalysis,
         model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
-        let is_other = analysis.fitted_lag.is_some() || !analysis.has_real_residues();
-        if analysis.is_explained || is_other {
+        let has_other_model = analysis.fitted_lag.is_some() || !analysis.has_real_residues();
+        if analysis.is_explained || has_other_model {
             return Ok(analysis);
         }
         let ExternalAnalysis { frf, chain, .. } = &analysis;
@@ -331,7 +333,7 @@ impl Identification {
             chain,
             stated: self.output_kind,
             clear_kind: None,
-            other_kind: &OtherKind::new(),
+            part: &Part::of(&frf.data, chain),
             output_step: analysis.resolution.output,
             remedies: record.remedies(),
         };
@@ -390,7 +392,7 @@ impl Identification {
         } else {
             expected
         };
-        let judged = Judged {
+        let found = Judged {
             frf,
             fit,
             chain: chain.clone(),
@@ -401,7 +403,7 @@ impl Identification {
         Ok(ExternalAnalysis {
             corrections,
             readings_fit: Some(noise),
-            ..ExternalAnalysis::of(prepared, judged)
+            ..ExternalAnalysis::of(prepared, found)
         })
     }
 
@@ -449,7 +451,7 @@ impl Identification {
         };
         let cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
         let input_path = self.input_path;
-        let judged = Judged {
+        let found = Judged {
             frf: frf.clone(),
             fit,
             chain,
@@ -464,7 +466,7 @@ impl Identification {
             clock_skew,
             is_explained,
             cautions,
-            ..ExternalAnalysis::of(prepared, judged)
+            ..ExternalAnalysis::of(prepared, found)
         })
     }
 

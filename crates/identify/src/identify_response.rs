@@ -10,7 +10,8 @@ use crate::fitted_lag::FittedLag;
 use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
-use crate::observation::{Observation, OtherKind, Source, fit_part, part};
+use crate::observation::{Observation, Source};
+use crate::part::Part;
 use crate::plausibility::{
     OtherModel, complex_model, implausible, known_cause, lag_model, response_hint,
 };
@@ -194,15 +195,15 @@ impl ResponseIdentification {
         };
         let output_kind = self.output_kind.unwrap_or_default();
         let assumed = source.chain(output_kind, &frf.data);
-        let few = fit_part(&part(&frf.data), &assumed);
+        let part = Part::of(&frf.data, &assumed);
         let with_few = Observation {
             source,
             frf: &frf,
-            fit: &few,
+            fit: part.few(),
             chain: &assumed,
             stated: self.output_kind,
             clear_kind: None,
-            other_kind: &OtherKind::new(),
+            part: &part,
             output_step: None,
             remedies: &OF_RESPONSE,
         };
@@ -222,11 +223,11 @@ impl ResponseIdentification {
             ..with_few
         };
         let known = known_cause(&observation);
-        let is_other = fit
+        let has_complex_residues = fit
             .as_ref()
             .is_ok_and(|fit| !fit.parameters.has_real_residues());
         let other = match (&known, first_lag) {
-            (None, None) if !is_other => {
+            (None, None) if !has_complex_residues => {
                 lag_model(&observation).or_else(|| complex_model(&observation))
             }
             _ => None,

@@ -60,6 +60,7 @@ mod multisine_lines;
 mod noise_parts;
 mod observation;
 mod other_kind;
+mod part;
 mod periodic_part;
 mod plausibility;
 mod prepared;

@@ -1,11 +1,10 @@
 //! A response with the modes that were fitted to it, and how it was observed.
 
-use core::cell::OnceCell;
-
 use bench_plant::{InputKind, OutputKind};
 
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
-use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit, Residues};
+use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
+use crate::part::{Part, fit_part, part};
 use crate::remedies::Remedies;
 use crate::{Frf, FrfDatum};
 
@@ -22,11 +21,6 @@ pub(super) struct Source {
     pub(super) fits_lag: bool,
 }
 
-/// Number of data of a part.
-const PART_DATA: usize = 400;
-/// Largest number of modes that are fitted to a part.
-pub(super) const PART_MODES: usize = 8;
-
 impl Source {
     /// The chain of an output of this kind. An acceleration that steps with its input may have been read before the step or after it: the
     /// chain is the one that describes a part of the data better.
@@ -35,8 +29,7 @@ impl Source {
         let Some(after) = self.input_path.chain_after_step(self.rate_hz, kind) else {
             return before;
         };
-        let data = part(data);
-        if cost(&data, &after) < cost(&data, &before) {
+        if cost(data, &after) < cost(data, &before) {
             after
         } else {
             before
@@ -44,28 +37,14 @@ impl Source {
     }
 }
 
-/// chi^2 and a penalty for each mode, as for a mode that is significant: modes may take the place of another chain.
+/// chi^2 of a part and a penalty for each mode, as for a mode that is significant: modes may take the place of another chain.
 fn cost(data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
     let Ok(fit) = fit_part(data, chain) else {
         return f64::INFINITY;
     };
-    let n = data.len() as f64;
+    let n = part(data).len() as f64;
     2.0 * n * fit.chi2_per_freedom + 5.0 * n.ln() * fit.parameters.modes.len() as f64
 }
-
-/// A few modes of some data.
-pub(super) fn fit_part(data: &[FrfDatum], chain: &MeasurementChain) -> Result<ModalFit, FitError> {
-    modal::fit_few(data, chain, &Residues::Real, PART_MODES)
-}
-
-/// Some of the data: many modes are fitted to what is no sum of modes, and a part shows that at less cost.
-pub(super) fn part(data: &[FrfDatum]) -> Vec<FrfDatum> {
-    let every = data.len().div_ceil(PART_DATA).max(1);
-    data.iter().step_by(every).copied().collect()
-}
-
-/// The only other kind of output of which modes describe a response, with these modes; computed when it is first asked for.
-pub(super) type OtherKind = OnceCell<Option<(OutputKind, ModalFit)>>;
 
 /// A response with its modes.
 #[derive(Clone, Copy)]
@@ -79,7 +58,8 @@ pub(super) struct Observation<'a> {
     pub(super) stated: Option<OutputKind>,
     /// The kind of an output that is clearly another one.
     pub(super) clear_kind: Option<OutputKind>,
-    pub(super) other_kind: &'a OtherKind,
+    /// A part of the response, through the chain of the stated kind, or of a position.
+    pub(super) part: &'a Part,
     /// Step of the output, if it exceeds its noise: its errors are no noise, and fewer modes of another kind may describe them by chance.
     pub(super) output_step: Option<f64>,
     /// What to do about implausible data.

@@ -9,9 +9,10 @@ use bench_plant::OutputKind;
 use nalgebra::Complex;
 
 use crate::chi2_limits::NOISE_CHI2;
-use crate::complex_residues::{better_complex, is_clearly_better};
-use crate::modal::{self, FitError, MeasurementChain, ModalFit};
-use crate::observation::{Observation, PART_MODES, Source, describes, fit_part, part};
+use crate::complex_residues::is_clearly_better;
+use crate::modal::{self, FitError, ModalFit};
+use crate::observation::{Observation, Source, describes};
+use crate::part::{PART_MODES, Part, fit_part};
 use crate::{Estimate, FrfDatum};
 
 /// A constant above this ratio of the response at the end of the band is nearly all of it.
@@ -34,7 +35,7 @@ const SWAPPED: &str =
 /// fewer to its noise, or as many far better, and complex residues of the assumed kind do not better. If few modes describe
 /// the data, it is clear only if they are suspect, and fewer of that kind leave noise. `seen` with few modes of a part of the data.
 pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
-    let (few, data) = (seen.fit, &seen.frf.data);
+    let few = seen.fit;
     let few_modes = match few {
         Ok(fit) => fit.parameters.modes.len(),
         Err(FitError::Undetermined { modes }) => *modes,
@@ -53,7 +54,7 @@ pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
     } else {
         saves_modes || 2 * other_modes <= PART_MODES || few.as_ref().is_ok_and(is_far_better)
     };
-    let is_simplest = is_clear && !complex_residues_are_better(data, seen.chain, few, other);
+    let is_simplest = is_clear && !complex_residues_are_better(seen.part, other);
     is_simplest.then_some(*kind)
 }
 
@@ -85,7 +86,7 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
         return None;
     }
     let (kind, other) = other_kind(seen)?;
-    let is_simplest = !complex_residues_are_better(&seen.frf.data, seen.chain, seen.fit, other);
+    let is_simplest = !complex_residues_are_better(seen.part, other);
     is_simplest.then(|| give_kind(assumed, *kind))
 }
 
@@ -99,18 +100,11 @@ pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
 
 /// Whether modes of the assumed kind with complex residues describe a part of the data better than those of another kind. (They can be
 /// those of an acceleration as well, but need more parameters for it.)
-fn complex_residues_are_better(
-    data: &[FrfDatum],
-    chain: &MeasurementChain,
-    real: &Result<ModalFit, FitError>,
-    other: &ModalFit,
-) -> bool {
-    let data = part(data);
-    let complex = better_complex(&data, chain, real);
-    complex.is_some_and(|fit| {
+fn complex_residues_are_better(part: &Part, other: &ModalFit) -> bool {
+    part.complex().is_some_and(|fit| {
         let is_smaller = fit.number_of_parameters() < other.number_of_parameters();
-        let is_better = is_smaller || is_clearly_better(&fit, other, data.len());
-        !vanishes(&fit) && (is_better || !other.is_of_a_stage())
+        let is_better = is_smaller || is_clearly_better(fit, other, part.data.len());
+        !vanishes(fit) && (is_better || !other.is_of_a_stage())
     })
 }
 
@@ -128,9 +122,8 @@ fn give_kind_of_fewer_modes(assumed: OutputKind, kind: OutputKind) -> String {
 
 /// The only other kind of output, of which as many modes describe the data to their noise, clearly better than those of the assumed kind.
 fn described_better(seen: &Observation<'_>) -> Option<String> {
-    let (data, assumed) = (&seen.frf.data, seen.chain.output());
+    let (few, assumed) = (seen.part.few().as_ref().ok()?, seen.chain.output());
     let (kind, other) = other_kind(seen)?;
-    let few = fit_part(&part(data), seen.chain).ok()?;
     let ratio = few.chi2_per_freedom / other.chi2_per_freedom;
     let is_better = ratio > CLEARLY_BETTER
         && other.chi2_per_freedom <= NOISE_CHI2
@@ -154,7 +147,8 @@ pub(super) fn better_kind(seen: &Observation<'_>) -> Option<String> {
 
 /// The only other kind of output of which modes describe the data, with these modes.
 fn other_kind<'a>(seen: &Observation<'a>) -> Option<&'a (OutputKind, ModalFit)> {
-    seen.other_kind.get_or_init(|| only_other(seen)).as_ref()
+    let other = &seen.part.other_kind;
+    other.get_or_init(|| only_other(seen)).as_ref()
 }
 
 fn only_other(seen: &Observation<'_>) -> Option<(OutputKind, ModalFit)> {
@@ -167,7 +161,7 @@ fn only_other(seen: &Observation<'_>) -> Option<(OutputKind, ModalFit)> {
 
 /// Modes that describe a part of the data as an output of this kind.
 fn modes_as(source: &Source, data: &[FrfDatum], kind: OutputKind) -> Option<ModalFit> {
-    let fit = fit_part(&part(data), &source.chain(kind, data)).ok()?;
+    let fit = fit_part(data, &source.chain(kind, data)).ok()?;
     let is_acceleration = kind == OutputKind::Position && vanishes(&fit);
     (describes(&fit) && !is_of_inverse(&fit) && !is_acceleration).then_some(fit)
 }
@@ -177,7 +171,7 @@ fn inverse_fits(seen: &Observation<'_>) -> bool {
     let mut inverse: Vec<FrfDatum> = seen.frf.data.iter().map(inverse_datum).collect();
     inverse.retain(|datum| datum.variance.is_normal());
     let is_sum_of_modes = |fit: ModalFit| describes(&fit) && !is_of_inverse(&fit);
-    fit_part(&part(&inverse), seen.chain).is_ok_and(is_sum_of_modes)
+    fit_part(&inverse, seen.chain).is_ok_and(is_sum_of_modes)
         && modal::fit(&inverse, seen.chain).is_ok_and(is_sum_of_modes)
 }
 

@@ -2,12 +2,12 @@
 
 use std::borrow::Cow;
 
-use crate::complex_residues::better_complex;
 use crate::external_signals::ExternalSignals;
 use crate::in_time::{TimeFit, TimeSearch};
 use crate::modal::{self, FitError, MeasurementChain, ModalFit};
 use crate::multisine_lines::useful_band::useful_limit_hz;
-use crate::observation::{Observation, OtherKind, PART_MODES, Source, describes, fit_part, part};
+use crate::observation::{Observation, Source, describes};
+use crate::part::{PART_MODES, Part, part};
 use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::cut_within_excitation;
@@ -59,9 +59,7 @@ pub(super) struct Prepared<'a> {
     pub(super) stated: Option<OutputKind>,
     /// The chain of an output of the stated kind, or of a position.
     pub(super) assumed: MeasurementChain,
-    other_kind: OtherKind,
-    /// A few modes, fitted to a part of the response.
-    pub(super) few: Result<ModalFit, FitError>,
+    part: Part,
 }
 
 impl<'a> Prepared<'a> {
@@ -100,8 +98,7 @@ impl<'a> Prepared<'a> {
             defects,
             lost,
             cut: cut_within_excitation(cleaned),
-            other_kind: OtherKind::new(),
-            few: fit_part(&part(&frf.data), &assumed),
+            part: Part::of(&frf.data, &assumed),
             record,
             signals,
             stray_lines,
@@ -171,8 +168,7 @@ impl<'a> Prepared<'a> {
     fn fit_of_readings(&self, readings: &[Reading], path: &SignalPath) -> Option<TimeFit> {
         let input = &self.record.signals.input;
         let mut search = TimeSearch::new(input, readings, self.step(), path);
-        let mut orders =
-            modal::rising_orders(&part(&self.frf.data), &self.assumed, PART_MODES).ok()?;
+        let mut orders = modal::rising_orders(&self.part.data, &self.assumed, PART_MODES).ok()?;
         for _ in 0..MAX_RESPONSES {
             search.try_modes(orders);
             if let Some(found) = search.result(self.band_hz) {
@@ -222,13 +218,12 @@ impl<'a> Prepared<'a> {
 
     /// Whether a few modes describe a part of the response.
     pub(super) fn few_modes_describe(&self) -> bool {
-        self.few.as_ref().is_ok_and(describes)
+        self.part.few().as_ref().is_ok_and(describes)
     }
 
     /// Whether a few modes with complex residues describe a part of the response.
     pub(super) fn complex_residues_describe(&self) -> bool {
-        let data = part(&self.frf.data);
-        self.is_sound() && better_complex(&data, &self.assumed, &self.few).is_some()
+        self.is_sound() && self.part.complex().is_some()
     }
 
     /// As many modes as are significant. Many modes would be fitted to a defect or to a missing end, of which the few are kept.
@@ -238,11 +233,11 @@ impl<'a> Prepared<'a> {
         }
         let is_cut = self.cut.is_some() && !self.few_modes_describe();
         if is_cut || !self.defects.is_empty() {
-            return self.few.clone();
+            return self.part.few().clone();
         }
         if !self.few_modes_describe() {
             // Nor do many, if they do not describe a part.
-            let of_part = modal::fit(&part(&self.frf.data), &self.assumed);
+            let of_part = modal::fit(&self.part.data, &self.assumed);
             if !of_part.as_ref().is_ok_and(describes) {
                 return of_part;
             }
@@ -255,11 +250,11 @@ impl<'a> Prepared<'a> {
         Observation {
             source: self.source,
             frf: &self.frf,
-            fit: &self.few,
+            fit: self.part.few(),
             chain: &self.assumed,
             stated: self.stated,
             clear_kind: None,
-            other_kind: &self.other_kind,
+            part: &self.part,
             output_step: self.resolution.output,
             remedies: self.record.remedies(),
         }

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::*;
 use crate::independent::independent;
-use crate::observation::OtherKind;
+use crate::part::Part;
 use crate::remedies::OF_RESPONSE;
 use crate::verdict::{self, Cnmp, UncertainZero};
 use crate::{Frf, FrfPoint, ResponseAnalysis, ResponseIdentification};
@@ -134,7 +134,7 @@ fn through_unknown_lag(frf: &Frf) -> FitThroughLag {
         chain: &MeasurementChain::Direct,
         stated: None,
         clear_kind: None,
-        other_kind: &OtherKind::new(),
+        part: &Part::of(&frf.data, &MeasurementChain::Direct),
         output_step: None,
         remedies: &OF_RESPONSE,
     };
