@@ -17,7 +17,9 @@ use bench_external::{Record, TimeBase};
 use bench_identify::frf_csv;
 use bench_identify::linearity::Linearity;
 use bench_identify::record_check::{Correction, Resolution};
-use bench_identify::{ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, ReadingsFit};
+use bench_identify::{
+    ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, ReadingsFit, StaticSign,
+};
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
 use bench_report::run_pages::{ExternalRecord, PageError, write_page};
@@ -47,6 +49,8 @@ struct Report {
     input_kind: Option<InputKind>,
     /// What the output measures, as stated, or `position`.
     output_kind: OutputKind,
+    /// The sign of the static response by the modes; `null` if they do not tell it.
+    static_sign: Option<StaticSign>,
     /// Hold and lag of the input that were assumed; 0 without them.
     #[serde(flatten)]
     input_path: InputPathReport,
@@ -163,6 +167,7 @@ impl Report {
             band_hz: analysis.band_hz,
             input_kind: analysis.input_kind,
             output_kind: analysis.output_kind,
+            static_sign: analysis.static_sign(),
             input_path: InputPathReport::new(analysis.input_path, analysis.fitted_lag),
             input_resolution: analysis.resolution.input,
             output_resolution: analysis.resolution.output,
@@ -205,7 +210,7 @@ impl Report {
     fn record_text(&self) -> String {
         let periods = self.periods_text().unwrap_or_default();
         format!(
-            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{}{}{periods}{}",
+            "  record     {}\n             {} samples at {} from `{}` to `{}`\n{}{}{}{}{}{}{}{}{}{periods}{}",
             self.recording,
             self.ticks,
             hertz(self.rate_hz),
@@ -216,6 +221,7 @@ impl Report {
             self.clocks_text(),
             input_kind_text(self.input_kind),
             self.output_kind_text(),
+            self.static_sign_text(),
             self.resolution_text(),
             self.readings_text(),
             self.corrections_text(),
@@ -236,6 +242,12 @@ impl Report {
             OutputKind::Position => String::new(),
             kind => labelled("output", kind.name()),
         }
+    }
+
+    /// An inverted sensor or drive.
+    fn static_sign_text(&self) -> String {
+        let text = self.static_sign.and_then(StaticSign::description);
+        text.map_or_else(String::new, |text| labelled("sign", text))
     }
 
     /// The unit of the residues, in which a position is the output divided by s or s^2.

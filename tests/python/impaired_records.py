@@ -630,6 +630,14 @@ def coarse_as_well(rng):
     return record
 
 
+@kind("clipped input")
+def clipped_input(rng):
+    b = Bench(rng)
+    y = b.noisy(b.motion())
+    limit = rng.uniform(0.3, 0.9) * np.max(abs(b.u))
+    return b.record(y, u=np.clip(b.u, -limit, limit), causes=["clipped"], model_holds=False)
+
+
 # What is done with a record.
 
 

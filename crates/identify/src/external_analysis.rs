@@ -11,6 +11,7 @@ use crate::observation::Source;
 use crate::periodic_part::PeriodicPart;
 use crate::prepared::Prepared;
 use crate::record_check::{Correction, Resolution};
+use crate::static_sign::StaticSign;
 use crate::verdict::{Cnmp, Verdict};
 use bench_plant::{InputKind, OutputKind};
 
@@ -124,6 +125,11 @@ impl ExternalAnalysis {
     pub(super) fn number_of_parameters(&self) -> usize {
         let fit = self.fit.as_ref();
         fit.map_or(usize::MAX, ModalFit::number_of_parameters)
+    }
+
+    /// The sign of the static response of the position; `None` if the modes do not tell it.
+    pub fn static_sign(&self) -> Option<StaticSign> {
+        self.fit.as_ref().ok().and_then(StaticSign::of)
     }
 
     pub(super) fn has_real_residues(&self) -> bool {

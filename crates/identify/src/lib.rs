@@ -71,6 +71,7 @@ pub mod repeated;
 pub mod scatter;
 mod settings;
 mod signals;
+mod static_sign;
 mod steady_input;
 mod timing;
 pub mod verdict;
@@ -95,6 +96,7 @@ pub(crate) use noise_parts::{NoiseParts, PowerDatum};
 pub use periodic_part::{Distortion, DistortionSource, PeriodicPart};
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
+pub use static_sign::StaticSign;
 pub use timing::{resampling, setpoint_timing};
 
 /// The frequency response by the estimator that the configuration selects, with its data for a fit.

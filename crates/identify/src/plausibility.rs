@@ -205,6 +205,10 @@ pub(super) fn hint(
     if let Some(step) = resolution.output {
         return Some(coarse_steps(step));
     }
+    let is_misfit = !fit.as_ref().is_ok_and(ModalFit::leaves_noise);
+    if is_misfit && let Some(limit) = record_check::limit_of_input(&record.signals.input) {
+        return Some(clipped_input(limit));
+    }
     let is_open = record.reference.is_none() && record.ends != Ends::Periods;
     not_a_sum_of_modes(fit).map(|why| {
         if is_open {
@@ -213,6 +217,12 @@ pub(super) fn hint(
             why
         }
     })
+}
+
+fn clipped_input(limit: f64) -> String {
+    format!(
+        "the input stays at its limit of {limit:.6e} for several samples in several places, as one that is clipped; lower the amplitude, or extend the range of the sensor of the input"
+    )
 }
 
 fn coarse_steps(step: f64) -> String {

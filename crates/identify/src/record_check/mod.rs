@@ -23,6 +23,7 @@ pub use ends::{Ends, input_ratio_at_end, input_ratio_at_start};
 use held::held;
 use lost::{Channel, NoReadings};
 pub use lost::{LostReadings, Reading};
+pub(crate) use plateaus::limit_of_input;
 use plateaus::{Quantisation, limits, repeated};
 use prediction::Prediction;
 pub use resolution::Resolution;

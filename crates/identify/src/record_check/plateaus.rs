@@ -36,6 +36,8 @@ const CLIPPED_FAST: Plateaus = Plateaus {
 };
 /// A limit occurs at least this many times as often as the value next to it.
 const MIN_PILE_RATIO: usize = 5;
+/// An input with fewer values between its limits is one of steps.
+const MIN_VALUES: usize = 100;
 
 /// How often, and for how many samples, a signal has a value in succession.
 #[derive(Clone, Copy, Debug)]
@@ -193,6 +195,18 @@ pub(super) fn limits(output: &[f64]) -> Vec<Limit> {
             })
         })
         .collect()
+}
+
+/// The limit at which an input that varies between its limits stays, as one that is clipped. (A binary sequence, or steps of a few
+/// heights, stay at their values as well.)
+pub(crate) fn limit_of_input(input: &[f64]) -> Option<f64> {
+    let limits = limits(input);
+    let limit = limits.first()?.value;
+    let is_limit = |u: &&f64| limits.iter().any(|limit| limit.value == **u);
+    let mut between: Vec<f64> = input.iter().filter(|u| !is_limit(u)).copied().collect();
+    between.sort_by(f64::total_cmp);
+    between.dedup();
+    (between.len() >= MIN_VALUES).then_some(limit)
 }
 
 /// Whether the extreme value of a signal occurs far more often than the value next to it. The flat peaks of a coarsely quantised

@@ -8,7 +8,7 @@ use crate::{MagnitudeAxis, ReportError};
 use bench_external::TimeBase;
 use bench_identify::modal::{InputPath, ModalFit};
 use bench_identify::record_check::Correction;
-use bench_identify::{ExternalAnalysis, FittedLag, OutputKind, Unit};
+use bench_identify::{ExternalAnalysis, FittedLag, OutputKind, StaticSign, Unit};
 
 /// An analysed table of samples.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,12 @@ impl<'a> ExternalRecord<'a> {
         }
     }
 
+    /// An inverted sensor or drive.
+    fn static_sign(&self) -> Option<String> {
+        let sign = self.analysis.static_sign();
+        sign.and_then(StaticSign::description).map(String::from)
+    }
+
     fn description(&self) -> String {
         let periodic = self.analysis.periodic.as_ref();
         let pairs = named([
@@ -102,6 +108,7 @@ impl<'a> ExternalRecord<'a> {
                 "Kind of the output",
                 Some(self.analysis.output_kind.name().to_string()),
             ),
+            ("Sign", self.static_sign()),
             ("Samples", Some(self.samples.to_string())),
             ("Rate", Some(format!("{} Hz", self.rate_hz))),
             ("Times", Some(self.times.to_string())),
