@@ -37,6 +37,7 @@ fn judged(frf_data: &[FrfDatum], config: &Config) -> Verdict {
         up_to_rad_s: 650.0,
         expected_modes: Some(3),
         certainty: Certainty::ONE_LOOK,
+        duration_s: None,
     })
     .expect("zeros")
 }

@@ -20,6 +20,7 @@ fn fit(modes: Vec<ModalTerm>, covariance: DMatrix<f64>) -> ModalFit {
         orders: Vec::new(),
         one_more_mode: None,
         chi2_per_freedom: 1.0,
+        freedom: 1000,
         band_hz: (1.0, 500.0),
         left_out_hz: Vec::new(),
     }

@@ -64,6 +64,7 @@ fn verdict_from(fit: &ModalFit, frf_data: &[FrfDatum], expected: usize) -> Verdi
         up_to_rad_s,
         expected_modes: Some(expected),
         certainty: Certainty::ONE_LOOK,
+        duration_s: None,
     })
     .expect("zeros")
 }

@@ -670,7 +670,7 @@ def judged(record, answer):
 
 
 def intervals(record, answer):
-    """Whether the 95 % intervals of frequency, damping and residue hold the truth, and the number of certain signs that are wrong."""
+    """Whether the 95 % intervals of frequency, damping and residue hold the truth, and the number of wrong signs that are shown as certain."""
     rows, wrong = [], 0
     for w, zeta, r in record.modes:
         hz = w / (2 * np.pi)
@@ -679,8 +679,8 @@ def intervals(record, answer):
             continue
         truth = {"frequency_hz": hz, "damping_ratio": zeta, "residue": r * record.scale}
         rows.append([abs(near[name] - value) <= 1.96 * near[name + "_sigma"] for name, value in truth.items()])
-        is_certain = near["sign"] != "c" and abs(near["residue"]) > 1.96 * near["residue_sigma"]
-        wrong += bool(is_certain and near["residue"] * truth["residue"] < 0 and answer["cnmp"] != "undecided")
+        is_certain = near["sign"] != "c" and near["sign_error_probability"] < 0.025
+        wrong += bool(is_certain and near["residue"] * truth["residue"] < 0)
     return rows, wrong
 
 

@@ -18,3 +18,20 @@ pub fn rad_s(frequency_hz: f64) -> f64 {
 pub fn hz(omega_rad_s: f64) -> f64 {
     omega_rad_s / TAU
 }
+
+/// A frequency with two decimals, and with more if it would have fewer than three significant digits: no frequency is shown as 0.
+///
+/// ```
+/// use bench_base::units::hz_text;
+///
+/// assert_eq!([hz_text(64.664), hz_text(0.012345)], ["64.66", "0.0123"]);
+/// ```
+pub fn hz_text(frequency_hz: f64) -> String {
+    let magnitude = libm::log10(frequency_hz.abs()).floor();
+    let decimals = if magnitude.is_finite() {
+        (2.0 - magnitude).clamp(2.0, 12.0)
+    } else {
+        2.0
+    };
+    format!("{frequency_hz:.*}", decimals as usize)
+}

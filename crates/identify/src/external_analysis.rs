@@ -115,6 +115,7 @@ impl ExternalAnalysis {
             verdict: Verdict {
                 cnmp: Cnmp::Undecided,
                 why,
+                describes: false,
                 ..self.verdict
             },
             ..self

@@ -12,6 +12,8 @@ use crate::{
 
 /// An input whose RMS value at the first or the last samples exceeds this ratio of that of the record began before, or did not end.
 pub(super) const ACTIVE_RATIO: f64 = 0.3;
+/// At rest an input differs from its first value by less than this ratio of its largest difference.
+const REST_RATIO: f64 = 0.01;
 
 /// Input and output, and what excites them.
 #[derive(Clone, Copy, Debug)]
@@ -72,6 +74,20 @@ impl<'a> ExternalSignals<'a> {
             input: reference.iter().map(|r| r - first).collect(),
             output: self.signals.output.clone(),
         })
+    }
+
+    /// The duration of the excitation in seconds: from the first to the last sample at which it differs from its first value by more than
+    /// [`REST_RATIO`] of the largest difference.
+    pub(super) fn excitation_s(&self) -> f64 {
+        let excited = self.excited();
+        let first = excited.input.first().copied().unwrap_or_default();
+        let distance = |u: &f64| (u - first).abs();
+        let largest = excited.input.iter().map(distance).fold(0.0, f64::max);
+        let is_active = |u: &f64| distance(u) > REST_RATIO * largest;
+        let begin = excited.input.iter().position(is_active);
+        let end = excited.input.iter().rposition(is_active);
+        let samples = begin.zip(end).map_or(0, |(begin, end)| end + 1 - begin);
+        samples as f64 / excited.rate_hz
     }
 
     /// The band that is excited; `None` without any excitation.

@@ -341,8 +341,8 @@ impl Identification {
             return Ok(analysis);
         };
         let fit = Ok(fit);
-        let up_to_rad_s = analysis.judged_up_to_rad_s;
-        let verdict = judged(None, frf, &fit, &chain, up_to_rad_s, |verdict| {
+        let scope = scope(record, analysis.judged_up_to_rad_s);
+        let verdict = judged(None, frf, &fit, &chain, scope, |verdict| {
             hint(verdict, record, &fit, &analysis.resolution)
         })?;
         let path = self.input_path;
@@ -382,8 +382,8 @@ impl Identification {
         .or(gap);
         let expected = prepared.response_of(output)?;
         let is_plausible = why.is_none();
-        let up_to_rad_s = TAU * band_hz.1;
-        let verdict = judged(why, &expected, &fit, chain, up_to_rad_s, |_| None)?;
+        let scope = scope(prepared.record, TAU * band_hz.1);
+        let verdict = judged(why, &expected, &fit, chain, scope, |_| None)?;
         let verdict = verdict
             .with(Correction::description(&corrections))
             .with(Some(noise.description()));
@@ -441,8 +441,8 @@ impl Identification {
         let is_explained = known.is_some() || prepared.cut.is_some();
         let why = known.or_else(|| implausible(&observation));
         let is_plausible = why.is_none();
-        let up_to_rad_s = TAU * prepared.band_hz.1;
-        let verdict = judged(why, frf, &fit, &chain, up_to_rad_s, |verdict| {
+        let scope = scope(cleaned, TAU * prepared.band_hz.1);
+        let verdict = judged(why, frf, &fit, &chain, scope, |verdict| {
             hint(verdict, cleaned, &fit, &prepared.resolution)
         })?;
         let verdict = match &prepared.cut {
@@ -496,19 +496,27 @@ fn cautions(
         .collect()
 }
 
+/// The scope of the verdict of a record, which states how long a record must be.
+fn scope(record: ExternalSignals<'_>, up_to_rad_s: f64) -> VerdictScope {
+    VerdictScope {
+        duration_s: Some(record.excitation_s()),
+        ..VerdictScope::up_to(up_to_rad_s)
+    }
+}
+
 /// The verdict of a fit, with what else may be the cause of an undecided one; undecided for a reason that is already known.
 pub(super) fn judged(
     why: Option<String>,
     frf: &Frf,
     fit: &Result<ModalFit, FitError>,
     chain: &MeasurementChain,
-    up_to_rad_s: f64,
+    scope: VerdictScope,
     hint: impl Fn(&Verdict) -> Option<String>,
 ) -> Result<Verdict, PlantError> {
     if let Some(why) = why {
         return Ok(Verdict::undecided(why));
     }
-    let verdict = judge(fit, &frf.data, chain, VerdictScope::up_to(up_to_rad_s))?;
+    let verdict = judge(fit, &frf.data, chain, scope)?;
     let verdict = unless_undetermined(verdict, fit);
     let hint = hint(&verdict).filter(|hint| !verdict.why.contains(hint));
     Ok(verdict.with(hint))

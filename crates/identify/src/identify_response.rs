@@ -17,7 +17,7 @@ use crate::plausibility::{
 };
 use crate::remedies::OF_RESPONSE;
 use crate::scatter::Scatter;
-use crate::verdict::{Cnmp, Verdict};
+use crate::verdict::{Cnmp, Verdict, VerdictScope};
 
 /// Samples per second over the last frequency of a response whose rate is not known: 400 lines of 1024 samples, the usual ratio of
 /// analysers.
@@ -240,7 +240,8 @@ impl ResponseIdentification {
             Some(OtherModel { fit, chain, lag }) => (Ok(fit), chain, lag),
             None => (fit, chain, first_lag),
         };
-        let verdict = judged(why, &frf, &fit, &chain, judged_up_to_rad_s, |verdict| {
+        let scope = VerdictScope::up_to(judged_up_to_rad_s);
+        let verdict = judged(why, &frf, &fit, &chain, scope, |verdict| {
             response_hint(verdict, &fit)
         })?;
         let too_small = small_sigmas(&verdict, &fit, &frf);

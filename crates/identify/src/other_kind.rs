@@ -8,7 +8,6 @@
 use bench_plant::OutputKind;
 use nalgebra::Complex;
 
-use crate::chi2_limits::NOISE_CHI2;
 use crate::complex_residues::is_clearly_better;
 use crate::modal::{self, FitError, ModalFit};
 use crate::observation::{Observation, Source, describes};
@@ -75,7 +74,7 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
         });
     }
     if let Some(fit) = described {
-        let is_clear = seen.stated.is_some() || fit.chi2_per_freedom <= NOISE_CHI2;
+        let is_clear = seen.stated.is_some() || fit.leaves_noise();
         return if is_clear {
             None
         } else {
@@ -126,7 +125,7 @@ fn described_better(seen: &Observation<'_>) -> Option<String> {
     let (kind, other) = other_kind(seen)?;
     let ratio = few.chi2_per_freedom / other.chi2_per_freedom;
     let is_better = ratio > CLEARLY_BETTER
-        && other.chi2_per_freedom <= NOISE_CHI2
+        && other.leaves_noise()
         && other.parameters.modes.len() <= few.parameters.modes.len();
     let (assumed, kind) = (assumed.name(), kind.name());
     is_better.then(|| {

@@ -134,12 +134,12 @@ fn fit_with_errors(
     chain: &MeasurementChain,
 ) -> Result<ModalFit, FitError> {
     let mut fit = modal::fit(increased, chain)?;
-    fit.chi2_per_freedom = chi2_per_freedom(&fit, data, chain);
+    (fit.chi2_per_freedom, fit.freedom) = chi2_per_freedom(&fit, data, chain);
     Ok(fit)
 }
 
-/// Reduced chi-square of the fitted data with the noise alone.
-fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> f64 {
+/// Reduced chi-square of the fitted data with the noise alone, and its degrees of freedom.
+fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain) -> (f64, usize) {
     let data = fit.used_data(data);
     let frequency_hz: Vec<f64> = data.iter().map(|datum| datum.frequency_hz).collect();
     let fitted = fit.response(chain, &frequency_hz);
@@ -149,5 +149,5 @@ fn chi2_per_freedom(fit: &ModalFit, data: &[FrfDatum], chain: &MeasurementChain)
         .map(|(datum, h)| 2.0 * (datum.response - h).norm_sqr() / datum.variance);
     let parameters = fit.covariance.nrows();
     let freedom = (2 * data.len()).saturating_sub(parameters).max(1);
-    squares.sum::<f64>() / freedom as f64
+    (squares.sum::<f64>() / freedom as f64, freedom)
 }

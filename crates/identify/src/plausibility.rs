@@ -1,5 +1,6 @@
 //! Signs that the columns of an external record are not input and output of a plant that was at rest.
 
+use bench_base::units::hz_text;
 use bench_plant::OutputKind;
 
 use crate::complex_residues::fit_complex;
@@ -69,6 +70,7 @@ pub(super) fn due_to_cut(verdict: Verdict, cut: &str) -> Verdict {
     match verdict.cnmp {
         Cnmp::Undecided => Verdict {
             why: format!("{cut} (it seems that {})", verdict.why),
+            describes: false,
             ..verdict
         },
         _ => verdict,
@@ -247,6 +249,7 @@ pub(super) fn unless_undetermined(verdict: Verdict, fit: &Result<ModalFit, FitEr
     Verdict {
         cnmp: Cnmp::Undecided,
         why: no_sum_of_modes(&cancelling(group)),
+        describes: false,
         ..verdict
     }
 }
@@ -254,8 +257,10 @@ pub(super) fn unless_undetermined(verdict: Verdict, fit: &Result<ModalFit, FitEr
 fn cancelling(group: ModeGroup) -> String {
     let (low_hz, high_hz) = group.band_hz;
     format!(
-        "the residues of {} modes from {low_hz:.2} to {high_hz:.2} Hz nearly cancel",
-        group.count
+        "the residues of {} modes from {} to {} Hz nearly cancel",
+        group.count,
+        hz_text(low_hz),
+        hz_text(high_hz)
     )
 }
 

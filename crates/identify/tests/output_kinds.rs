@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use bench_identify::verdict::Cnmp;
-use bench_identify::{Estimate, ExternalAnalysis, Identification, OutputKind};
+use bench_identify::{Estimate, ExternalAnalysis, Identification, OutputKind, StaticSign};
 use nalgebra::Complex;
 
 const RATE_HZ: f64 = 500.0;
@@ -183,6 +183,33 @@ fn modes_of_a_velocity_and_of_an_acceleration_are_those_of_the_position() {
             assert!(distance < 0.3, "{case}: {:?}", zeros[0]);
         }
     }
+}
+
+#[test]
+fn sign_of_the_static_response_is_that_of_the_sensor() {
+    let force = Force::HeldReadBefore;
+    for (sensor, sign) in [(1.0, StaticSign::Positive), (-1.0, StaticSign::Negative)] {
+        let stage = STAGE.map(|(hz, zeta, residue)| (hz, zeta, sensor * residue));
+        let record = record(&stage, OutputKind::Position, force, 1e-3, &mut Random(31));
+        let found = identified(None, force, &record);
+        assert_eq!(found.static_sign(), Some(sign));
+        assert_eq!(found.verdict.cnmp, Cnmp::Excluded, "{}", found.verdict.why);
+    }
+}
+
+#[test]
+fn modes_that_do_not_describe_the_stage_have_no_certain_sign() {
+    let (kind, force) = (OutputKind::Velocity, Force::HeldReadBefore);
+    let record = record(&STAGE, kind, force, 1e-3, &mut Random(32));
+    let found = identified(None, force, &record);
+    assert_eq!(found.verdict.cnmp, Cnmp::Undecided);
+    assert_eq!(found.static_sign(), None);
+    let modes = found.verdict.modes(found.fit.as_ref().expect("modes"));
+    assert!(modes.len() > 1);
+    assert!(modes.iter().all(|mode| mode.certain_sign() == '?'));
+    let found = identified(Some(kind), force, &record);
+    let modes = found.verdict.modes(found.fit.as_ref().expect("modes"));
+    assert!(modes.iter().all(|mode| mode.certain_sign() == '+'));
 }
 
 /// One to three modes, the first one with a positive residue.

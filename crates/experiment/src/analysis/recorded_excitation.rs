@@ -297,6 +297,7 @@ pub(crate) fn scope_of_model(modal: &ModalModel, certainty: Certainty) -> Verdic
         up_to_rad_s,
         expected_modes: Some(visible_modes(modal, up_to_rad_s)),
         certainty,
+        duration_s: None,
     }
 }
 

@@ -48,7 +48,7 @@ impl ModalSummary {
     pub fn new(fit: Option<&ModalFit>, verdict: &Verdict) -> ModalSummary {
         let delay_s = fit.and_then(ModalFit::determined_delay_s);
         ModalSummary {
-            modes: fit.map_or(Vec::new(), ModalFit::modes),
+            modes: fit.map_or(Vec::new(), |fit| verdict.modes(fit)),
             fit_band_hz: fit.map(|fit| fit.band_hz),
             residues: fit.map(|fit| fit.parameters.residues.name()),
             zeros: verdict.zeros.clone(),

@@ -146,6 +146,7 @@ impl<'a> TimeSearch<'a> {
             fit: ModalFit {
                 one_more_mode: Some(one_more_mode(&found, &next.found, next.cost - cost)),
                 chi2_per_freedom: found.chi2(),
+                freedom: self.record.count().saturating_sub(found.covariance.nrows()),
                 parameters: found.parameters,
                 covariance: found.covariance,
                 orders: self.tried.clone(),
@@ -185,9 +186,11 @@ fn one_more_mode(best: &Likeliest, next: &Likeliest, difference: f64) -> OneMore
     };
     let frequencies = next.parameters.modes.iter().map(|mode| mode.omega_rad_s);
     let farthest = frequencies.max_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    let decrease = 2.0 * (next.log_probability - best.log_probability);
     OneMoreMode {
         parameters: next.parameters.clone(),
         near_rad_s: farthest.unwrap_or_default(),
         probability: 1.0 / (1.0 + (0.5 * difference).exp()),
+        significant_decrease: difference + decrease,
     }
 }

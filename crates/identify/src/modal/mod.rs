@@ -270,11 +270,13 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
         modes: start.modes.len(),
     };
     let by_estimator = Solution::new(problem, start.clone());
-    let chi2_per_freedom = by_estimator.chi2 / (2 * data.len() - free) as f64;
+    let freedom = 2 * data.len() - free;
+    let chi2_per_freedom = by_estimator.chi2 / freedom as f64;
     let fit = |solution: &Solution, data: &[FrfDatum]| {
         Some(ModalFit {
             covariance: solution.covariance(data)?,
             chi2_per_freedom,
+            freedom,
             orders: Vec::new(),
             one_more_mode: None,
             parameters: solution.parameters.clone(),

@@ -8,7 +8,7 @@ use serde::ser::{Serialize, SerializeStruct, Serializer};
 use super::clusters::cancelling;
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, OneMoreMode, Parameter};
 use crate::FrfDatum;
-use crate::chi2_limits::NOISE_CHI2;
+use crate::chi2_limits::noise_limit;
 use bench_plant::Sign;
 use bench_plant::zeros::ModalTerm;
 
@@ -31,6 +31,8 @@ pub struct ModalFit {
     pub one_more_mode: Option<OneMoreMode>,
     /// Reduced chi-square with the noise of the estimator: 1 if the residual is noise.
     pub chi2_per_freedom: f64,
+    /// Its degrees of freedom: two for each datum, less the parameters.
+    pub freedom: usize,
     /// Lowest and highest fitted frequency in hertz.
     pub band_hz: (f64, f64),
     /// Frequencies in hertz, rising, at which the response alone shows a mode: as a disturbance does that repeats with the periods, or a
@@ -144,9 +146,14 @@ pub struct UncertainPole {
 }
 
 impl ModalFit {
+    /// The largest reduced chi-square of a residual that is noise.
+    pub(crate) fn noise_limit(&self) -> f64 {
+        noise_limit(self.freedom)
+    }
+
     /// Whether the residual is noise.
     pub(crate) fn leaves_noise(&self) -> bool {
-        self.chi2_per_freedom <= NOISE_CHI2
+        self.chi2_per_freedom <= self.noise_limit()
     }
 
     /// The data that are fitted.

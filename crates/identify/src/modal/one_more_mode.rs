@@ -21,6 +21,8 @@ pub struct OneMoreMode {
     pub near_rad_s: f64,
     /// Probability that the stage has it.
     pub probability: f64,
+    /// The smallest decrease of chi^2 that is significant.
+    pub significant_decrease: f64,
 }
 
 impl OneMoreMode {
@@ -37,6 +39,7 @@ impl OneMoreMode {
             parameters: next.parameters,
             near_rad_s,
             probability: 1.0 / (1.0 + (0.5 * lacking).exp()),
+            significant_decrease: significant,
         }
     }
 
@@ -153,6 +156,7 @@ mod tests {
                     parameters: parameters.with_mode(term(79.0, 0.9)),
                     near_rad_s: 0.0,
                     probability,
+                    significant_decrease: 30.0,
                 }),
                 ..fit.clone()
             };

@@ -109,6 +109,7 @@ mod tests {
             orders: Vec::new(),
             one_more_mode: None,
             chi2_per_freedom: 1.0,
+            freedom: 1000,
             band_hz: (1.0, 200.0),
             left_out_hz: Vec::new(),
         };

@@ -32,6 +32,10 @@ impl Certainty {
         error_probability <= self.error_probability
     }
 
+    pub(super) fn error_probability(self) -> f64 {
+        self.error_probability
+    }
+
     /// A normally distributed estimate is certain from this multiple of its standard deviation.
     pub(super) fn quantile(self) -> f64 {
         self.quantile
@@ -47,6 +51,8 @@ pub struct VerdictScope {
     pub expected_modes: Option<usize>,
     /// How certain signs and sides must be.
     pub certainty: Certainty,
+    /// Duration of the excitation in seconds, if it is known, for what is to be changed.
+    pub duration_s: Option<f64>,
 }
 
 impl VerdictScope {
@@ -56,6 +62,7 @@ impl VerdictScope {
             up_to_rad_s,
             expected_modes: None,
             certainty: Certainty::ONE_LOOK,
+            duration_s: None,
         }
     }
 
@@ -73,6 +80,7 @@ impl VerdictScope {
             up_to_rad_s: self.up_to_rad_s,
             expected_modes: self.expected_modes,
             certainty: self.certainty,
+            duration_s: self.duration_s,
         }
     }
 }
@@ -92,6 +100,8 @@ pub struct VerdictInput<'a> {
     pub expected_modes: Option<usize>,
     /// How certain signs and sides must be.
     pub certainty: Certainty,
+    /// Duration of the excitation in seconds, if it is known.
+    pub duration_s: Option<f64>,
 }
 
 impl VerdictInput<'_> {

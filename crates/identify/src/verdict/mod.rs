@@ -22,6 +22,7 @@
 mod decisive;
 mod information;
 mod input;
+mod longer;
 mod phase_check;
 mod phase_drop;
 mod sign_groups;
@@ -35,14 +36,15 @@ pub use phase_drop::PhaseDrop;
 pub use zeros::{UncertainZero, zeros};
 
 use decisive::{decisive_mode_more, decisive_uncertain_mode};
+use longer::Longer;
 use phase_check::phase_drop_over;
 use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::FrfDatum;
-use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit, OneMoreMode};
 use bench_base::decimal::Decimal;
+use bench_base::units::hz_text;
 use bench_plant::zeros::ZeroKind;
 use bench_plant::{PlantError, Sign};
 
@@ -54,6 +56,9 @@ const MIRROR_RATIO: f64 = 0.2;
 const FIT_ACCURACY: f64 = 1e-4;
 /// Largest deviation of the measured from the predicted phase drop in degrees: a sixth of the turn of a CNMP pair.
 const MAX_PHASE_DEVIATION_DEG: f64 = 60.0;
+
+/// Probability of the other sign where nothing is known of it.
+const UNKNOWN_SIGN: f64 = 0.5;
 
 const NO_PHASE: &str = "the response is not significant against its noise over the modes, so that its phase cannot be checked; increase the amplitude or the duration of the excitation";
 const TOO_FEW_MODES: &str = "fewer than two modes are found, and the phase check needs two modes; increase the amplitude or the duration of the excitation, or measure at another operating point, as the other modes may have no residue at this one";
@@ -95,17 +100,31 @@ pub struct Verdict {
     pub zeros: Vec<UncertainZero>,
     /// The phase drop over the modes of the band, if there are two or more.
     pub phase_drop: Option<PhaseDrop>,
+    /// Whether the modes describe the stage. Otherwise none of their signs is certain.
+    pub describes: bool,
 }
 
 impl Verdict {
-    /// An undecided verdict without any zeros.
+    /// An undecided verdict without any zeros, because the modes do not describe the stage.
     pub fn undecided(why: String) -> Verdict {
         Verdict {
             cnmp: Cnmp::Undecided,
             why,
             zeros: Vec::new(),
             phase_drop: None,
+            describes: false,
         }
+    }
+
+    /// The modes of its fit. If they do not describe the stage, each sign may as well be the other one.
+    pub fn modes(&self, fit: &ModalFit) -> Vec<FittedMode> {
+        let mut modes = fit.modes();
+        if !self.describes {
+            modes
+                .iter_mut()
+                .for_each(|mode| mode.turned_by_one_more = UNKNOWN_SIGN);
+        }
+        modes
     }
 
     /// The verdict with a caution added to its reasons.
@@ -153,9 +172,9 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
     let uncertain_mode = decisive_uncertain_mode(input)?.map(|k| input.fit.modes()[k]);
     let mode_more = decisive_mode_more(input)?;
     let insufficient = insufficient_data(input, &modes)
-        .or_else(|| uncertain_mode.as_ref().map(uncertain_sign_reason))
-        .or_else(|| uncertain_side(&zeros, input.certainty))
-        .or_else(|| mode_more.map(uncertain_mode_reason))
+        .or_else(|| uncertain_mode.map(|mode| uncertain_sign_reason(&mode, input)))
+        .or_else(|| uncertain_side(&zeros, input))
+        .or_else(|| mode_more.map(|more| uncertain_mode_reason(more, input)))
         .or_else(|| only_of_the_chain(&zeros, &of_stage));
     let (cnmp, why) = match insufficient {
         Some(why) => (Cnmp::Undecided, why),
@@ -169,6 +188,7 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         why,
         zeros,
         phase_drop,
+        describes: poor_fit(input.fit).is_none(),
     };
     let verdict = verdict
         .with(is_complex.then(|| COMPLEX_RESIDUES.into()))
@@ -190,7 +210,7 @@ fn filter_modes(fit: &ModalFit) -> Option<String> {
     let modes: Vec<String> = fit.filter_modes().iter().map(described).collect();
     (!modes.is_empty()).then(|| {
         format!(
-            "so strongly damped, unless a brake acts on the stage, are poles of a filter between input and output or what takes the place of a delay: {}",
+            "{}: a pole of a filter between input and output, or in place of a delay, unless a brake acts on the stage",
             modes.join(", ")
         )
     })
@@ -198,18 +218,14 @@ fn filter_modes(fit: &ModalFit) -> Option<String> {
 
 /// A mode by frequency and damping.
 fn described(mode: &FittedMode) -> String {
-    let frequency_hz = mode.frequency_hz().value;
+    let frequency_hz = hz_text(mode.frequency_hz().value);
     let damping_ratio = mode.damping_ratio.value;
-    format!("{frequency_hz:.2} Hz (damping ratio {damping_ratio:.2})")
+    format!("{frequency_hz} Hz (damping ratio {damping_ratio:.2})")
 }
 
 /// The frequencies that are not fitted, as a caution.
 fn left_out(fit: &ModalFit) -> Option<String> {
-    let frequencies: Vec<String> = fit
-        .left_out_hz
-        .iter()
-        .map(|hz| format!("{hz:.2}"))
-        .collect();
+    let frequencies: Vec<String> = fit.left_out_hz.iter().map(|hz| hz_text(*hz)).collect();
     (!frequencies.is_empty()).then(|| {
         format!(
             "the response at {} Hz alone differs from the modes, as by a disturbance or a mode narrower than the distance of the frequencies; it is left out, and a finer resolution (a longer period) shows which it is",
@@ -220,16 +236,18 @@ fn left_out(fit: &ModalFit) -> Option<String> {
 
 /// Why the data are insufficient for a verdict.
 fn insufficient_data(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
-    poor_fit(input.fit.chi2_per_freedom)
+    poor_fit(input.fit)
         .or_else(|| missing_modes(input, modes.len()))
         .or_else(|| undefined_response(input.frf_data))
 }
 
-fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
-    let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
-    (!good).then(|| {
+fn poor_fit(fit: &ModalFit) -> Option<String> {
+    (!fit.leaves_noise()).then(|| {
         format!(
-            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes with real residues; lower the amplitude if a record with half of it has other modes, and remove or state a filter or a lag in the channel; the damping may also be not proportional, or the stage may have changed during the record; the Bode plot shows where response and fit differ: leave that out of the band"
+            "reduced chi-square {:.2}, above {:.2}, the largest of noise with {} degrees of freedom: the response is not the fitted sum of modes with real residues; lower the amplitude if a record with half of it has other modes, and remove or state a filter or a lag in the channel; the damping may also be not proportional, or the stage may have changed during the record; the Bode plot shows where response and fit differ: leave that out of the band",
+            fit.chi2_per_freedom,
+            fit.noise_limit(),
+            fit.freedom
         )
     })
 }
@@ -256,45 +274,49 @@ fn undefined_response(data: &[FrfDatum]) -> Option<String> {
         .iter()
         .find(|datum| !datum.response.norm().is_normal())?;
     Some(format!(
-        "the response at {:.2} Hz is {}, which has no phase; check the output of the record, or exclude this frequency from the band",
-        undefined.frequency_hz, undefined.response
+        "the response at {} Hz is {}, which has no phase; check the output of the record, or exclude this frequency from the band",
+        hz_text(undefined.frequency_hz),
+        undefined.response
     ))
 }
 
-fn uncertain_sign_reason(mode: &FittedMode) -> String {
+fn uncertain_sign_reason(mode: &FittedMode, input: &VerdictInput<'_>) -> String {
     format!(
-        "the sign of the residue at {:.2} Hz is uncertain, and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
-        mode.frequency_hz().value
+        "the sign of the residue at {} Hz is uncertain, and the number of CNMP zeros depends on it; {}",
+        hz_text(mode.frequency_hz().value),
+        Longer::for_sign(mode.residue_per_kg, input.certainty, input.duration_s)
     )
 }
 
-fn uncertain_mode_reason(mode: &OneMoreMode) -> String {
+fn uncertain_mode_reason(more: &OneMoreMode, input: &VerdictInput<'_>) -> String {
     format!(
-        "it is uncertain whether there is one more mode near {:.2} Hz (probability {:.1} %), and the number of CNMP zeros depends on it; increase the amplitude there, or the duration",
-        hertz(mode.near_rad_s),
-        100.0 * mode.probability
+        "it is uncertain whether there is one more mode near {} Hz (probability {:.1} %), and the number of CNMP zeros depends on it; {}",
+        hz_text(hertz(more.near_rad_s)),
+        100.0 * more.probability,
+        Longer::for_mode(more, input.certainty, input.duration_s)
     )
 }
 
 /// A complex zero that may lie on either side of the imaginary axis. (A real zero is no CNMP zero on either side.)
-fn uncertain_side(zeros: &[UncertainZero], certainty: Certainty) -> Option<String> {
+fn uncertain_side(zeros: &[UncertainZero], input: &VerdictInput<'_>) -> Option<String> {
     let mut complex = zeros.iter().filter(|zero| zero.s.im != 0.0);
-    let zero = complex.find(|zero| !has_certain_side(zero, certainty))?;
+    let zero = complex.find(|zero| !has_certain_side(zero, input.certainty))?;
     let real_part = zero.real_part();
     if is_on_axis(zero) && real_part.half_width_95() < FIT_ACCURACY * zero.s.norm() {
         return Some(format!(
-            "the zero {:.4} ± {:.4} rad/s at {:.2} Hz lies on the imaginary axis within the accuracy of a fit, 0.01 % of its frequency; a longer record does not decide: measure at another operating point",
+            "the zero {:.4} ± {:.4} rad/s at {} Hz lies on the imaginary axis within the accuracy of a fit, 0.01 % of its frequency; a longer record does not decide: measure at another operating point",
             Decimal(real_part.value),
             real_part.half_width_95(),
-            hertz(zero.s.norm())
+            hz_text(hertz(zero.s.norm()))
         ));
     }
     Some(format!(
-        "the zero {:.3} ± {:.3} at {:.2} Hz may lie on either side of the imaginary axis (right: {:.1} %); increase the amplitude there, or the duration",
+        "the zero {:.3} ± {:.3} at {} Hz may lie on either side of the imaginary axis (right: {:.1} %); {}",
         Decimal(real_part.value),
         real_part.half_width_95(),
-        hertz(zero.s.norm()),
-        100.0 * zero.rhp_probability
+        hz_text(hertz(zero.s.norm())),
+        100.0 * zero.rhp_probability,
+        Longer::for_sign(real_part, input.certainty, input.duration_s)
     ))
 }
 
@@ -416,17 +438,17 @@ fn only_of_the_chain(zeros: &[UncertainZero], of_stage: &[UncertainZero]) -> Opt
     let mut cnmp = zeros.iter().filter(|zero| zero.kind == ZeroKind::Cnmp);
     let zero = cnmp.next()?;
     Some(format!(
-        "the zero {:.1} \u{b1} {:.1}j rad/s at {:.2} Hz lies far right of the imaginary axis without one left of it, as of a filter or a lag between input and output, and not of the stage; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)",
+        "the zero {:.1} \u{b1} {:.1}j rad/s at {} Hz lies far right of the imaginary axis without one left of it, as of a filter or a lag between input and output, and not of the stage; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)",
         zero.s.re,
         zero.s.im,
-        hertz(zero.s.norm())
+        hz_text(hertz(zero.s.norm()))
     ))
 }
 
 fn unconfirmed_reason(zero: &UncertainZero) -> String {
     format!(
-        "the fit has CNMP zeros at {:.2} Hz, where the response is noise and its phase cannot confirm them; increase the amplitude there, or the duration",
-        hertz(zero.s.norm())
+        "the fit has CNMP zeros at {} Hz, where the response is noise and its phase cannot confirm them; increase the amplitude there, or the duration",
+        hz_text(hertz(zero.s.norm()))
     )
 }
 

@@ -3,7 +3,7 @@
 use super::interval_of;
 use crate::number::{NEGLIGIBLE_PROBABILITY, interval, percent, significant};
 use crate::table::{Table, Width};
-use bench_base::units::hz;
+use bench_base::units::{hz, hz_text};
 use bench_identify::modal::{FittedMode, SIGMAS_95};
 use bench_identify::verdict::UncertainZero;
 
@@ -103,7 +103,7 @@ fn zero_row(zero: &UncertainZero) -> Vec<String> {
         interval(zero.s.im, half_width)
     };
     vec![
-        format!("{:.3}", hz(zero.s.norm())),
+        hz_text(hz(zero.s.norm())),
         interval_of(zero.real_part()),
         imaginary_part,
         zero.kind.name().into(),

@@ -109,10 +109,11 @@ fn modes(report: &RecordReport<'_>) -> String {
     let Some(fit) = report.fit else {
         return String::new();
     };
-    let ModeLists { in_band, outside } = ModeLists::new(&fit.modes(), fit.band_hz);
+    let modes = report.verdict.modes(fit);
+    let ModeLists { in_band, outside } = ModeLists::new(&modes, fit.band_hz);
     let table = |modes: &[FittedMode]| mode_table(modes, &report.residue_unit, Width::Page).html();
     let mut text = "± is the 95 % confidence interval.".to_string();
-    if has_complex_residues(&fit.modes()) {
+    if has_complex_residues(&modes) {
         text += &format!(" {COMPLEX_RESIDUES_NOTE}.");
     }
     let mut content = if in_band.is_empty() {

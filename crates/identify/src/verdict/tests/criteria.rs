@@ -6,8 +6,8 @@ use super::stage::{Case, Stage, index};
 use crate::modal::Parameter;
 use crate::verdict::sign_groups::signs_of;
 use crate::verdict::{
-    Certainty, Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate,
-    only_of_the_chain, uncertain_side, zeros_of_the_stage,
+    Cnmp, NO_CNMP, NO_OPPOSITE_NEIGHBOURS, PhaseDrop, UncertainZero, evaluate, only_of_the_chain,
+    uncertain_side, zeros_of_the_stage,
 };
 use bench_plant::zeros::ZeroKind;
 
@@ -99,7 +99,8 @@ fn reasons_have_no_negative_zero() {
         covariance: [[0.01, 0.0], [0.0, 0.0]],
         ..near_axis
     };
-    let why_of = |zero| uncertain_side(&[zero], Certainty::ONE_LOOK).expect("on no side");
+    let case = Case::of(&Stage::with_pair(2.0));
+    let why_of = |zero| uncertain_side(&[zero], &case.input()).expect("on no side");
     let [certain, uncertain] = [near_axis, uncertain].map(why_of);
     assert!(uncertain.contains("the zero 0.000 ± 0.196"), "{uncertain}");
     assert!(certain.contains("the zero 0.0000 ± 0.0000"), "{certain}");

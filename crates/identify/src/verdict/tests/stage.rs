@@ -127,6 +127,7 @@ impl Stage {
             orders: Vec::new(),
             one_more_mode: None,
             chi2_per_freedom: 1.0,
+            freedom: 2 * FREQUENCIES - free,
             band_hz: (hertz(FIRST_RAD_S), hertz(FIRST_RAD_S + FREQUENCIES as f64)),
             left_out_hz: Vec::new(),
         }
@@ -189,6 +190,7 @@ impl Case {
             up_to_rad_s: self.up_to_rad_s,
             expected_modes: self.expected_modes,
             certainty: self.certainty,
+            duration_s: None,
         }
     }
 
