@@ -154,7 +154,7 @@ fn shape_by_the_model_is_accepted_with_every_excitation_of_other_stages() {
         std::fs::write(bench.path("own.toml"), chain(seed)).expect("a file");
         for (options, most_m) in [
             ("", 600e-6),
-            ("--excitation multisine --set multisine.periods=3", 300e-6),
+            ("--excitation multisine --set multisine.periods=5", 300e-6),
             (
                 "--excitation stepped_sine --set stepped_sine.count=20",
                 600e-6,
