@@ -145,8 +145,8 @@ duration_s = 15.0
     )
 }
 
-/// The travel of a shape is a third of the soft limit of 900 um. All lines of a multisine and of a PRBS together, and a slow stepped sine,
-/// keep it; a sweep, which passes modes quickly, may reach two thirds.
+/// The travel of a shape is a third of the soft limit of 900 um. All lines of a multisine and of a PRBS together keep it; a sweep and the
+/// steps of a sine, which pass modes quickly, may reach two thirds.
 #[test]
 fn shape_by_the_model_is_accepted_with_every_excitation_of_other_stages() {
     let bench = Bench::new();

@@ -453,7 +453,7 @@ def filtered(rng):
     b = Bench(rng)
     corner = rng.uniform(1.0, 2.5) * b.high / (b.rate / 2)
     y = lfilter(*butter(2, min(0.95, corner)), b.motion())
-    return b.record(b.noisy(y), causes=["misfit", "complex", "lag"], model_holds=False)
+    return b.record(b.noisy(y), causes=["misfit", "complex"], model_holds=False)
 
 
 @kind("mean of eight samples")

@@ -19,19 +19,19 @@ pub fn hz(omega_rad_s: f64) -> f64 {
     omega_rad_s / TAU
 }
 
-/// A frequency with two decimals, and with more if it would have fewer than three significant digits: no frequency is shown as 0.
+/// A frequency with a number of decimals, and with more if it would have fewer than two significant digits: none is shown as 0.
 ///
 /// ```
 /// use bench_base::units::hz_text;
 ///
-/// assert_eq!([hz_text(64.664), hz_text(0.012345)], ["64.66", "0.0123"]);
+/// assert_eq!([hz_text(64.664, 2), hz_text(0.012345, 2)], ["64.66", "0.012"]);
 /// ```
-pub fn hz_text(frequency_hz: f64) -> String {
+pub fn hz_text(frequency_hz: f64, decimals: usize) -> String {
     let magnitude = libm::log10(frequency_hz.abs()).floor();
-    let decimals = if magnitude.is_finite() {
-        (2.0 - magnitude).clamp(2.0, 12.0)
+    let needed = if magnitude.is_finite() {
+        (1.0 - magnitude).clamp(0.0, 12.0) as usize
     } else {
-        2.0
+        0
     };
-    format!("{frequency_hz:.*}", decimals as usize)
+    format!("{frequency_hz:.*}", decimals.max(needed))
 }

@@ -108,14 +108,15 @@ impl ExternalAnalysis {
 
     /// The analysis with a reason not to decide.
     pub(super) fn undecided_by(self, why: String) -> ExternalAnalysis {
-        if self.verdict.cnmp == Cnmp::Undecided {
-            return self;
-        }
+        let why = match self.verdict.cnmp {
+            Cnmp::Undecided => self.verdict.why,
+            Cnmp::Detected | Cnmp::Excluded => why,
+        };
         ExternalAnalysis {
             verdict: Verdict {
                 cnmp: Cnmp::Undecided,
                 why,
-                describes: false,
+                is_of_stage: false,
                 ..self.verdict
             },
             ..self
@@ -130,7 +131,9 @@ impl ExternalAnalysis {
 
     /// The sign of the static response of the position; `None` if the modes do not tell it.
     pub fn static_sign(&self) -> Option<StaticSign> {
-        self.fit.as_ref().ok().and_then(StaticSign::of)
+        let fit = self.fit.as_ref().ok();
+        fit.filter(|_| self.verdict.is_of_stage)
+            .and_then(StaticSign::of)
     }
 
     pub(super) fn has_real_residues(&self) -> bool {

@@ -499,7 +499,8 @@ fn cautions(
 /// The scope of the verdict of a record, which states how long a record must be.
 fn scope(record: ExternalSignals<'_>, up_to_rad_s: f64) -> VerdictScope {
     VerdictScope {
-        duration_s: Some(record.excitation_s()),
+        // The set-point of a loop may rest at another value than before its motion.
+        duration_s: record.reference.is_none().then(|| record.excitation_s()),
         ..VerdictScope::up_to(up_to_rad_s)
     }
 }

@@ -70,7 +70,7 @@ pub(super) fn due_to_cut(verdict: Verdict, cut: &str) -> Verdict {
     match verdict.cnmp {
         Cnmp::Undecided => Verdict {
             why: format!("{cut} (it seems that {})", verdict.why),
-            describes: false,
+            is_of_stage: false,
             ..verdict
         },
         _ => verdict,
@@ -207,23 +207,25 @@ pub(super) fn hint(
     if let Some(step) = resolution.output {
         return Some(coarse_steps(step));
     }
-    let is_misfit = !fit.as_ref().is_ok_and(ModalFit::leaves_noise);
-    if is_misfit && let Some(limit) = record_check::limit_of_input(&record.signals.input) {
-        return Some(clipped_input(limit));
-    }
     let is_open = record.reference.is_none() && record.ends != Ends::Periods;
-    not_a_sum_of_modes(fit).map(|why| {
+    let no_sum = not_a_sum_of_modes(fit).map(|why| {
         if is_open {
             format!("{why}; {CLOSED_LOOP}")
         } else {
             why
         }
-    })
+    });
+    let is_noise = fit.as_ref().is_ok_and(ModalFit::leaves_noise);
+    let limit = record_check::limit_of_input(&record.signals.input).filter(|_| !is_noise);
+    match (no_sum, limit.map(clipped_input)) {
+        (Some(no_sum), Some(clipped)) => Some(format!("{clipped}; {no_sum}")),
+        (no_sum, clipped) => clipped.or(no_sum),
+    }
 }
 
 fn clipped_input(limit: f64) -> String {
     format!(
-        "the input stays at its limit of {limit:.6e} for several samples in several places, as one that is clipped; lower the amplitude, or extend the range of the sensor of the input"
+        "the input stays at its limit of {limit:.4} for several samples in several places, as one that is clipped; lower the amplitude, or extend the range of the sensor of the input"
     )
 }
 
@@ -249,7 +251,7 @@ pub(super) fn unless_undetermined(verdict: Verdict, fit: &Result<ModalFit, FitEr
     Verdict {
         cnmp: Cnmp::Undecided,
         why: no_sum_of_modes(&cancelling(group)),
-        describes: false,
+        is_of_stage: false,
         ..verdict
     }
 }
@@ -259,8 +261,8 @@ fn cancelling(group: ModeGroup) -> String {
     format!(
         "the residues of {} modes from {} to {} Hz nearly cancel",
         group.count,
-        hz_text(low_hz),
-        hz_text(high_hz)
+        hz_text(low_hz, 2),
+        hz_text(high_hz, 2)
     )
 }
 

@@ -121,7 +121,7 @@ pub fn shape_amplitude(
     let most_m = if is_broadband {
         travel_m
     } else {
-        travel_m.max(SWEEP_RATIO * config.interlock.soft_limit_m)
+        travel_m.max(SWEEP_RATIO * config.permitted_travel_m())
     };
     limit_travel(&mut config, most_m)?;
     Ok(config)

@@ -31,7 +31,7 @@ pub struct ModalFit {
     pub one_more_mode: Option<OneMoreMode>,
     /// Reduced chi-square with the noise of the estimator: 1 if the residual is noise.
     pub chi2_per_freedom: f64,
-    /// Its degrees of freedom: two for each datum, less the parameters.
+    /// Its degrees of freedom: two for each datum (which are merged far from the poles) or one for each reading, less the parameters.
     pub freedom: usize,
     /// Lowest and highest fitted frequency in hertz.
     pub band_hz: (f64, f64),
@@ -64,7 +64,8 @@ impl FittedMode {
             ..self.residue_per_kg
         };
         let turned = self.turned_by_one_more;
-        turned + (1.0 - turned) * magnitude.below_zero_probability()
+        let other = magnitude.below_zero_probability();
+        turned * (1.0 - other) + (1.0 - turned) * other
     }
 
     /// The sign of the residue; [`COMPLEX_SIGN`] of a complex one, which has none.

@@ -200,7 +200,9 @@ pub(super) fn limits(output: &[f64]) -> Vec<Limit> {
 /// The limit at which an input that varies between its limits stays, as one that is clipped. (A binary sequence, or steps of a few
 /// heights, stay at their values as well.)
 pub(crate) fn limit_of_input(input: &[f64]) -> Option<f64> {
-    let limits = limits(input);
+    let mut limits = limits(input);
+    // That of an input to one side is its rest.
+    limits.retain(|limit| Some(&limit.value) != input.first());
     let limit = limits.first()?.value;
     let is_limit = |u: &&f64| limits.iter().any(|limit| limit.value == **u);
     let mut between: Vec<f64> = input.iter().filter(|u| !is_limit(u)).copied().collect();

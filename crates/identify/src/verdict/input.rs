@@ -32,10 +32,6 @@ impl Certainty {
         error_probability <= self.error_probability
     }
 
-    pub(super) fn error_probability(self) -> f64 {
-        self.error_probability
-    }
-
     /// A normally distributed estimate is certain from this multiple of its standard deviation.
     pub(super) fn quantile(self) -> f64 {
         self.quantile

@@ -12,6 +12,9 @@ use super::Certainty;
 use crate::Estimate;
 use crate::modal::OneMoreMode;
 
+/// A shorter excitation is a hit, which is repeated, and not made longer.
+const LEAST_S: f64 = 1.0;
+
 /// The duration over that of the record with which a quantity becomes certain, if it is what it seems to be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Longer {
@@ -33,18 +36,13 @@ impl Longer {
         }
     }
 
-    /// For one more mode, which is there with the decrease of chi^2 that is seen, or not at all: with p = 1/(1 + exp((D - d)/2)) the
-    /// decrease must exceed D by 2 ln(1/p_error - 1).
-    pub(super) fn for_mode(
-        more: &OneMoreMode,
-        certainty: Certainty,
-        duration_s: Option<f64>,
-    ) -> Longer {
-        let odds = |probability: f64| 2.0 * (1.0 / probability - 1.0).ln();
+    /// For one more mode, which belongs to the fit from the decrease D of chi^2 on: with p = 1/(1 + exp((D - d)/2)) the decrease that is
+    /// seen is d = D - 2 ln(1/p - 1). If the mode is none, d does not grow, and p falls.
+    pub(super) fn for_mode(more: &OneMoreMode, duration_s: Option<f64>) -> Longer {
         let significant = more.significant_decrease;
-        let decrease = significant - odds(more.probability);
+        let decrease = significant - 2.0 * (1.0 / more.probability - 1.0).ln();
         Longer {
-            ratio: (significant + odds(certainty.error_probability())) / decrease.max(1.0),
+            ratio: significant / decrease.max(1.0),
             is_least: decrease < 1.0,
             duration_s,
         }
@@ -64,8 +62,8 @@ impl fmt::Display for Longer {
             "increase the amplitude there, or the duration to {about} {ratio:.digits$} times"
         )?;
         match self.duration_s {
-            Some(duration_s) => write!(f, ", {:.0} s", ratio * duration_s),
-            None => Ok(()),
+            Some(duration_s) if duration_s >= LEAST_S => write!(f, ", {:.0} s", ratio * duration_s),
+            _ => Ok(()),
         }
     }
 }
@@ -73,6 +71,7 @@ impl fmt::Display for Longer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::modal::ModalParameters;
 
     fn estimate(value: f64, sigma: f64) -> Estimate {
         Estimate { value, sigma }
@@ -95,5 +94,22 @@ mod tests {
         let unknown = estimate(1.0, f64::INFINITY);
         let text = Longer::for_sign(unknown, Certainty::ONE_LOOK, None).to_string();
         assert_eq!(text, "increase the amplitude there, or the duration");
+    }
+
+    #[test]
+    fn evidence_of_a_mode_grows_with_the_duration() {
+        let more = |probability: f64| OneMoreMode {
+            parameters: ModalParameters::default(),
+            near_rad_s: 100.0,
+            probability,
+            significant_decrease: 36.6,
+        };
+        let begin = "increase the amplitude there, or the duration to";
+        // 2 ln 99 = 9.19 are lacking of 36.6, and of a probability of 1e-8 all of it, 36.84.
+        let text = |probability: f64| Longer::for_mode(&more(probability), Some(20.0)).to_string();
+        assert_eq!(text(0.01), format!("{begin} about 1.3 times, 27 s"));
+        assert_eq!(text(1e-8), format!("{begin} more than 37 times, 732 s"));
+        let hit = Longer::for_mode(&more(0.01), Some(0.01)).to_string();
+        assert_eq!(hit, format!("{begin} about 1.3 times"));
     }
 }

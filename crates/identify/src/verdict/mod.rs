@@ -42,6 +42,7 @@ use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
 
 use crate::FrfDatum;
+use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use crate::modal::{FitError, FittedMode, MeasurementChain, ModalFit, OneMoreMode};
 use bench_base::decimal::Decimal;
 use bench_base::units::hz_text;
@@ -100,26 +101,27 @@ pub struct Verdict {
     pub zeros: Vec<UncertainZero>,
     /// The phase drop over the modes of the band, if there are two or more.
     pub phase_drop: Option<PhaseDrop>,
-    /// Whether the modes describe the stage. Otherwise none of their signs is certain.
-    pub describes: bool,
+    /// Whether the modes may be those of the stage. Otherwise, as with a defect of the record or another kind of output, none of their signs
+    /// is certain.
+    pub is_of_stage: bool,
 }
 
 impl Verdict {
-    /// An undecided verdict without any zeros, because the modes do not describe the stage.
+    /// An undecided verdict without any zeros, because the modes are not those of the stage.
     pub fn undecided(why: String) -> Verdict {
         Verdict {
             cnmp: Cnmp::Undecided,
             why,
             zeros: Vec::new(),
             phase_drop: None,
-            describes: false,
+            is_of_stage: false,
         }
     }
 
-    /// The modes of its fit. If they do not describe the stage, each sign may as well be the other one.
+    /// The modes of its fit. If they are not those of the stage, each sign may as well be the other one.
     pub fn modes(&self, fit: &ModalFit) -> Vec<FittedMode> {
         let mut modes = fit.modes();
-        if !self.describes {
+        if !self.is_of_stage {
             modes
                 .iter_mut()
                 .for_each(|mode| mode.turned_by_one_more = UNKNOWN_SIGN);
@@ -188,7 +190,7 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         why,
         zeros,
         phase_drop,
-        describes: poor_fit(input.fit).is_none(),
+        is_of_stage: true,
     };
     let verdict = verdict
         .with(is_complex.then(|| COMPLEX_RESIDUES.into()))
@@ -218,14 +220,14 @@ fn filter_modes(fit: &ModalFit) -> Option<String> {
 
 /// A mode by frequency and damping.
 fn described(mode: &FittedMode) -> String {
-    let frequency_hz = hz_text(mode.frequency_hz().value);
+    let frequency_hz = hz_text(mode.frequency_hz().value, 2);
     let damping_ratio = mode.damping_ratio.value;
     format!("{frequency_hz} Hz (damping ratio {damping_ratio:.2})")
 }
 
 /// The frequencies that are not fitted, as a caution.
 fn left_out(fit: &ModalFit) -> Option<String> {
-    let frequencies: Vec<String> = fit.left_out_hz.iter().map(|hz| hz_text(*hz)).collect();
+    let frequencies: Vec<String> = fit.left_out_hz.iter().map(|hz| hz_text(*hz, 2)).collect();
     (!frequencies.is_empty()).then(|| {
         format!(
             "the response at {} Hz alone differs from the modes, as by a disturbance or a mode narrower than the distance of the frequencies; it is left out, and a finer resolution (a longer period) shows which it is",
@@ -236,18 +238,16 @@ fn left_out(fit: &ModalFit) -> Option<String> {
 
 /// Why the data are insufficient for a verdict.
 fn insufficient_data(input: &VerdictInput<'_>, modes: &[FittedMode]) -> Option<String> {
-    poor_fit(input.fit)
+    poor_fit(input.fit.chi2_per_freedom)
         .or_else(|| missing_modes(input, modes.len()))
         .or_else(|| undefined_response(input.frf_data))
 }
 
-fn poor_fit(fit: &ModalFit) -> Option<String> {
-    (!fit.leaves_noise()).then(|| {
+fn poor_fit(chi2_per_freedom: f64) -> Option<String> {
+    let good = chi2_per_freedom <= MAX_CHI2_PER_FREEDOM;
+    (!good).then(|| {
         format!(
-            "reduced chi-square {:.2}, above {:.2}, the largest of noise with {} degrees of freedom: the response is not the fitted sum of modes with real residues; lower the amplitude if a record with half of it has other modes, and remove or state a filter or a lag in the channel; the damping may also be not proportional, or the stage may have changed during the record; the Bode plot shows where response and fit differ: leave that out of the band",
-            fit.chi2_per_freedom,
-            fit.noise_limit(),
-            fit.freedom
+            "reduced chi-square {chi2_per_freedom:.1}, above {MAX_CHI2_PER_FREEDOM}: the response is not the fitted sum of modes with real residues; lower the amplitude if a record with half of it has other modes, and remove or state a filter or a lag in the channel; the damping may also be not proportional, or the stage may have changed during the record; the Bode plot shows where response and fit differ: leave that out of the band"
         )
     })
 }
@@ -275,7 +275,7 @@ fn undefined_response(data: &[FrfDatum]) -> Option<String> {
         .find(|datum| !datum.response.norm().is_normal())?;
     Some(format!(
         "the response at {} Hz is {}, which has no phase; check the output of the record, or exclude this frequency from the band",
-        hz_text(undefined.frequency_hz),
+        hz_text(undefined.frequency_hz, 2),
         undefined.response
     ))
 }
@@ -283,18 +283,38 @@ fn undefined_response(data: &[FrfDatum]) -> Option<String> {
 fn uncertain_sign_reason(mode: &FittedMode, input: &VerdictInput<'_>) -> String {
     format!(
         "the sign of the residue at {} Hz is uncertain, and the number of CNMP zeros depends on it; {}",
-        hz_text(mode.frequency_hz().value),
-        Longer::for_sign(mode.residue_per_kg, input.certainty, input.duration_s)
+        hz_text(mode.frequency_hz().value, 2),
+        longer_for_sign(mode, input)
     )
+}
+
+/// How long a record must be for the sign of a residue, which one more mode may turn.
+fn longer_for_sign(mode: &FittedMode, input: &VerdictInput<'_>) -> Longer {
+    let alone = FittedMode {
+        turned_by_one_more: 0.0,
+        ..*mode
+    };
+    match &input.fit.one_more_mode {
+        Some(more) if input.has_certain_sign(&alone) => Longer::for_mode(more, input.duration_s),
+        _ => Longer::for_sign(mode.residue_per_kg, input.certainty, input.duration_s),
+    }
 }
 
 fn uncertain_mode_reason(more: &OneMoreMode, input: &VerdictInput<'_>) -> String {
     format!(
         "it is uncertain whether there is one more mode near {} Hz (probability {:.1} %), and the number of CNMP zeros depends on it; {}",
-        hz_text(hertz(more.near_rad_s)),
+        hz_text(hertz(more.near_rad_s), 2),
         100.0 * more.probability,
-        Longer::for_mode(more, input.certainty, input.duration_s)
+        Longer::for_mode(more, input.duration_s)
     )
+}
+
+/// How long a record must be for the side of a zero. None decides that of one closer to the axis than a fit is accurate.
+fn longer_for_side(zero: &UncertainZero, input: &VerdictInput<'_>) -> String {
+    if is_on_axis(zero) {
+        return "increase the amplitude there, or the duration".into();
+    }
+    Longer::for_sign(zero.real_part(), input.certainty, input.duration_s).to_string()
 }
 
 /// A complex zero that may lie on either side of the imaginary axis. (A real zero is no CNMP zero on either side.)
@@ -307,16 +327,16 @@ fn uncertain_side(zeros: &[UncertainZero], input: &VerdictInput<'_>) -> Option<S
             "the zero {:.4} ± {:.4} rad/s at {} Hz lies on the imaginary axis within the accuracy of a fit, 0.01 % of its frequency; a longer record does not decide: measure at another operating point",
             Decimal(real_part.value),
             real_part.half_width_95(),
-            hz_text(hertz(zero.s.norm()))
+            hz_text(hertz(zero.s.norm()), 2)
         ));
     }
     Some(format!(
         "the zero {:.3} ± {:.3} at {} Hz may lie on either side of the imaginary axis (right: {:.1} %); {}",
         Decimal(real_part.value),
         real_part.half_width_95(),
-        hz_text(hertz(zero.s.norm())),
+        hz_text(hertz(zero.s.norm()), 2),
         100.0 * zero.rhp_probability,
-        Longer::for_sign(real_part, input.certainty, input.duration_s)
+        longer_for_side(zero, input)
     ))
 }
 
@@ -362,13 +382,13 @@ fn excluded(zeros: &[UncertainZero]) -> String {
     match limiting_zero(zeros) {
         None => NO_CNMP.into(),
         Some(real) => format!(
-            "all complex zeros of the fit lie left of the imaginary axis, and the phase lag is that which the fit predicts; a real zero {} right of it, at {:.1} Hz: it is not a CNMP zero, but limits the bandwidth of a controller in the same way",
+            "all complex zeros of the fit lie left of the imaginary axis, and the phase lag is that which the fit predicts; a real zero {} right of it, at {} Hz: it is not a CNMP zero, but limits the bandwidth of a controller in the same way",
             if is_certain_right(real) {
                 "lies".into()
             } else {
                 format!("may lie ({:.0} %)", 100.0 * real.rhp_probability)
             },
-            hertz(real.s.re)
+            hz_text(hertz(real.s.re), 1)
         ),
     }
 }
@@ -441,14 +461,14 @@ fn only_of_the_chain(zeros: &[UncertainZero], of_stage: &[UncertainZero]) -> Opt
         "the zero {:.1} \u{b1} {:.1}j rad/s at {} Hz lies far right of the imaginary axis without one left of it, as of a filter or a lag between input and output, and not of the stage; record unfiltered signals, or state hold and lag of the input (--hold, --input-lag)",
         zero.s.re,
         zero.s.im,
-        hz_text(hertz(zero.s.norm()))
+        hz_text(hertz(zero.s.norm()), 2)
     ))
 }
 
 fn unconfirmed_reason(zero: &UncertainZero) -> String {
     format!(
         "the fit has CNMP zeros at {} Hz, where the response is noise and its phase cannot confirm them; increase the amplitude there, or the duration",
-        hz_text(hertz(zero.s.norm()))
+        hz_text(hertz(zero.s.norm()), 2)
     )
 }
 

@@ -103,7 +103,7 @@ fn zero_row(zero: &UncertainZero) -> Vec<String> {
         interval(zero.s.im, half_width)
     };
     vec![
-        hz_text(hz(zero.s.norm())),
+        hz_text(hz(zero.s.norm()), 3),
         interval_of(zero.real_part()),
         imaginary_part,
         zero.kind.name().into(),
