@@ -196,13 +196,13 @@ impl Report {
 
     fn text(&self) -> String {
         let coherence = self.coherence_median.unwrap_or(0.0);
-        let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         format!(
-            "{}{}\n{}  residues   in {}\n  fit        reduced chi-square {chi2:.3}\n{}",
+            "{}{}\n{}  residues   in {}\n{}{}",
             self.record_text(),
             response_text(&self.frf_csv, self.frequencies, coherence),
             pages_text(&self.pages),
             self.residue_unit(),
+            modal_output::fit_text(&self.summary),
             modal_output::text(&self.summary, table_unit(self.output_kind))
         )
     }

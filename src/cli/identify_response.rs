@@ -130,7 +130,6 @@ impl Report {
     }
 
     fn text(&self) -> String {
-        let chi2 = self.summary.fit_chi2_per_freedom.unwrap_or(0.0);
         [
             format!("  response   {}\n", self.recording),
             self.points_text(),
@@ -143,7 +142,7 @@ impl Report {
                 .map_or(String::new(), |text| labelled("sign", text)),
             self.input_path.text(),
             format!("  written    {}\n", self.frf_csv),
-            format!("  fit        reduced chi-square {chi2:.3}\n"),
+            modal_output::fit_text(&self.summary),
             pages_text(&self.pages),
             modal_output::text(&self.summary, &self.residue_unit),
         ]

@@ -9,6 +9,14 @@ use bench_report::figures::{
 };
 use bench_report::table::Width;
 
+/// How well modes describe the response, or that there are none.
+pub(super) fn fit_text(summary: &ModalSummary) -> String {
+    match summary.fit_chi2_per_freedom {
+        Some(chi2) => format!("  fit        reduced chi-square {chi2:.3}\n"),
+        None => "  fit        no modes\n".into(),
+    }
+}
+
 /// Tables of modes and zeros, and the verdict.
 pub(super) fn text(summary: &ModalSummary, residue_unit: &str) -> String {
     let verdict = format!("CNMP zeros: {}: {}", summary.cnmp.name(), summary.why);

@@ -45,14 +45,21 @@ pub fn outside_band_note((low_hz, high_hz): (f64, f64)) -> String {
 
 fn mode_row(mode: &FittedMode, width: Width) -> Vec<String> {
     let sign = mode.certain_sign().to_string().replace('-', "\u{2212}");
-    let mut cells = vec![
-        interval_of(mode.frequency_hz()),
-        interval_of(mode.damping_ratio),
-        interval_of(mode.residue_per_kg),
-        sign,
-    ];
+    let [frequency, damping] = frequency_and_damping(mode);
+    let mut cells = vec![frequency, damping, interval_of(mode.residue_per_kg), sign];
     cells.extend(width.page_only(percent(mode.sign_error_probability())));
     cells
+}
+
+/// Frequency in hertz and damping ratio; a free body has neither.
+fn frequency_and_damping(mode: &FittedMode) -> [String; 2] {
+    if mode.omega_rad_s.value == 0.0 {
+        return ["0 (free body)".into(), String::new()];
+    }
+    [
+        interval_of(mode.frequency_hz()),
+        interval_of(mode.damping_ratio),
+    ]
 }
 
 /// The table of modes with complex residues: real and imaginary part of r + j q w.
@@ -70,9 +77,10 @@ fn complex_mode_table(modes: &[FittedMode], residue_unit: &str) -> Table {
 
 fn complex_mode_row(mode: &FittedMode) -> Vec<String> {
     let imaginary = mode.residue_imaginary_per_kg;
+    let [frequency, damping] = frequency_and_damping(mode);
     vec![
-        interval_of(mode.frequency_hz()),
-        interval_of(mode.damping_ratio),
+        frequency,
+        damping,
         interval_of(mode.residue_per_kg),
         imaginary.map_or_else(String::new, interval_of),
         mode.certain_sign().to_string(),
@@ -133,6 +141,23 @@ mod tests {
         assert_eq!(page.rows[0][3..], ["\u{2212}", "below 0.01 %"]);
         assert_eq!(page.columns[..4], terminal.columns);
         assert_eq!(page.rows[0][..4], terminal.rows[0]);
+    }
+
+    #[test]
+    fn a_free_body_has_no_frequency_and_no_damping() {
+        let exact = |value: f64| Estimate { value, sigma: 0.0 };
+        let body = FittedMode {
+            omega_rad_s: exact(0.0),
+            damping_ratio: exact(0.0),
+            residue_per_kg: Estimate {
+                value: 0.5,
+                sigma: 0.01,
+            },
+            residue_imaginary_per_kg: None,
+            turned_by_one_more: 0.0,
+        };
+        let table = mode_table(&[body], "1/kg", Width::Terminal);
+        assert_eq!(table.rows[0], ["0 (free body)", "", "0.500 ± 0.020", "+"]);
     }
 
     #[test]
