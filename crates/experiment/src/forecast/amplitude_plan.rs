@@ -96,7 +96,7 @@ pub fn default_amplitude(config: Config) -> Result<Config, AmplitudePlanError> {
 /// suffices. An excitation that has one amplitude moves it by at most as much, by the model.
 ///
 /// A sweep that passes a mode quickly moves the stage further than a steady sine. All amplitudes are then lowered until it stays within
-/// the soft limit by [`SWEEP_RATIO`], or within `shape.travel_m` if that is more.
+/// two thirds of the permitted travel, or within `shape.travel_m` if that is more.
 ///
 /// # Errors
 /// If the excitation has one amplitude only and the source is a measured response, or the response cannot be read or computed over the
