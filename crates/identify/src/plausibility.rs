@@ -225,7 +225,7 @@ pub(super) fn hint(
 
 fn clipped_input(limit: f64) -> String {
     format!(
-        "the input stays at its limit of {limit:.4} for several samples in several places, as one that is clipped; lower the amplitude, or extend the range of the sensor of the input"
+        "the input stays at its limit of {limit:.4e} for several samples in several places, as one that is clipped; lower the amplitude, or extend the range of the sensor of the input"
     )
 }
 

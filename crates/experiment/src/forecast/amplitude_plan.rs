@@ -18,7 +18,7 @@ const GRID: usize = 4000;
 /// An FRF must reach the ends of the band up to this ratio. It is constant beyond its own ends.
 const END_RATIO: f64 = 1.1;
 
-/// A shaped sweep may move the stage by this part of the soft limit.
+/// A shaped sweep may move the stage by this part of the permitted travel.
 const SWEEP_RATIO: f64 = 2.0 / 3.0;
 
 /// Frequency in hertz and |G| in metres per ampere, by rising frequency.
