@@ -1,4 +1,4 @@
-//! Files of scipy, numpy, h5py, pyarrow and pyuff (`tests/python/record_files.py`) give the modes of the CSV with the same numbers.
+//! Files of scipy, numpy, h5py, pyarrow and pyuff, and of the format of LabVIEW (`tests/python/record_files.py`), give the modes of the CSV with the same numbers.
 use serde_json::Value;
 
 use crate::external::program::{Bench, number};
@@ -7,7 +7,7 @@ use crate::external::signals::{STAGE, csv, multisine};
 
 /// File, names of its columns, and how far frequencies, dampings and residues may differ from those of the CSV: only by what the file
 /// rounds. Single times have the same rate as double ones; pyuff writes text with 12 digits.
-const FILES: [(&str, [&str; 3], f64); 21] = [
+const FILES: [(&str, [&str; 3], f64); 23] = [
     ("row.mat", NAMES, 0.0),
     ("column.mat", NAMES, 0.0),
     ("struct.mat", FIELDS, 0.0),
@@ -29,6 +29,8 @@ const FILES: [(&str, [&str; 3], f64); 21] = [
     ("text.uff", NODES, 1e-6),
     ("binary.uff", NODES, 0.0),
     ("uneven.uff", NODES, 0.0),
+    ("steps.lvm", CHANNELS, 0.0),
+    ("comma.lvm", CHANNELS, 0.0),
 ];
 
 /// With the feature `parquet`.
@@ -44,6 +46,7 @@ const FIELDS: [&str; 3] = ["rec.time_s", "rec.force_n", "rec.position_m"];
 const MATRIX: [&str; 3] = ["data:1", "data:2", "data:3"];
 const NUMBERS: [&str; 3] = ["1", "2", "3"];
 const NODES: [&str; 3] = ["time", "1:+Z", "2:+Z"];
+const CHANNELS: [&str; 3] = ["time", "force_n", "position_m"];
 
 /// A folder with the record as CSV and as the other files. `None` without Python.
 fn bench() -> Option<Bench> {

@@ -119,6 +119,35 @@ def universal_files(columns, folder):
         pyuff.UFF(str(folder / file)).write_sets(sets, "add")
 
 
+def labview_files(columns, folder):
+    """Measurement files as the specification of National Instruments describes them: without a column of times, and with one and a decimal comma."""
+    time, force, position = (columns[name] for name in NAMES)
+    step = time[1] - time[0]
+    for file, with_times, decimal in [("steps.lvm", "No", "."), ("comma.lvm", "One", ",")]:
+        head = [
+            "LabVIEW Measurement\t",
+            "Separator\tTab",
+            f"Decimal_Separator\t{decimal}",
+            "Multi_Headings\tNo",
+            f"X_Columns\t{with_times}",
+            "***End_of_Header***\t",
+            "\t",
+            "Channels\t2\t\t",
+            f"Samples\t{len(time)}\t{len(time)}\t",
+            "Y_Unit_Label\tNewton\tMeter\t",
+            "X_Dimension\tTime\tTime\t",
+            f"X0\t{time[0]:.16E}\t{time[0]:.16E}\t",
+            f"Delta_X\t{step:.6E}\t{step:.6E}\t",
+            "***End_of_Header***\t\t\t",
+            f"X_Value\t{NAMES[1]}\t{NAMES[2]}\tComment",
+        ]
+        times = [f"{t:.9g}" if with_times == "One" else "" for t in time]
+        rows = [f"{t}\t{u!r}\t{y!r}" for t, u, y in zip(times, force.tolist(), position.tolist())]
+        head = [line if line.startswith("Decimal") else line.replace(".", decimal) for line in head]
+        text = [*head, *(row.replace(".", decimal) for row in rows)]
+        (folder / file).write_bytes("".join(line + "\r\n" for line in text).encode())
+
+
 def main():
     csv, folder = Path(sys.argv[1]), Path(sys.argv[2])
     numbers = np.loadtxt(csv, delimiter=",", skiprows=1)
@@ -128,6 +157,7 @@ def main():
     hdf5_files(columns, folder)
     parquet_files(columns, folder)
     universal_files(columns, folder)
+    labview_files(columns, folder)
 
 
 main()

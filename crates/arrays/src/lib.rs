@@ -11,6 +11,7 @@
 //! | Parquet (feature `parquet`) | pandas, polars, Arrow, DuckDB |
 //! | NPZ, NPY | `numpy.savez`, `numpy.savez_compressed`, `numpy.save` |
 //! | universal file, dataset 58 and 58b | vibration analysers, pyuff |
+//! | measurement file (LVM) | LabVIEW |
 //!
 //! Sizes that a file states never determine how much memory is taken: a part ends where its bytes end, and all numbers together, as
 //! well as all unpacked bytes, are limited.
@@ -22,6 +23,7 @@ mod bytes;
 mod contents;
 mod error;
 mod hdf5;
+mod labview;
 mod mat;
 mod npy;
 mod npz;
@@ -56,6 +58,8 @@ pub enum Format {
     Npy,
     /// Universal file.
     Universal,
+    /// Measurement file of LabVIEW.
+    LabView,
 }
 
 impl Format {
@@ -79,6 +83,8 @@ impl Format {
             Some(Format::Npy)
         } else if npz::is_one(bytes) {
             Some(Format::Npz)
+        } else if labview::is_one(bytes) {
+            Some(Format::LabView)
         } else {
             universal::is_one(bytes).then_some(Format::Universal)
         }
@@ -94,6 +100,7 @@ impl Format {
             Format::Npz => "an NPZ file",
             Format::Npy => "a NumPy file",
             Format::Universal => "a universal file",
+            Format::LabView => "a LabVIEW measurement file",
         }
     }
 }
@@ -101,7 +108,8 @@ impl Format {
 /// The variables of a file. The numbers, and the unpacked bytes, may take `max_bytes` each.
 ///
 /// The time responses of a universal file are variables of the name `node:direction` (`2:+Z`), or of ID line 1 if the nodes are not
-/// told apart by it, and their abscissas are `time`, in the unit of its axis label. Other functions are named only.
+/// told apart by it, and their abscissas are `time`, in the unit of its axis label. Other functions are named only. The channels of a
+/// LabVIEW file have their names and `time`; those of several measurements are fields of `1`, `2`, ...
 ///
 /// # Errors
 /// When the file is damaged, or has more numbers.
@@ -118,6 +126,7 @@ pub fn variables(format: Format, bytes: &[u8], max_bytes: u64) -> Result<Variabl
             bytes,
             &mut budget,
         )?)),
+        Format::LabView => labview::variables(bytes, &mut budget),
     }
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! file -> content (gzip, UTF-8, UTF-16, Latin-1; other formats are named)
 //!      -> text: layout (preamble, names, units, separator) -> table (numbers of the selected columns) ---> times (unit, regular or not)
-//!      -> arrays (MAT-file, NPZ, NPY, universal file) -> series of the selected names ------------------/      -> signals
+//!      -> arrays (MAT-file, NPZ, universal file, ...) -> series of the selected names ------------------/      -> signals
 //! ```
 //!
 //! Input, output and the reference of a closed loop may have any units: the [`Signals`] have them as well, and a residue is output per
