@@ -23,11 +23,28 @@ const MOVING_SIGMAS: f64 = 8.0;
 
 /// The start of a record is one of this number of parts.
 const PARTS: usize = 200;
+/// Samples below this ratio of the largest one precede an excitation, as those before the blow of a hammer. Noise whose largest value is
+/// four standard deviations stays below it for 0.025 of its mean period: it passes zero with fewer than [`END_SAMPLES`] of them, unless
+/// its frequencies lie below a six-hundredth of the rate.
+const QUIET_RATIO: f64 = 0.02;
 
 /// The RMS value of the input at the start of the record as a ratio of that of the whole record.
 pub fn input_ratio_at_start(signals: &Signals) -> f64 {
     let input = &signals.input;
-    rms(&input[..input.len().div_ceil(PARTS)]) / rms(input)
+    rms(start(input)) / rms(input)
+}
+
+/// The samples before the excitation, if it begins within the first of the [`PARTS`]; otherwise this part.
+pub(super) fn start(input: &[f64]) -> &[f64] {
+    let first = &input[..input.len().div_ceil(PARTS)];
+    let largest = input.iter().fold(0.0_f64, |max, x| max.max(x.abs()));
+    let is_quiet = |x: &&f64| x.abs() < QUIET_RATIO * largest;
+    let quiet = first.iter().take_while(is_quiet).count();
+    if quiet < END_SAMPLES {
+        first
+    } else {
+        &first[..quiet]
+    }
 }
 
 /// The RMS value of the input at the end of the record, about its mean there, as a ratio of that of the whole record: a set-point may end

@@ -2,6 +2,7 @@
 
 mod corrections;
 
+use super::ends::start;
 use super::*;
 
 const RATE_HZ: f64 = 1000.0;
@@ -207,6 +208,51 @@ fn input_that_began_before_the_record_is_active_at_its_start() {
     assert!((0.5..2.0).contains(&ended), "{ended}");
     let begun = input_ratio_at_start(&whole.slice(10_000..25_000));
     assert!((0.5..2.0).contains(&begun), "{begun}");
+}
+
+/// A blow of 20 samples, in a record of 20,000, with noise of 0.1 % of it.
+fn blow(at: usize) -> Signals {
+    let mut noise = noise(3);
+    let force = |n: usize| match n.checked_sub(at) {
+        Some(after) if after < 20 => (std::f64::consts::PI * after as f64 / 20.0).sin(),
+        _ => 0.0,
+    };
+    Signals {
+        rate_hz: RATE_HZ,
+        input: (0..20_000).map(|n| force(n) + 1e-3 * noise()).collect(),
+        output: vec![0.0; 20_000],
+    }
+}
+
+#[test]
+fn blow_soon_after_the_first_sample_begins_at_rest() {
+    // The RMS value of the blow over the record is sqrt(10/20,000) = 0.022, that of the noise 0.001.
+    for at in [20, 50, 90] {
+        let ratio = input_ratio_at_start(&blow(at));
+        assert!((0.02..0.09).contains(&ratio), "{at}: {ratio}");
+    }
+    // Without 16 samples before it, the beginning of the blow is not known.
+    for at in [0, 5] {
+        let ratio = input_ratio_at_start(&blow(at));
+        assert!(ratio > 5.0, "{at}: {ratio}");
+    }
+}
+
+#[test]
+fn noise_that_goes_on_is_active_wherever_the_record_begins() {
+    let mut noise = noise(5);
+    // A first-order low-pass of 1/100 of the rate.
+    let mut smooth = 0.0;
+    let input: Vec<f64> = (0..40_000)
+        .map(|_| {
+            smooth += (noise() - smooth) * std::f64::consts::TAU / 100.0;
+            smooth
+        })
+        .collect();
+    for from in (0..30_000).step_by(50) {
+        let record = &input[from..from + 10_000];
+        assert_eq!(start(record), &record[..50], "from {from}");
+    }
 }
 
 #[test]
