@@ -212,7 +212,8 @@ impl DiscreteMode {
         let determinant = (z - a11) * (z - a22) - a12 * a21;
         let along = ((z - a22) * first + second * a12) * row[0]
             + ((z - a11) * second + first * a21) * row[1];
-        along / determinant
+        // One division in place of two.
+        along * determinant.conj() * (1.0 / determinant.norm_sqr())
     }
 }
 

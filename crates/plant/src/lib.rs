@@ -57,7 +57,7 @@ pub use damping::{DampingPoint, DampingSettings};
 pub use discrete::{DiscreteMode, DiscretePlant, PlantState};
 pub use error::PlantError;
 pub use input_kind::InputKind;
-pub use loop_plant::{LoopPlant, LoopPlantState, PathResponse, SignalPath};
+pub use loop_plant::{LoopPlant, LoopPlantState, PathResponses, SignalPath};
 pub use lumped::{LumpedSettings, NodeSettings, SpringSettings};
 pub use matrix_exponential::matrix_exponential;
 pub use modal::{ModalSettings, ModeSettings};

@@ -137,14 +137,14 @@ struct Tap {
     setpoint: f64,
 }
 
-/// The part of a response at z = exp(j w T) that does not depend on the modes: that of the amplifier and of the delays.
+/// The part of the responses at some z = exp(j w T) that does not depend on the modes: that of the amplifier and of the delays.
 #[derive(Clone, Debug)]
-pub struct PathResponse {
-    z: Complex<f64>,
+pub struct PathResponses {
+    z: Vec<Complex<f64>>,
     /// Of the amplifier, as [`DiscretePlant::current_response`].
-    current: Complex<f64>,
+    currents: Vec<Complex<f64>>,
     /// z^-periods of each tap.
-    arrivals: Vec<Complex<f64>>,
+    arrivals: Vec<Vec<Complex<f64>>>,
 }
 
 /// State of a [`LoopPlant`]: the state of the plant, and the delayed readings, indexed by the tick of their arrival.
@@ -208,24 +208,32 @@ impl LoopPlant {
 
     /// The same at z = exp(j w T).
     pub fn response_at(&self, z: Complex<f64>) -> Complex<f64> {
-        self.response_along(&self.path_response(z))
+        let current = self.held.current_response(z);
+        let taps = self.taps.iter();
+        taps.map(|tap| tap.response(&self.held, z, current) * tap.arrival(z))
+            .sum()
     }
 
-    /// The part of the response at z = exp(j w T) that all plants at the end of this signal path have in common.
-    pub fn path_response(&self, z: Complex<f64>) -> PathResponse {
-        let arrivals = self.taps.iter().map(|tap| z.powi(-(tap.periods as i32)));
-        PathResponse {
+    /// The part of the responses at these z = exp(j w T) that all plants at the end of this signal path have in common.
+    pub fn path_responses(&self, z: Vec<Complex<f64>>) -> PathResponses {
+        let arrivals = |tap: &Tap| z.iter().map(|z| tap.arrival(*z)).collect();
+        PathResponses {
+            currents: z.iter().map(|z| self.held.current_response(*z)).collect(),
+            arrivals: self.taps.iter().map(arrivals).collect(),
             z,
-            current: self.held.current_response(z),
-            arrivals: arrivals.collect(),
         }
     }
 
-    /// As [`LoopPlant::response_at`], with the [`LoopPlant::path_response`] of any plant at the end of the same signal path.
-    pub fn response_along(&self, path: &PathResponse) -> Complex<f64> {
-        let taps = self.taps.iter().zip(&path.arrivals);
-        taps.map(|(tap, arrival)| tap.response(&self.held, path) * arrival)
-            .sum()
+    /// As [`LoopPlant::response_at`] at each z, with the [`LoopPlant::path_responses`] of any plant at the end of the same signal path.
+    pub fn responses_along(&self, path: &PathResponses) -> Vec<Complex<f64>> {
+        let mut sums = vec![Complex::new(0.0, 0.0); path.z.len()];
+        for (tap, arrivals) in self.taps.iter().zip(&path.arrivals) {
+            let points = path.z.iter().zip(&path.currents).zip(arrivals);
+            for (sum, ((z, current), arrival)) in sums.iter_mut().zip(points) {
+                *sum += tap.response(&self.held, *z, *current) * arrival;
+            }
+        }
+        sums
     }
 
     /// x+ = A x + B u, y = C x with the states [i, q1, q1'/w1, q2, ..., next reading, the one after it, ...].
@@ -344,13 +352,23 @@ impl Tap {
         }
     }
 
-    /// The response without the whole periods of the delay.
-    fn response(&self, held: &DiscretePlant, path: &PathResponse) -> Complex<f64> {
+    /// The response at z without the whole periods of the delay, with the [`DiscretePlant::current_response`] there.
+    fn response(
+        &self,
+        held: &DiscretePlant,
+        z: Complex<f64>,
+        current: Complex<f64>,
+    ) -> Complex<f64> {
         let rows = self.rows.iter().zip(&held.modes);
         let moved: Complex<f64> = rows
-            .map(|(row, mode)| mode.state_response(*row, path.z, path.current))
+            .map(|(row, mode)| mode.state_response(*row, z, current))
             .sum();
-        moved + path.current * self.current + self.setpoint
+        moved + current * self.current + self.setpoint
+    }
+
+    /// The whole periods of the delay: z^-periods.
+    fn arrival(&self, z: Complex<f64>) -> Complex<f64> {
+        z.powi(-(self.periods as i32))
     }
 
     fn output_m(&self, state: &PlantState, setpoint_a: f64) -> f64 {

@@ -4,7 +4,7 @@ use nalgebra::Complex;
 
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
-use bench_plant::{FAR_RAD_S, LoopPlant, Mode, OutputKind, PathResponse, SignalPath};
+use bench_plant::{FAR_RAD_S, LoopPlant, Mode, OutputKind, PathResponses, SignalPath};
 
 /// The signal path between set-point and reading, without the mechanics.
 ///
@@ -98,36 +98,34 @@ impl InputPath {
     }
 }
 
-/// The frequencies at which the model of each datum is evaluated, with that part of the model that its parameters do not change.
+/// The frequencies at which the model of each datum is evaluated, with that part of the model that its parameters do not change. A datum
+/// has two nodes, one after the other, which have its first three moments, or one.
 pub(super) struct Nodes {
     /// The chain, with an additional delay.
     chain: MeasurementChain,
     /// The additional delay: the aliases have it too. Only a change of the delay multiplies the response by exp(-s change).
     delay_s: f64,
-    data: Vec<DatumNodes>,
+    /// Whether each datum has two nodes.
+    has_two: Vec<bool>,
+    /// j w of each node.
+    s: Vec<Complex<f64>>,
+    /// The chain at the nodes.
+    path: ChainResponses,
+    /// The response at the nodes of a mode far above all frequencies.
+    far: Vec<Complex<f64>>,
 }
 
-/// A response at each node of each datum, with the delay of the nodes.
-pub(super) struct NodeResponse(Vec<[Complex<f64>; 2]>);
+/// A response at each node, with the delay of the nodes.
+pub(super) struct NodeResponse(Vec<Complex<f64>>);
 
-/// exp(-s change) at each node of each datum, for one change of the delay.
-pub(super) struct Delays(Vec<[Complex<f64>; 2]>);
+/// exp(-s change) at each node, for one change of the delay.
+pub(super) struct Delays(Vec<Complex<f64>>);
 
-/// Two frequencies that have the first three moments of a datum, or one.
-struct DatumNodes(Node, Option<Node>);
-
-struct Node {
-    s: Complex<f64>,
-    chain: ChainResponse,
-    /// The response of a mode far above all frequencies.
-    far: Complex<f64>,
-}
-
-/// The chain at one frequency.
-enum ChainResponse {
-    Bench(PathResponse),
+/// The chain at some frequencies.
+enum ChainResponses {
+    Bench(PathResponses),
     Direct,
-    Input(Complex<f64>),
+    Input(Vec<Complex<f64>>),
 }
 
 /// A mode of residue 1, to be observed through a chain.
@@ -138,91 +136,31 @@ struct ObservedMode {
 }
 
 impl ObservedMode {
-    fn response(&self, s: Complex<f64>, chain: &ChainResponse) -> Complex<f64> {
+    fn responses(&self, s: &[Complex<f64>], chain: &ChainResponses) -> Vec<Complex<f64>> {
+        let resonances = s.iter().map(|s| self.mode.resonance(*s));
         match (chain, &self.plant) {
-            (ChainResponse::Bench(path), Some(plant)) => plant.response_along(path),
-            (ChainResponse::Input(path), _) => self.mode.resonance(s) * path,
-            (ChainResponse::Bench(_) | ChainResponse::Direct, _) => self.mode.resonance(s),
+            (ChainResponses::Bench(path), Some(plant)) => plant.responses_along(path),
+            (ChainResponses::Input(path), _) => resonances
+                .zip(path)
+                .map(|(mode, path)| mode * path)
+                .collect(),
+            (ChainResponses::Bench(_) | ChainResponses::Direct, _) => resonances.collect(),
         }
     }
 }
 
-impl Node {
-    fn new(chain: &MeasurementChain, far: &ObservedMode, frequency_hz: f64) -> Node {
-        let s = Complex::new(0.0, 2.0 * std::f64::consts::PI * frequency_hz);
-        let continuous = chain.continuous_response(s, 0.0) / (FAR_RAD_S * FAR_RAD_S);
-        let output = chain.output();
-        let chain = match (chain, &far.plant) {
+impl ChainResponses {
+    fn new(chain: &MeasurementChain, far: &ObservedMode, s: &[Complex<f64>]) -> ChainResponses {
+        match (chain, &far.plant) {
             (MeasurementChain::Bench(path), Some(plant)) => {
-                ChainResponse::Bench(plant.path_response(unit_phasor(s.im * path.period_s)))
+                let z = s.iter().map(|s| unit_phasor(s.im * path.period_s));
+                ChainResponses::Bench(plant.path_responses(z.collect()))
             }
             (MeasurementChain::Input(path, output), _) => {
-                ChainResponse::Input(path.response(s) * output.factor(s))
+                let at = |s: &Complex<f64>| path.response(*s) * output.factor(*s);
+                ChainResponses::Input(s.iter().map(at).collect())
             }
-            (MeasurementChain::Bench(_) | MeasurementChain::Direct, _) => ChainResponse::Direct,
-        };
-        // The velocity of such a mode is a pulse after each step, of which samples show nothing: its aliases cancel it. Of modes that
-        // are not that far, samples show the compliance.
-        let far = match output {
-            OutputKind::Position => far.response(s, &chain),
-            OutputKind::Velocity | OutputKind::Acceleration => continuous,
-        };
-        Node { s, chain, far }
-    }
-
-    /// The factor from an observed derivative to that of the node's chain: in samples of a bench it is observed itself, elsewhere it is s
-    /// times the mode, as the chain of the node has its own output.
-    fn rate_factor(&self) -> Complex<f64> {
-        match self.chain {
-            ChainResponse::Bench(_) => Complex::new(1.0, 0.0),
-            ChainResponse::Direct | ChainResponse::Input(_) => self.s,
-        }
-    }
-
-    /// exp(-s tau).
-    fn delay(&self, delay_s: f64) -> Complex<f64> {
-        unit_phasor(-self.s.im * delay_s)
-    }
-}
-
-impl DatumNodes {
-    fn new(
-        chain: &MeasurementChain,
-        far: &ObservedMode,
-        frequency_hz: f64,
-        spread_hz: f64,
-    ) -> DatumNodes {
-        let node = |frequency_hz| Node::new(chain, far, frequency_hz);
-        if spread_hz == 0.0 {
-            DatumNodes(node(frequency_hz), None)
-        } else {
-            DatumNodes(
-                node(frequency_hz - spread_hz),
-                Some(node(frequency_hz + spread_hz)),
-            )
-        }
-    }
-
-    /// The delay at the nodes; 1 in place of a second node that does not exist.
-    fn delays(&self, delay_s: f64) -> [Complex<f64>; 2] {
-        let other = self.1.as_ref().map(|node| node.delay(delay_s));
-        [
-            self.0.delay(delay_s),
-            other.unwrap_or(Complex::new(1.0, 0.0)),
-        ]
-    }
-
-    /// A response at the nodes; 0 in place of a second node that does not exist.
-    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> [Complex<f64>; 2] {
-        let other = self.1.as_ref().map(&response);
-        [response(&self.0), other.unwrap_or_default()]
-    }
-
-    /// The mean of a response over the datum, with the delays.
-    fn mean(&self, response: &[Complex<f64>; 2], delays: &[Complex<f64>; 2]) -> Complex<f64> {
-        match &self.1 {
-            Some(_) => (response[0] * delays[0] + response[1] * delays[1]) * 0.5,
-            None => response[0] * delays[0],
+            (MeasurementChain::Bench(_) | MeasurementChain::Direct, _) => ChainResponses::Direct,
         }
     }
 }
@@ -241,24 +179,40 @@ impl Nodes {
         delay_s: f64,
     ) -> Nodes {
         let (chain, delay_s) = chain.with_added_delay(delay_s);
+        let (mut has_two, mut s) = (Vec::new(), Vec::new());
+        for (frequency_hz, spread_hz) in frequencies {
+            let mut add = |hz: f64| s.push(Complex::new(0.0, 2.0 * std::f64::consts::PI * hz));
+            has_two.push(spread_hz != 0.0);
+            add(frequency_hz - spread_hz);
+            if spread_hz != 0.0 {
+                add(frequency_hz + spread_hz);
+            }
+        }
         let far = chain.observed(FAR_RAD_S, 1.0);
-        let data = frequencies.map(|(hz, spread_hz)| DatumNodes::new(&chain, &far, hz, spread_hz));
+        let path = ChainResponses::new(&chain, &far, &s);
+        // The velocity of such a mode is a pulse after each step, of which samples show nothing: its aliases cancel it. Of modes that
+        // are not that far, samples show the compliance.
+        let continuous =
+            |s: &Complex<f64>| chain.continuous_response(*s, 0.0) / (FAR_RAD_S * FAR_RAD_S);
+        let far = match chain.output() {
+            OutputKind::Position => far.responses(&s, &path),
+            OutputKind::Velocity | OutputKind::Acceleration => s.iter().map(continuous).collect(),
+        };
         Nodes {
-            data: data.collect(),
             chain,
             delay_s,
+            has_two,
+            s,
+            path,
+            far,
         }
     }
 
     /// exp(-s change) at each node, for the change from the delay of the nodes to `delay_s` beyond the given chain.
     pub(super) fn delays(&self, delay_s: f64) -> Delays {
         let change_s = delay_s - self.delay_s;
-        Delays(
-            self.data
-                .iter()
-                .map(|nodes| nodes.delays(change_s))
-                .collect(),
-        )
+        let phasors = self.s.iter().map(|s| unit_phasor(-s.im * change_s));
+        Delays(phasors.collect())
     }
 
     /// Whether the aliases of the chain with this delay differ from those of the nodes: by [`ALIAS_PHASE_RAD`] and more.
@@ -279,42 +233,56 @@ impl Nodes {
     /// The response of a mode of residue 1, its own excluded.
     pub(super) fn mode(&self, term: &ModalTerm) -> NodeResponse {
         let mode = self.chain.observed(term.omega_rad_s, term.damping_ratio);
-        self.response(|node| mode.response(node.s, &node.chain))
+        NodeResponse(mode.responses(&self.s, &self.path))
     }
 
     /// The response of a mode of rate 1 s/kg, with the numerator s: the derivative by time of that of residue 1. Through the chain of
     /// a bench it is that of the next kind of output; of an acceleration, which has none, it is 0.
     pub(super) fn mode_rate(&self, term: &ModalTerm) -> NodeResponse {
-        let (w, zeta) = (term.omega_rad_s, term.damping_ratio);
-        let mode = self.chain.derivative().map(|chain| chain.observed(w, zeta));
-        self.response(|node| match &mode {
-            None => Complex::new(0.0, 0.0),
-            Some(mode) => mode.response(node.s, &node.chain) * node.rate_factor(),
-        })
-    }
-
-    fn response(&self, response: impl Fn(&Node) -> Complex<f64>) -> NodeResponse {
-        NodeResponse(
-            self.data
-                .iter()
-                .map(|nodes| nodes.response(&response))
-                .collect(),
-        )
+        let Some(chain) = self.chain.derivative() else {
+            return NodeResponse(vec![Complex::new(0.0, 0.0); self.s.len()]);
+        };
+        let mode = chain.observed(term.omega_rad_s, term.damping_ratio);
+        let mut rates = mode.responses(&self.s, &self.path);
+        // In samples of a bench the derivative is observed itself, elsewhere it is s times the mode: the nodes have the chain's own output.
+        if !matches!(self.path, ChainResponses::Bench(_)) {
+            for (rate, s) in rates.iter_mut().zip(&self.s) {
+                *rate *= s;
+            }
+        }
+        NodeResponse(rates)
     }
 
     /// The mean of a response over each datum, with the delay.
     pub(super) fn mean(&self, response: &NodeResponse, delays: &Delays) -> Vec<Complex<f64>> {
-        let data = self.data.iter().zip(&response.0).zip(&delays.0);
-        data.map(|((nodes, response), delays)| nodes.mean(response, delays))
-            .collect()
+        self.mean_of(&response.0, delays)
     }
 
     /// The response of a constant compliance of 1 m/N for each datum.
     pub(super) fn constant(&self, delays: &Delays) -> Vec<Complex<f64>> {
-        let far = self.mean(&self.response(|node| node.far), delays);
+        let far = self.mean_of(&self.far, delays);
         far.into_iter()
             .map(|h| h * (FAR_RAD_S * FAR_RAD_S))
             .collect()
+    }
+
+    fn mean_of(&self, response: &[Complex<f64>], delays: &Delays) -> Vec<Complex<f64>> {
+        let mut node = 0;
+        let mut next = || {
+            let delayed = response[node] * delays.0[node];
+            node += 1;
+            delayed
+        };
+        let data = self.has_two.iter();
+        data.map(|has_two| {
+            let first = next();
+            if *has_two {
+                (first + next()) * 0.5
+            } else {
+                first
+            }
+        })
+        .collect()
     }
 }
 
@@ -349,6 +317,14 @@ impl MeasurementChain {
             MeasurementChain::Bench(path) => path.output,
             MeasurementChain::Direct => OutputKind::Position,
             MeasurementChain::Input(_, output) => *output,
+        }
+    }
+
+    /// Whether samples show a mode of this frequency in its place: below half of their rate. A chain without samples has none.
+    pub(super) fn is_below_nyquist(&self, omega_rad_s: f64) -> bool {
+        match self {
+            MeasurementChain::Bench(path) => omega_rad_s * path.period_s < std::f64::consts::PI,
+            MeasurementChain::Direct | MeasurementChain::Input(..) => true,
         }
     }
 

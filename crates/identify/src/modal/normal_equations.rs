@@ -9,10 +9,10 @@ const LANES: usize = 8;
 /// Number of values of each column that are multiplied at a time: those of all columns fit into the cache of a processor.
 const BLOCK: usize = 512;
 
-/// The columns of J, each datum weighted with the square root of 2/v: real and imaginary parts, one after the other.
+/// The columns of J, each datum weighted with the square root of 2/v: its real and its imaginary part.
 pub(super) struct WeightedColumns {
     root_weights: Vec<f64>,
-    columns: Vec<Vec<f64>>,
+    columns: Vec<Vec<[f64; 2]>>,
 }
 
 impl WeightedColumns {
@@ -30,12 +30,11 @@ impl WeightedColumns {
         self.columns.push(column);
     }
 
-    fn weighted(&self, column: impl Iterator<Item = Complex<f64>>) -> Vec<f64> {
-        let mut weighted = Vec::with_capacity(2 * self.root_weights.len());
-        for (value, root_weight) in column.zip(&self.root_weights) {
-            weighted.extend([value.re * root_weight, value.im * root_weight]);
-        }
+    fn weighted(&self, column: impl Iterator<Item = Complex<f64>>) -> Vec<[f64; 2]> {
+        let weighted = column.zip(&self.root_weights);
         weighted
+            .map(|(value, root_weight)| [value.re * root_weight, value.im * root_weight])
+            .collect()
     }
 
     /// The normal equations with the residual e.
@@ -45,9 +44,9 @@ impl WeightedColumns {
     ) -> NormalEquations {
         let n = self.columns.len();
         let residual = self.weighted(residual);
-        let zeros = vec![0.0; residual.len()];
-        let mut columns: Vec<&[f64]> = self.columns.iter().map(Vec::as_slice).collect();
-        columns.push(&residual);
+        let zeros = vec![0.0; 2 * residual.len()];
+        let columns = self.columns.iter().chain([&residual]);
+        let mut columns: Vec<&[f64]> = columns.map(|column| column.as_flattened()).collect();
         if columns.len() % 2 == 1 {
             columns.push(&zeros);
         }
