@@ -48,6 +48,7 @@ pub use one_more_mode::OneMoreMode;
 pub use parameters::{ModalParameters, Parameter, Residues};
 pub(crate) use search::CoarseFit;
 pub use search::ModelOrder;
+use search::Starts;
 
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -120,7 +121,8 @@ pub(crate) fn rising_orders(
     let nodes = &chain.nodes(data, 0.0);
     let problem = Problem { chain, data, nodes };
     let progress = &mut |_| ControlFlow::Continue(());
-    let found = search::orders(problem, &Residues::Real, max_modes, progress)?;
+    let starts = Starts::Peaks;
+    let found = search::orders(problem, &Residues::Real, max_modes, starts, progress)?;
     Ok(found.parameters())
 }
 
@@ -150,12 +152,13 @@ fn fit_up_to(
     let band_hz = (first.frequency_hz, last.frequency_hz);
     let mut used = UsedData::all(data);
     let mut searched = 0.0_f64;
+    let mut starts = Starts::Peaks;
     loop {
         let data = &used.data;
         let nodes = &chain.nodes(data, 0.0);
         let problem = Problem { chain, data, nodes };
         // A search that is repeated makes no progress until it is farther than the one before.
-        let found = search::orders(problem, residues, max_modes, &mut |done| {
+        let found = search::orders(problem, residues, max_modes, starts, &mut |done| {
             searched = searched.max(SEARCH_PROGRESS * done);
             progress(searched)
         })?;
@@ -166,7 +169,13 @@ fn fit_up_to(
             continue;
         }
         report(progress, SEARCH_PROGRESS)?;
-        let fit = final_fit(problem, best.parameters.clone())?;
+        let fit = match final_fit(problem, best.parameters.clone()) {
+            Err(FitError::Undetermined { .. }) if starts == Starts::Peaks => {
+                starts = Starts::PeaksWithModeAbove;
+                continue;
+            }
+            result => result?,
+        };
         let lone = lone_data(problem, &fit.parameters);
         if used.can_leave_out(&lone) {
             used.leave_out(&lone);

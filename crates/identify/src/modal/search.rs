@@ -27,6 +27,20 @@ pub(super) const MAX_MODES: usize = 24;
 /// No data are left out below this number of data, as of the lines of a multisine.
 const MIN_DATA: usize = 400;
 
+/// Frequencies of a mode above the band, as multiples of its end, and its damping ratio.
+const ABOVE_BAND: [f64; 2] = [1.3, 2.0];
+const ABOVE_BAND_DAMPING: f64 = 0.01;
+
+/// Where the first pass begins, beside no mode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Starts {
+    /// One mode at each peak of the response.
+    Peaks,
+    /// The same with one mode above the band. Modes are added within the band only, and many of them take its place, which the data do
+    /// not determine.
+    PeaksWithModeAbove,
+}
+
 /// One pass of the search.
 struct Pass {
     /// Error as a ratio of H that is added to the noise.
@@ -115,6 +129,7 @@ pub(super) fn orders(
     problem: Problem<'_>,
     residues: &Residues,
     max_modes: usize,
+    starts: Starts,
     progress: &mut Progress<'_>,
 ) -> Result<Found, FitError> {
     let mut search = Search {
@@ -127,7 +142,7 @@ pub(super) fn orders(
         progress,
     };
     let [coarse, finer @ ..] = &PASSES;
-    search.run_from_best_start(coarse, problem)?;
+    search.run_from_best_start(coarse, problem, starts)?;
     for pass in finer {
         search.run(pass, problem)?;
     }
@@ -172,7 +187,7 @@ pub(super) fn coarse(problem: Problem<'_>, max_modes: usize) -> Result<CoarseFit
         done: 0.0,
         progress: &mut |_| ControlFlow::Continue(()),
     };
-    let cost = search.run_from_best_start(&PASSES[0], problem)?;
+    let cost = search.run_from_best_start(&PASSES[0], problem, Starts::Peaks)?;
     Ok(CoarseFit {
         cost,
         parameters: search.parameters,
@@ -205,11 +220,20 @@ struct Search<'a, 'p> {
 
 impl Search<'_, '_> {
     /// A pass from each start: the result with the fewest and most significant modes, and its cost.
-    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
+    fn run_from_best_start(
+        &mut self,
+        pass: &Pass,
+        problem: Problem<'_>,
+        starts: Starts,
+    ) -> Result<f64, FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
-        let starts = peak_starts(Problem { chain, data, nodes }, self.residues);
+        let peaks = peak_starts(Problem { chain, data, nodes }, self.residues);
+        let starts = match starts {
+            Starts::Peaks => peaks,
+            Starts::PeaksWithModeAbove => with_mode_above(problem, &peaks),
+        };
         let by_one = self.cost_of_run(pass, problem)?;
         let first = (by_one, self.parameters.clone(), self.orders.clone());
         let mut best = first;
@@ -335,6 +359,24 @@ impl Pass {
             .map(|datum| datum.with_relative_error(self.relative_error))
             .collect()
     }
+}
+
+/// Each start with one mode above the band, in each place that samples can show.
+fn with_mode_above(problem: Problem<'_>, starts: &[ModalParameters]) -> Vec<ModalParameters> {
+    let end_rad_s = problem.data.last().map_or(0.0, FrfDatum::omega_rad_s);
+    let mut with_mode = Vec::new();
+    for omega_rad_s in ABOVE_BAND.map(|multiple| multiple * end_rad_s) {
+        if !problem.chain.is_below_nyquist(omega_rad_s) {
+            continue;
+        }
+        let mode = ModalTerm {
+            omega_rad_s,
+            damping_ratio: ABOVE_BAND_DAMPING,
+            residue_per_kg: 0.0,
+        };
+        with_mode.extend(starts.iter().map(|start| start.clone().with_mode(mode)));
+    }
+    with_mode
 }
 
 fn order(problem: Problem<'_>, solution: &Solution, evidence: f64) -> ModelOrder {
