@@ -20,6 +20,10 @@ const MIN_COHERENCE: f64 = 0.5;
 const MAX_SLOPE: f64 = 1.0;
 /// The slope is measured over this fraction of the band, in ln f, at its end.
 const SLOPE_PART: f64 = 0.25;
+/// A mode beyond the band explains a growth at its end up to this multiple of that end ...
+const MAX_BEYOND_BAND: f64 = 3.0;
+/// ... if the standard deviations of its frequency and its residue lie below this ratio of them.
+const DETERMINED_RATIO: f64 = 0.2;
 /// An output is early if it precedes its input by more than this fraction of a sample and by more than [`CERTAIN_SIGMAS`].
 const EARLY_SAMPLES: f64 = 0.5;
 /// A deviation of more standard deviations is not noise.
@@ -154,15 +158,24 @@ fn growing(frf: &Frf, fit: &Result<ModalFit, FitError>, kind: OutputKind) -> Opt
     })
 }
 
-/// Whether the highest mode of a fit that describes the data lies between two frequencies. (The inverse of a response needs a mode
-/// beyond the band.)
+/// Whether the highest mode of a fit that describes the data lies between two frequencies, or not far above them with a frequency and a
+/// residue that the data determine. (The inverse of a response needs a mode beyond the band as well, but its frequency is undetermined.)
 fn ends_with_a_mode(fit: &Result<ModalFit, FitError>, from_hz: f64, to_hz: f64) -> bool {
     let Some(fit) = fit.as_ref().ok().filter(|fit| describes(fit)) else {
         return false;
     };
-    let modes = fit.modes();
-    let last_hz = modes.last().map_or(0.0, |mode| mode.frequency_hz().value);
-    (from_hz..=to_hz).contains(&last_hz)
+    let Some(last) = fit.modes().pop() else {
+        return false;
+    };
+    let (frequency_hz, residue) = (last.frequency_hz(), last.residue_per_kg);
+    let is_determined = frequency_hz.sigma < DETERMINED_RATIO * frequency_hz.value
+        && residue.sigma < DETERMINED_RATIO * residue.value.abs();
+    let limit_hz = if is_determined {
+        MAX_BEYOND_BAND * to_hz
+    } else {
+        to_hz
+    };
+    (from_hz..=limit_hz).contains(&frequency_hz.value)
 }
 
 /// The slope of the least-squares line.
