@@ -55,6 +55,7 @@ CAUSES = {
     "times": r"only the times are inaccurate|not rising|earlier than",
     "opposite": r"no two neighbouring modes",
     "reference": r"--reference",
+    "beyond": r"extend --band",
 }
 KINDS = {}
 
@@ -82,16 +83,21 @@ def kind(name):
 class Bench:
     """A random stage, its command, and the exact response at the ticks."""
 
-    def __init__(self, rng, seconds=None, top_ratio=3.0):
+    def __init__(self, rng, seconds=None, top_ratio=3.0, rates=(500, 1000, 2000, 4000)):
         self.rng = rng
         self.modes, (self.low, self.high) = stage(rng, FAMILIES[int(rng.integers(len(FAMILIES)))])
-        self.rate = float(rng.choice([r for r in (500, 1000, 2000) if r > top_ratio * self.high] or [4000]))
+        self.rate = float(rng.choice([r for r in rates[:-1] if r > top_ratio * self.high] or rates[-1:]))
         self.seconds = seconds or float(rng.choice([20, 30]))
         self.amplitude = float(rng.uniform(0.02, 0.1))
         self.u = sweep(self.rate, self.seconds, self.low, self.high, self.amplitude)
         slowest = np.min(self.modes[:, 0] * self.modes[:, 1])
-        self.u = np.concatenate([self.u, np.zeros(int(9 / slowest * self.rate))])
+        self.rest = np.zeros(int(9 / slowest * self.rate))
+        self.u = np.concatenate([self.u, self.rest])
         self.noise = float(np.exp(rng.uniform(np.log(3e-4), np.log(3e-3))))
+
+    def excite(self, force):
+        """Replaces the sweep, with rest before and after."""
+        self.u = np.concatenate([np.zeros(int(self.rate)), force, np.zeros(int(4 * self.rate)), self.rest])
 
     @property
     def t(self):
@@ -485,6 +491,12 @@ def damper(rng):
             stiff[k, k - 1] -= spring[k]
     at = int(rng.integers(n))
     damp = 1e-4 * stiff + np.diag(np.eye(n)[at]) * rng.uniform(2, 20)
+    return of_matrices(b, mass, stiff, damp)
+
+
+def of_matrices(b, mass, stiff, damp):
+    """The record of masses with stiffness and damping matrices, with force and probe at random masses."""
+    rng, n = b.rng, len(mass)
     inverse = np.diag(1 / mass)
     a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiff, -inverse @ damp]])
     force, probe = np.zeros(2 * n), np.zeros(2 * n)
@@ -639,6 +651,171 @@ def clipped_input(rng):
     return b.record(y, u=np.clip(b.u, -limit, limit), causes=["clipped"], model_holds=False)
 
 
+# Other excitations.
+
+
+@kind("sweep of rising speed")
+def logarithmic(rng):
+    b = Bench(rng)
+    t = np.arange(int(b.seconds * b.rate)) / b.rate
+    growth = np.log(b.high / b.low) / b.seconds
+    window = np.sin(0.5 * np.pi * np.clip(np.minimum(t, b.seconds - t) / 0.5, 0, 1)) ** 2
+    b.excite(b.amplitude * window * np.sin(2 * np.pi * b.low / growth * np.expm1(growth * t)))
+    return b.record(b.noisy(b.motion()))
+
+
+@kind("sine in steps of frequency")
+def stepped_sine(rng):
+    b = Bench(rng)
+    frequencies = np.linspace(b.low, b.high, int(rng.integers(40, 120)))
+    each = np.maximum(np.round(rng.uniform(4, 10) * b.rate / frequencies), 0.3 * b.rate).astype(int)
+    angle = np.cumsum(np.repeat(2 * np.pi * frequencies / b.rate, each))
+    b.excite(b.amplitude * np.sin(angle))
+    return b.record(b.noisy(b.motion()))
+
+
+@kind("steps of the input")
+def steps(rng):
+    b = Bench(rng)
+    each = rng.uniform(0.2, 2.0, 200) / b.low
+    each = each[np.cumsum(each) < b.seconds]
+    b.excite(np.repeat(b.amplitude * rng.uniform(-1, 1, len(each)), (each * b.rate).astype(int)))
+    b.noise *= 0.1
+    # The power of steps falls with the square of frequency: modes lie above the band.
+    return b.record(b.noisy(b.motion()), causes=["beyond"])
+
+
+@kind("multisine whose period is not stated")
+def multisine_unstated(rng):
+    record = multisine(rng)
+    record.options = ["--hold", "zoh"]
+    record.causes |= {"start", "end"}
+    return record
+
+
+@kind("measured current of a drive")
+def measured_current(rng):
+    b = Bench(rng, top_ratio=6.0)
+    tau = rng.uniform(1.0, 4.0) / b.rate
+    current = np.real(state(-1 / tau, b.u, 1 / b.rate)) / tau
+    current += rng.uniform(1e-4, 3e-3) * np.std(current) * rng.standard_normal(len(current))
+    return b.record(b.noisy(through_lag(b, tau)), u=current, options=[], causes=["uncertain", "few modes", "misfit"], model_holds=False)
+
+
+@kind("voltage of a coil")
+def voltage(rng):
+    b = Bench(rng)
+    tau = float(rng.uniform(0.3e-3, 3e-3))
+    options = ["--hold", "zoh", "--input-kind", "voltage"]
+    return b.record(b.noisy(through_lag(b, tau)), options=options, causes=["uncertain", "few modes", "misfit", "complex", "lag"], model_holds=False)
+
+
+@kind("blow soon after the first sample")
+def blow(rng):
+    """As of an analyser with a pre-trigger of some samples."""
+    record = hammer(rng)
+    cut = int(record.rate) - int(rng.uniform(20, 200))
+    record.columns = {name: column[cut:] for name, column in record.columns.items()}
+    return record
+
+
+# Other times.
+
+
+@kind("jitter, regular times")
+def hidden_jitter(rng):
+    b = Bench(rng)
+    times = b.t + rng.uniform(0.005, 0.05) / b.rate * rng.standard_normal(len(b.u)).clip(-3, 3)
+    return b.record(b.noisy(b.at(b.motion(), np.clip(times, 0, b.t[-1]))))
+
+
+@kind("times rounded by their format")
+def rounded_times(rng):
+    b = Bench(rng, rates=(600, 1300, 2300, 4700))
+    decimals = int(np.ceil(-np.log10(1 / b.rate))) + int(rng.integers(0, 2))
+    return b.record(b.noisy(b.motion()), t=np.round(b.t, decimals))
+
+
+# Other stages.
+
+
+@kind("free body")
+def free_body(rng):
+    """A mass without a spring beside the modes. The command leaves it at rest, where it began."""
+    b = Bench(rng)
+    residue = rng.uniform(0.1, 2.0) * np.max(abs(b.modes[:, 2]))
+    active = np.flatnonzero(b.u)
+    span = np.linspace(-1, 1, active[-1] - active[0] + 1)
+    moments = np.stack([(1 - span**2) ** 2, span * (1 - span**2) ** 2])
+    part = b.u[active[0] : active[-1] + 1]
+    powers = np.stack([np.ones_like(span), span])
+    part -= np.linalg.solve(powers @ moments.T, powers @ part) @ moments
+    speed = np.concatenate([[0.0], np.cumsum(b.u)[:-1]]) / b.rate
+    place = np.concatenate([[0.0], np.cumsum(speed + 0.5 * b.u / b.rate)[:-1]]) / b.rate
+    y = b.motion() + residue * place
+    b.modes = np.vstack([[0.01, 0.0, residue], b.modes])
+    return b.record(b.noisy(y))
+
+
+@kind("mode above the band")
+def above(rng):
+    b = Bench(rng, top_ratio=5.0)
+    mode = [2 * np.pi * b.high * rng.uniform(1.2, 2.4), rng.uniform(0.003, 0.02), rng.choice([-1, 1]) * np.max(abs(b.modes[:, 2]))]
+    b.modes = np.vstack([b.modes, mode])
+    return b.record(b.noisy(b.motion()))
+
+
+@kind("all-pass in the channel")
+def all_pass(rng):
+    b = Bench(rng)
+    corner = np.pi * min(0.9, rng.uniform(0.5, 3) * b.high / (b.rate / 2))
+    if rng.random() < 0.5:
+        pole = (1 - np.tan(corner / 2)) / (1 + np.tan(corner / 2))
+        below = [1.0, -pole]
+    else:
+        radius = rng.uniform(0.6, 0.9)
+        below = [1.0, -2 * radius * np.cos(corner), radius**2]
+    y = lfilter(below[::-1], below, b.motion())
+    return b.record(b.noisy(y), causes=["misfit", "complex", "lag"], model_holds=False)
+
+
+@kind("gyroscopic")
+def gyroscopic(rng):
+    """Two masses of a rotor: the coupling of their velocities is antisymmetric, the residues are complex."""
+    b = Bench(rng)
+    mass = rng.uniform(0.3, 2.0, 2)
+    stiff = np.diag(rng.uniform(1e4, 1e5, 2))
+    stiff[0, 1] = stiff[1, 0] = -rng.uniform(0.0, 0.3) * np.min(np.diag(stiff))
+    gyro = rng.uniform(2.0, 60.0) * np.array([[0.0, 1.0], [-1.0, 0.0]])
+    return of_matrices(b, mass, stiff, 1e-4 * stiff + gyro)
+
+
+@kind("hysteresis of the guide")
+def dahl(rng):
+    """The friction of P. Dahl (1968): dF/dx = (F_c/x_c) (1 - F/F_c sgn v)."""
+    b = Bench(rng, seconds=10.0)
+    size, reach = rng.uniform(0.02, 0.3) * b.amplitude, rng.uniform(0.05, 0.5) * np.std(b.at_motor())
+    step, held = 1 / (8 * b.rate), [0.0]
+
+    def force(u, y, v):
+        rate = v / reach
+        # Exact for a constant velocity.
+        held[0] = np.sign(v) + (held[0] - np.sign(v)) * np.exp(-abs(rate) * step)
+        return u - size * held[0]
+
+    return b.record(b.noisy(integrated(b, force)), causes=["misfit", "nonlinear", "complex"], model_holds=False)
+
+
+@kind("play of the probe")
+def play(rng):
+    b = Bench(rng)
+    y = b.motion()
+    half, seen = rng.uniform(0.001, 0.02) * np.max(abs(y)), np.zeros(len(y))
+    for k in range(1, len(y)):
+        seen[k] = min(max(seen[k - 1], y[k] - half), y[k] + half)
+    return b.record(b.noisy(seen), causes=["misfit", "nonlinear", "complex"], model_holds=False)
+
+
 # What is done with a record.
 
 
@@ -673,9 +850,12 @@ def judged(record, answer):
 def intervals(record, answer):
     """Whether the 95 % intervals of frequency, damping and residue hold the truth, and the number of wrong signs that are shown as certain."""
     rows, wrong = [], 0
+    low, high = answer["band_hz"]
+    # A mode outside the band represents all that lies beyond it.
+    inside = [mode for mode in answer["modes"] if low <= mode["frequency_hz"] <= high]
     for w, zeta, r in record.modes:
         hz = w / (2 * np.pi)
-        near = min(answer["modes"], key=lambda m: abs(m["frequency_hz"] / hz - 1), default=None)
+        near = min(inside, key=lambda m: abs(m["frequency_hz"] / hz - 1), default=None)
         if near is None or abs(near["frequency_hz"] / hz - 1) > 0.02 or np.isnan(r):
             continue
         truth = {"frequency_hz": hz, "damping_ratio": zeta, "residue": r * record.scale}
