@@ -72,3 +72,29 @@ fn damaged_external_record_is_refused_or_finite() {
         external(&path, bytes, &at_rate) || is_timed
     });
 }
+
+/// The measurement files of LabVIEW are text as well: no more samples than lines.
+#[test]
+fn damaged_measurement_file_of_labview_is_refused_or_finite() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("record.lvm");
+    let of_file = "LabVIEW Measurement\nSeparator\tTab\nDecimal_Separator\t.\nX_Columns\t";
+    let keys = "Channels\t2\nSamples\t4\t4\nX_Dimension\tTime\tTime\nX0\t0.0\t0.0\nDelta_X\t0.001\t0.001\n***End_of_Header***\n";
+    let without_times = format!(
+        "{of_file}No\n***End_of_Header***\n\n{keys}X_Value\tx\ty\tComment\n\t1.0\t2.0\tfirst\n\t1.5\t2.5\n\t-1.0\t1e-3\n\t0.25\t-4\n"
+    );
+    let with_times = format!(
+        "{of_file}One\n***End_of_Header***\n\n{keys}X_Value\tx\ty\n0.0\t1.0\t2.0\n0.001\t1.5\t2.5\n0.002\t-1.0\t1e-3\n0.003\t0.25\t-4\n"
+    );
+    let columns = Columns {
+        input: "x".into(),
+        output: "y".into(),
+        reference: None,
+        sampling: Sampling::TimeColumn {
+            name: "time".into(),
+            unit: None,
+        },
+    };
+    let valid = [without_times.as_bytes(), with_times.as_bytes()];
+    check_damaged("LabVIEW", &valid, |bytes| external(&path, bytes, &columns));
+}

@@ -175,11 +175,11 @@ impl Header {
         }
     }
 
-    /// The abscissas of a channel by its first one and the step.
-    pub fn abscissas(&self, channel: usize, count: usize) -> Vec<f64> {
+    /// The first abscissa of a channel and the step to the next one.
+    pub fn first_and_step(&self, channel: usize) -> (f64, f64) {
         let first = self.first.get(channel).copied().unwrap_or(0.0);
         let step = self.step.get(channel).copied().unwrap_or(f64::NAN);
-        (0..count).map(|k| first + k as f64 * step).collect()
+        (first, step)
     }
 }
 

@@ -56,27 +56,24 @@ fn channels(
     samples: Samples,
     budget: &mut Budget,
 ) -> Result<Variables, ArraysError> {
+    let is_common = samples.have_common_abscissas(header);
     let mut abscissas = Vec::new();
-    for (k, channel) in samples.channels.iter().enumerate() {
+    let with_abscissas = if is_common { 1 } else { samples.channels.len() };
+    for (k, channel) in samples.channels.iter().take(with_abscissas).enumerate() {
         budget.take(channel.numbers.len(), 8)?;
-        abscissas.push(match samples.abscissas_of(k) {
-            Some(written) => written.to_vec(),
-            None => header.abscissas(k, channel.numbers.len()),
-        });
+        abscissas.push(samples.abscissas_of(header, k).collect::<Vec<f64>>());
     }
-    let is_common = abscissas.windows(2).all(|pair| pair[0] == pair[1]);
+    let mut abscissas = abscissas.into_iter();
     let (abscissa_name, abscissa_unit) = header.abscissa();
     let mut variables = Variables::new();
-    if let (Some(first), true) = (abscissas.first(), is_common) {
-        variables.push((
-            abscissa_name.clone(),
-            array(first.clone(), abscissa_unit.clone()),
-        ));
-    }
-    for (k, (channel, abscissas)) in samples.channels.into_iter().zip(abscissas).enumerate() {
-        if !is_common {
-            let name = format!("{}.{abscissa_name}", channel.name);
-            variables.push((name, array(abscissas, abscissa_unit.clone())));
+    for (k, channel) in samples.channels.into_iter().enumerate() {
+        if let Some(of_channel) = abscissas.next() {
+            let name = if is_common {
+                abscissa_name.clone()
+            } else {
+                format!("{}.{abscissa_name}", channel.name)
+            };
+            variables.push((name, array(of_channel, abscissa_unit.clone())));
         }
         variables.push((channel.name, array(channel.numbers, header.unit(k))));
     }

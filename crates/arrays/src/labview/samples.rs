@@ -17,7 +17,7 @@ pub(super) struct Channel {
 /// The channels, and the abscissas if they are written: of the first column, or one for each channel.
 pub(super) struct Samples {
     pub channels: Vec<Channel>,
-    pub abscissas: Vec<Vec<f64>>,
+    abscissas: Vec<Vec<f64>>,
 }
 
 impl Samples {
@@ -43,6 +43,8 @@ impl Samples {
             abscissas: vec![Vec::new(); places.abscissas()],
         };
         let mut lines = 0_usize;
+        // Of all channels: a number after an empty line would move up in time.
+        let mut has_ended = false;
         loop {
             let place = *file;
             let Some(line) = file.line() else {
@@ -50,18 +52,22 @@ impl Samples {
             };
             let row = cells(&text(line), of_file.separator);
             if row.iter().all(String::is_empty) {
+                has_ended = lines > 0;
                 continue;
             }
             if row[0] == "Channels" || row[0].starts_with("***") {
                 *file = place;
                 break;
             }
+            if has_ended {
+                return Err(place.damaged("a line with a number for each channel"));
+            }
             if lines.is_multiple_of(BLOCK) {
                 budget.take(BLOCK, 8 * places.cells() as u64)?;
             }
+            let read = samples.push(&row, lines, of_file, &places);
+            read.ok_or_else(|| place.damaged("a line with a number for each channel"))?;
             lines += 1;
-            let read = samples.push(&row, of_file, &places);
-            read.ok_or_else(|| place.damaged("a line of numbers"))?;
         }
         for (k, channel) in samples.channels.iter().enumerate() {
             let is_short = |stated: usize| channel.numbers.len() < stated;
@@ -69,32 +75,80 @@ impl Samples {
                 let error = file.damaged("as many samples as the header states");
                 return Err(error.in_variable(&channel.name));
             }
+            let is_without = |written: &[f64]| written.len() < channel.numbers.len();
+            if samples.written_abscissas(k).is_some_and(is_without) {
+                let error = file.damaged("an abscissa for each sample");
+                return Err(error.in_variable(&channel.name));
+            }
         }
         Ok(samples)
     }
 
-    /// The written abscissas of a channel: its own, or those of all channels.
-    pub fn abscissas_of(&self, channel: usize) -> Option<&[f64]> {
+    /// The abscissas of a channel: those written for it or for all channels, or else those by the header.
+    pub fn abscissas_of(
+        &self,
+        header: &Header,
+        channel: usize,
+    ) -> impl Iterator<Item = f64> + use<'_> {
+        let written = self.written_abscissas(channel);
+        let (first, step) = header.first_and_step(channel);
+        let count = self.channels[channel].numbers.len();
+        (0..count).map(move |k| match written {
+            // There is one for each sample, or `read` fails.
+            Some(written) => written[k],
+            None => first + k as f64 * step,
+        })
+    }
+
+    /// The abscissas that are written for a channel, or for all of them.
+    fn written_abscissas(&self, channel: usize) -> Option<&[f64]> {
         let own = self.abscissas.get(channel).or(self.abscissas.first());
         own.map(Vec::as_slice)
     }
 
-    /// Adds a line; `None` if it has something else than numbers. A channel with fewer samples has empty cells below them.
-    fn push(&mut self, row: &[String], of_file: &FileHeader, places: &Places) -> Option<()> {
+    /// Whether all channels have the abscissas of the first one.
+    pub fn have_common_abscissas(&self, header: &Header) -> bool {
+        (1..self.channels.len()).all(|k| {
+            self.abscissas_of(header, k)
+                .eq(self.abscissas_of(header, 0))
+        })
+    }
+
+    /// Adds a line after `lines`; `None` if it has something else than numbers, or a number below an empty cell.
+    fn push(
+        &mut self,
+        row: &[String],
+        lines: usize,
+        of_file: &FileHeader,
+        places: &Places,
+    ) -> Option<()> {
         for (k, channel) in self.channels.iter_mut().enumerate() {
-            let Some(text) = row.get(places.channel(k)).filter(|text| !text.is_empty()) else {
-                continue;
-            };
-            channel.numbers.push(of_file.number(text)?);
+            let cell = row.get(places.channel(k));
+            push_cell(&mut channel.numbers, cell, lines, of_file)?;
         }
         for (k, abscissas) in self.abscissas.iter_mut().enumerate() {
-            let Some(text) = row.get(places.abscissa(k)).filter(|text| !text.is_empty()) else {
-                continue;
-            };
-            abscissas.push(of_file.number(text)?);
+            push_cell(abscissas, row.get(places.abscissa(k)), lines, of_file)?;
         }
         Some(())
     }
+}
+
+/// Adds the cell of a column in a line after `lines`. A channel with fewer samples than others has empty cells below its last one, and
+/// only there: a number after an empty cell would move up in time.
+fn push_cell(
+    column: &mut Vec<f64>,
+    cell: Option<&String>,
+    lines: usize,
+    of_file: &FileHeader,
+) -> Option<()> {
+    let Some(text) = cell.filter(|text| !text.is_empty()) else {
+        return Some(());
+    };
+    if column.len() < lines {
+        return None;
+    }
+    column.push(of_file.number(text)?);
+    Some(())
 }
 
 /// Where the numbers stand in a line.

@@ -87,6 +87,39 @@ fn channels_with_times_of_their_own_keep_them() {
 }
 
 #[test]
+fn shorter_channel_has_as_many_of_the_common_times() {
+    let text = file_header("Comma", ".", "One")
+        + "Channels,2\nSamples,3,2\n***End_of_Header***\nX_Value,u,y,Comment\n0,1,10\n1,2,20\n2,3,\n";
+    assert_eq!(
+        series(text.as_bytes()),
+        expected(&[
+            ("u.time", "s", &[0.0, 1.0, 2.0]),
+            ("u", "", &[1.0, 2.0, 3.0]),
+            ("y.time", "s", &[0.0, 1.0]),
+            ("y", "", &[10.0, 20.0]),
+        ])
+    );
+}
+
+/// Ten channels of 1000 samples at the same times take 11 columns, not 20.
+#[test]
+fn common_times_are_kept_once() {
+    let line = |cell: &str| format!("\t{cell}").repeat(10);
+    let text = file_header("Tab", ".", "No")
+        + &format!(
+            "Channels\t10\nX0{}\nDelta_X{}\n***End_of_Header***\n",
+            line("0"),
+            line("1")
+        )
+        + &format!("X_Value{}\n", line("u"))
+        + &format!("{}\n", line("1")).repeat(1000);
+    // Room is taken for 4096 samples at a time.
+    let limit = 8 * (11 * 4096 + 1000) + 1000;
+    let read = variables(text.as_bytes(), &mut Budget::new(limit)).expect("a measurement");
+    assert_eq!(read.len(), 11);
+}
+
+#[test]
 fn several_measurements_are_numbered() {
     let text = file_header("Tab", ".", "No")
         + &measurement(["1", "2", "3"])
@@ -122,12 +155,37 @@ fn special_blocks_and_latin_1_are_read() {
 #[test]
 fn missing_samples_and_words_among_them_are_reported() {
     let head = file_header("Tab", ".", "No");
+    let without_time = file_header("Tab", ".", "One")
+        + "Channels\t1\n***End_of_Header***\nX_Value\tu\n0\t1\n\t2\n";
+    let error = read(without_time.as_bytes()).expect_err("a sample without a time");
+    assert!(error.to_string().contains("an abscissa for each sample"));
     for (body, what) in [
         (
             measurement(["1", "2", "3"]).replace("Samples\t3\t3", "Samples\t4\t4"),
             "as many samples as the header states",
         ),
-        (measurement(["1", "x", "3"]), "a line of numbers"),
+        (
+            measurement(["1", "x", "3"]),
+            "a line with a number for each channel",
+        ),
+        // The third sample of the first channel would become its second one.
+        (
+            measurement(["1", "", "3"]).replace("Samples\t3\t3", "Samples\t2\t3"),
+            "a line with a number for each channel",
+        ),
+        (
+            measurement(["1", "2", "3"])
+                .replace("Samples\t3\t3", "Samples\t2\t2")
+                .replace("\t2\t-0.5\r\n", "\r\n"),
+            "a line with a number for each channel",
+        ),
+        // A line with a sample of the first channel only.
+        (
+            measurement(["1", "2", "3"])
+                .replace("Samples\t3\t3", "Samples\t3\t2")
+                .replace("2\t-0.5", "2"),
+            "a line with a number for each channel",
+        ),
         (
             measurement(["1", "2", "3"]).replace("Channels\t2", "Channels\t200"),
             "a name for each channel",
