@@ -477,7 +477,7 @@ def digital_filter(rng):
 
 
 @kind("one damper")
-def damper(rng):
+def damper(rng, accelerometer=False):
     """A chain of masses with one damper: the damping is not proportional, the residues are complex."""
     b = Bench(rng)
     n = int(rng.integers(2, 4))
@@ -491,11 +491,12 @@ def damper(rng):
             stiff[k, k - 1] -= spring[k]
     at = int(rng.integers(n))
     damp = 1e-4 * stiff + np.diag(np.eye(n)[at]) * rng.uniform(2, 20)
-    return of_matrices(b, mass, stiff, damp)
+    return of_matrices(b, mass, stiff, damp, accelerometer)
 
 
-def of_matrices(b, mass, stiff, damp):
-    """The record of masses with stiffness and damping matrices, with force and probe at random masses."""
+def of_matrices(b, mass, stiff, damp, accelerometer=False):
+    """The record of masses with stiffness and damping matrices, with force and probe at random masses: of a held force and the position,
+    or of a force and an acceleration that are both measured."""
     rng, n = b.rng, len(mass)
     inverse = np.diag(1 / mass)
     a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ stiff, -inverse @ damp]])
@@ -509,12 +510,19 @@ def of_matrices(b, mass, stiff, damp):
     b.rate = float(np.ceil(4 * high / 100) * 100)
     b.u = sweep(b.rate, 20, 1.0, high, 0.1)
     b.u = np.concatenate([b.u, np.zeros(int(9 / np.min(-poles.real) * b.rate))])
-    y = sum(np.real(seen[k] * drive[k] * state(poles[k], b.u, 1 / b.rate)) for k in range(2 * n))
+    options = ["--hold", "zoh"]
+    if accelerometer:
+        options = ["--output-kind", "acceleration"]
+        s = 2j * np.pi * np.fft.rfftfreq(len(b.u), 1 / b.rate)
+        y = np.fft.irfft(s**2 * sum(seen[k] * drive[k] / (s - poles[k]) for k in range(2 * n)) * np.fft.rfft(b.u), len(b.u))
+    else:
+        y = sum(np.real(seen[k] * drive[k] * state(poles[k], b.u, 1 / b.rate)) for k in range(2 * n))
     left = np.block([[a, force[:, None]], [probe[None, :], np.zeros((1, 1))]])
     at = la.eigvals(left, np.diag([1.0] * (2 * n) + [0.0]))
     at = at[np.isfinite(at) & (abs(at) < 1e4)]
     modes = [[abs(p), -p.real / abs(p), np.nan] for p in poles if p.imag > 0]
-    return Record(np.array(modes), b.rate, b.columns(b.noisy(y)), causes=["misfit", "complex"], model_holds=False, zeros_at=at)
+    about = {"options": options, "causes": ["misfit", "complex"], "model_holds": False, "zeros_at": at}
+    return Record(np.array(modes), b.rate, b.columns(b.noisy(y)), **about)
 
 
 def integrated(b, force, substeps=8):
@@ -814,6 +822,11 @@ def play(rng):
     for k in range(1, len(y)):
         seen[k] = min(max(seen[k - 1], y[k] - half), y[k] + half)
     return b.record(b.noisy(seen), causes=["misfit", "nonlinear", "complex"], model_holds=False)
+
+
+@kind("one damper, measured force and acceleration")
+def damper_by_accelerometer(rng):
+    return damper(rng, accelerometer=True)
 
 
 # What is done with a record.

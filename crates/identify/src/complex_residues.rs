@@ -18,7 +18,7 @@
 //!
 //! The delay of the result is that with the smallest imaginary parts.
 //!
-//! An acceleration has no derivative that is observed, and is not tested.
+//! Samples of an acceleration by a held force are not tested ([`MeasurementChain::shows_rates`]).
 
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -106,7 +106,9 @@ pub(crate) fn complex_modes(
     chain: &MeasurementChain,
     max_modes: usize,
 ) -> Option<ModalFit> {
-    chain.derivative()?;
+    if !chain.shows_rates() {
+        return None;
+    }
     let complex = fit_few(data, chain, &Residues::complex(), max_modes.min(MAX_MODES)).ok()?;
     is_accepted(&complex, data, chain).then_some(complex)
 }

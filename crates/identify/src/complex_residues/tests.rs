@@ -10,7 +10,7 @@ use nalgebra::Complex;
 use super::*;
 use crate::modal::fit;
 use crate::verdict::{self, Cnmp};
-use crate::{Estimate, Frf, Identification, ResponseAnalysis, ResponseIdentification};
+use crate::{Estimate, Frf, Identification, OutputKind, ResponseAnalysis, ResponseIdentification};
 use stage::{CMP, CNMP, Stage};
 
 /// Data from 5 to 125 Hz.
@@ -219,13 +219,44 @@ fn a_velocity_is_no_position_with_complex_residues() {
     assert!(!is_accepted, "{:?}", complex.modes());
 }
 
+/// As a signal that is continuous in time, s^2 G with s^4 times the variance.
 #[test]
-fn an_acceleration_is_not_tested() {
-    let data = data(&CNMP, 6);
-    let chain = MeasurementChain::Direct.observing(crate::OutputKind::Acceleration);
+fn acceleration_has_the_modes_of_the_position() {
+    let chain = MeasurementChain::Direct.observing(OutputKind::Acceleration);
+    for stage in [CNMP, CMP] {
+        let mut data = data(&stage, 6);
+        for datum in &mut data {
+            let s = Complex::new(0.0, TAU * datum.frequency_hz);
+            datum.response *= s * s;
+            datum.variance *= (s * s).norm_sqr();
+        }
+        let real = fit(&data, &chain);
+        let fit = fit_complex(&data, &chain, &real).expect("complex residues");
+        assert_modes(&fit, &stage);
+    }
+}
+
+#[test]
+fn samples_of_an_acceleration_by_a_held_force_are_not_tested() {
+    let path = crate::modal::InputPath {
+        hold_s: 1.0 / RATE_HZ,
+        lag_s: 0.0,
+    };
     let real = Err(FitError::Undetermined { modes: 5 });
-    assert!(fit_complex(&data, &chain, &real).is_none());
-    assert!(fit_complex(&data, &MeasurementChain::Direct, &real).is_some());
+    for (output, is_tested) in [
+        (OutputKind::Velocity, true),
+        (OutputKind::Acceleration, false),
+    ] {
+        let chain = path.chain(RATE_HZ).observing(output);
+        let mut data = data(&CNMP, 6);
+        for datum in &mut data {
+            let s = Complex::new(0.0, TAU * datum.frequency_hz);
+            datum.response *= chain.continuous_response(s, 0.0);
+            datum.variance *= chain.continuous_response(s, 0.0).norm_sqr();
+        }
+        let found = fit_complex(&data, &chain, &real);
+        assert_eq!(found.is_some(), is_tested, "{output:?}");
+    }
 }
 
 /// n modes have 3 n + 2 parameters with real residues, and 4 n + 1 with complex ones, whose delay is fixed. 2 N chi^2 + k ln 2N, and 25 with more

@@ -236,21 +236,21 @@ impl Nodes {
         NodeResponse(mode.responses(&self.s, &self.path))
     }
 
-    /// The response of a mode of rate 1 s/kg, with the numerator s: the derivative by time of that of residue 1. Through the chain of
-    /// a bench it is that of the next kind of output; of an acceleration, which has none, it is 0.
+    /// The response of a mode of rate 1 s/kg, with the numerator s: the derivative by time of that of residue 1. Through the samples of a
+    /// bench it is that of the next kind of output; of an acceleration it is 0, see [`MeasurementChain::shows_rates`].
     pub(super) fn mode_rate(&self, term: &ModalTerm) -> NodeResponse {
-        let Some(chain) = self.chain.derivative() else {
+        if !matches!(self.path, ChainResponses::Bench(_)) {
+            let mut rates = self.mode(term);
+            let with_s = rates.0.iter_mut().zip(&self.s);
+            with_s.for_each(|(rate, s)| *rate *= s);
+            return rates;
+        }
+        let Some(output) = self.chain.output().derivative() else {
             return NodeResponse(vec![Complex::new(0.0, 0.0); self.s.len()]);
         };
+        let chain = self.chain.clone().observing(output);
         let mode = chain.observed(term.omega_rad_s, term.damping_ratio);
-        let mut rates = mode.responses(&self.s, &self.path);
-        // In samples of a bench the derivative is observed itself, elsewhere it is s times the mode: the nodes have the chain's own output.
-        if !matches!(self.path, ChainResponses::Bench(_)) {
-            for (rate, s) in rates.iter_mut().zip(&self.s) {
-                *rate *= s;
-            }
-        }
-        NodeResponse(rates)
+        NodeResponse(mode.responses(&self.s, &self.path))
     }
 
     /// The mean of a response over each datum, with the delay.
@@ -305,10 +305,12 @@ impl MeasurementChain {
         }
     }
 
-    /// The same chain with the derivative by time of its output; `None` of an acceleration.
-    pub(crate) fn derivative(&self) -> Option<MeasurementChain> {
-        let output = self.output().derivative()?;
-        Some(self.clone().observing(output))
+    /// Whether the data show complex residues. Of samples of an acceleration by a held force they do not: each step of the force gives an
+    /// impulse in the derivative of the acceleration, of which a sample shows nothing or all, by its delay. Those of all modes cancel, but not
+    /// those of the modes in the band.
+    pub(crate) fn shows_rates(&self) -> bool {
+        let is_bench = matches!(self, MeasurementChain::Bench(_));
+        !is_bench || self.output() != OutputKind::Acceleration
     }
 
     /// What is measured.
@@ -373,7 +375,7 @@ impl MeasurementChain {
 
     /// The response at s = j w from the samples of the command to the force and, with a delay of `delay_s` beyond that of the chain and
     /// the derivatives s^k of its output, from the position to the reading, without aliases: that of a signal that is continuous in time.
-    pub(super) fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
+    pub(crate) fn continuous_response(&self, s: Complex<f64>, delay_s: f64) -> Complex<f64> {
         let delay = unit_phasor(-s.im * delay_s) * self.output().factor(s);
         match self {
             MeasurementChain::Direct => delay,
