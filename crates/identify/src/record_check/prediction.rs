@@ -5,7 +5,8 @@
 //! y_k = sum a_i y_(k-i) + sum b_j u_(k-j) + e_k           i = 1 .. 8, j = 0 .. 8
 //! ```
 //!
-//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins an outlier. A spike counts if its square
+//! An error above 20 standard deviations of its neighbours (from their median magnitude) begins an outlier. Readings at irregular times have
+//! errors in proportion to the speed of the output, and where it is fast their standard deviation counts. A spike counts if its square
 //! exceeds 2 % of the energy of the noise over the record: smaller ones have no effect. Samples after a jump of the input, which
 //! excites more than the prediction describes, do not count. In a periodic record such defects differ from period to period and count
 //! as noise.
@@ -29,6 +30,8 @@ const MAX_EQUATIONS: usize = 100_000;
 const REGULARIZATION: f64 = 1e-12;
 /// Number of samples whose errors are compared.
 const BLOCK: usize = 2048;
+/// Number of samples with about the same speed whose errors are compared.
+const CLASS: usize = 256;
 /// Errors of the prediction beyond this many standard deviations are no noise.
 const DEFECT_SIGMAS: f64 = 20.0;
 /// The median magnitude of normally distributed numbers of standard deviation 1.
@@ -115,22 +118,39 @@ impl<'a> Prediction<'a> {
     /// The spikes and steps that have an effect.
     pub(super) fn outliers(&self) -> Vec<Outlier> {
         let mut found = Vec::new();
+        let is_above = |k: usize, sigma: f64| self.error[k].abs() > DEFECT_SIGMAS * sigma;
+        let exceeds_neighbours = |k: &usize| is_above(*k, self.sigma[k / BLOCK]);
+        let Some(first) = (ORDER..self.error.len()).find(exceeds_neighbours) else {
+            return found;
+        };
         let jumps_of_input = jumps(&self.signals.input);
-        let mut k = ORDER;
+        let noise = self.noise_by_speed();
+        let mut k = first;
         while k < self.error.len() {
-            if !self.is_outlier(k) || after_a_jump(&jumps_of_input, k) {
+            if !is_above(k, noise.sigma[k]) || after_a_jump(&jumps_of_input, k) {
                 k += 1;
                 continue;
             }
             let outlier = self.patterns.outlier(self.errors_from(k), k);
-            found.extend(outlier.filter(|outlier| self.has_effect(outlier)));
+            found.extend(outlier.filter(|outlier| self.has_effect(outlier, noise.energy)));
             k += REACH;
         }
         found
     }
 
-    fn is_outlier(&self, k: usize) -> bool {
-        self.error[k].abs() > DEFECT_SIGMAS * self.sigma[k / BLOCK]
+    /// The noise with the errors in proportion to the speed of the output.
+    fn noise_by_speed(&self) -> NoiseBySpeed {
+        let output = &self.signals.output;
+        let ratio = variance_by_speed(output, &self.error);
+        let sigma = |k: usize| {
+            let by_speed = (ratio * speed_squared_before(output, k)).sqrt();
+            by_speed.max(self.sigma[k / BLOCK])
+        };
+        let sigma: Vec<f64> = (0..self.error.len()).map(sigma).collect();
+        NoiseBySpeed {
+            energy: sigma.iter().map(|sigma| sigma * sigma).sum(),
+            sigma,
+        }
     }
 
     /// The heights of a spike or a step that begins at a known sample.
@@ -149,16 +169,14 @@ impl<'a> Prediction<'a> {
     /// Whether an outlier matters beside the noise: it exceeds one step of the output, and a short spike has some of the noise's energy. A
     /// jump of less than [`DEFECT_SIGMAS`] of the output that does not explain the errors is none: after a hammer, errors of the prediction
     /// itself exceed the noise.
-    fn has_effect(&self, outlier: &Outlier) -> bool {
+    fn has_effect(&self, outlier: &Outlier, energy: f64) -> bool {
         let Outlier { place, height, .. } = outlier;
         let exceeds_steps = height.abs() > MIN_STEPS * self.step;
         if place.shape == Shape::Step {
             let is_large = height.abs() > DEFECT_SIGMAS * self.noise();
             return exceeds_steps && (outlier.is_explained || is_large);
         }
-        let sigma = self.sigma[place.at / BLOCK];
-        exceeds_steps
-            && height * height > MIN_ENERGY_RATIO * sigma * sigma * self.error.len() as f64
+        exceeds_steps && height * height > MIN_ENERGY_RATIO * energy
     }
 
     fn defect(&self, outlier: Outlier) -> Defect {
@@ -169,6 +187,14 @@ impl<'a> Prediction<'a> {
             Shape::Step => Defect::Step { time_s, height },
         }
     }
+}
+
+/// The noise of the errors of each sample: that of its neighbours, or more where the output is fast.
+struct NoiseBySpeed {
+    /// Standard deviation of the error of each sample.
+    sigma: Vec<f64>,
+    /// Sum of its squares.
+    energy: f64,
 }
 
 /// Scales that make both signals of size 1.
@@ -225,6 +251,39 @@ fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
     }
     // Cholesky reads the lower triangle alone.
     Some(Cholesky::<f64, Dyn>::new(matrix)?.solve(&right))
+}
+
+/// Errors in proportion to the speed v of the output have the variance b v^2,
+///
+/// ```text
+/// b = min over classes of samples of about the same speed of sigma^2/v^2, v the largest speed of the class
+/// ```
+///
+/// With white noise alone, b is that of the fastest class, so that b v^2 is no more than the variance of the noise. Spikes raise the ratio of a
+/// class and do not count. 0 if fewer samples move than a class has.
+fn variance_by_speed(output: &[f64], error: &[f64]) -> f64 {
+    let every = (error.len() / MAX_EQUATIONS).max(1);
+    let samples = (0..error.len()).step_by(every);
+    let mut by_speed: Vec<(f64, f64)> = samples
+        .map(|k| (speed_squared_before(output, k), error[k]))
+        .collect();
+    by_speed.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
+    let moving = by_speed.partition_point(|(speed_squared, _)| *speed_squared == 0.0);
+    let ratio = |alike: &[(f64, f64)]| {
+        let errors: Vec<f64> = alike.iter().map(|(_, error)| *error).collect();
+        let (speed_squared, _) = alike[CLASS - 1];
+        sigma_by_median(&errors).powi(2) / speed_squared
+    };
+    let ratios = by_speed[moving..].rchunks_exact(CLASS).map(ratio);
+    ratios.reduce(f64::min).unwrap_or(0.0)
+}
+
+/// The mean square of the changes of the output before a sample, of as many as the prediction uses: the change to a spike is not one of
+/// them.
+fn speed_squared_before(output: &[f64], k: usize) -> f64 {
+    let change = |k: usize| (output[k] - output[k - 1]).powi(2);
+    let first = k.saturating_sub(ORDER).max(1);
+    (first..k).map(change).sum::<f64>() / ORDER as f64
 }
 
 fn sigma_by_median(errors: &[f64]) -> f64 {

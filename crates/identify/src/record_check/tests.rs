@@ -9,7 +9,6 @@ const RATE_HZ: f64 = 1000.0;
 
 /// 20 s of a mode of 30 Hz driven by a sweep, with 1 s of rest before and 4 s after, and noise of 1e-3.
 fn signals() -> Signals {
-    let (w, zeta, step) = (std::f64::consts::TAU * 30.0, 0.02, 1.0 / RATE_HZ);
     let mut noise = noise(7);
     let force = |n: usize| {
         let t = n as f64 / RATE_HZ - 1.0;
@@ -17,19 +16,26 @@ fn signals() -> Signals {
         fade * (std::f64::consts::TAU * (3.0 * t + 1.5 * t * t)).sin()
     };
     let input: Vec<f64> = (0..25_000).map(force).collect();
-    let (mut x, mut v) = (0.0, 0.0);
-    let output = input.iter().map(|u| {
-        let position = x;
-        // Semi-implicit Euler: any stable recursion of second order serves.
-        v += step * (w * w * (u - x) - 2.0 * zeta * w * v);
-        x += step * v;
-        position + 1e-3 * noise()
-    });
+    let output = motion(&input).into_iter().map(|y| y + 1e-3 * noise());
     Signals {
         rate_hz: RATE_HZ,
         output: output.collect(),
         input,
     }
+}
+
+/// The motion of the mode from rest.
+fn motion(input: &[f64]) -> Vec<f64> {
+    let (w, zeta, step) = (std::f64::consts::TAU * 30.0, 0.02, 1.0 / RATE_HZ);
+    let (mut x, mut v) = (0.0, 0.0);
+    let positions = input.iter().map(|u| {
+        let position = x;
+        // Semi-implicit Euler: any stable recursion of second order serves.
+        v += step * (w * w * (u - x) - 2.0 * zeta * w * v);
+        x += step * v;
+        position
+    });
+    positions.collect()
 }
 
 /// Numbers with a standard deviation of 1: sums of twelve uniform ones.
@@ -59,6 +65,77 @@ fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
 #[test]
 fn sound_record_has_no_defect() {
     assert_eq!(found_in(&signals(), Ends::Rest), []);
+}
+
+/// A burst of 0.3 s on the mode, with readings that are early or late by 0.05 samples (RMS): their errors are far above the noise for less
+/// than half of the block in which neighbours are compared.
+#[test]
+fn errors_of_irregular_readings_are_no_spikes() {
+    let mut input = vec![0.0; 25_000];
+    for (k, force) in input[9_000..9_300].iter_mut().enumerate() {
+        *force = (std::f64::consts::TAU * 30.0 * k as f64 / RATE_HZ).sin();
+    }
+    let motion = motion(&input);
+    let (mut noise, mut jitter) = (noise(3), noise(11));
+    let output: Vec<f64> = (0..input.len())
+        .map(|k| {
+            let change = motion[k] - motion[k.saturating_sub(1)];
+            motion[k] + 0.05 * jitter() * change + 1e-5 * noise()
+        })
+        .collect();
+    let mut signals = Signals {
+        rate_hz: RATE_HZ,
+        input,
+        output,
+    };
+    assert_eq!(found_in(&signals, Ends::Rest), []);
+    // A spike of the size of the motion is found all the same.
+    let largest = motion.iter().fold(0.0_f64, |max, y| max.max(y.abs()));
+    for at in [3_000, 9_200] {
+        let before = signals.output[at];
+        signals.output[at] += 2.0 * largest;
+        let found = found_in(&signals, Ends::Rest);
+        assert!(
+            matches!(found[..], [Defect::Spike { .. }]),
+            "{at}: {found:?}"
+        );
+        signals.output[at] = before;
+    }
+}
+
+/// After a blow on a mode that decays within 30 samples, so that fewer samples move than are compared, whatever is left over at the end of
+/// the record.
+#[test]
+fn spike_is_found_in_a_short_motion() {
+    for samples in [25_088, 25_343] {
+        let mut input = vec![0.0; samples];
+        for (k, force) in input[9_000..9_008].iter_mut().enumerate() {
+            *force = (std::f64::consts::PI * k as f64 / 8.0).sin();
+        }
+        let (w, zeta) = (std::f64::consts::TAU * 120.0, 0.05);
+        let pole = nalgebra::Complex::new(-zeta, f64::sqrt(1.0 - zeta * zeta)) * w;
+        let step = (pole / RATE_HZ).exp();
+        let mut q = nalgebra::Complex::new(0.0, 0.0);
+        let motion: Vec<f64> = input
+            .iter()
+            .map(|force| {
+                let position = q.im;
+                q = step * q + (step - 1.0) / pole * *force;
+                position
+            })
+            .collect();
+        let largest = motion.iter().fold(0.0_f64, |max, y| max.max(y.abs()));
+        let mut noise = noise(5);
+        let output = motion.iter().map(|y| y + 1e-3 * largest * noise());
+        let mut signals = Signals {
+            rate_hz: RATE_HZ,
+            output: output.collect(),
+            input,
+        };
+        signals.output[9_028] += 0.5 * largest;
+        let found = found_in(&signals, Ends::Rest);
+        assert!(matches!(found[..], [Defect::Spike { .. }]), "{found:?}");
+    }
 }
 
 #[test]
