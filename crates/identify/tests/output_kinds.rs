@@ -197,19 +197,27 @@ fn sign_of_the_static_response_is_that_of_the_sensor() {
     }
 }
 
+/// A velocity that is taken for a position has modes that do not describe it, or too many for the data to determine.
 #[test]
 fn modes_that_do_not_describe_the_stage_have_no_certain_sign() {
     let (kind, force) = (OutputKind::Velocity, Force::HeldReadBefore);
-    let record = record(&STAGE, kind, force, 1e-3, &mut Random(32));
-    let found = identified(None, force, &record);
-    assert_eq!(found.verdict.cnmp, Cnmp::Undecided);
-    assert_eq!(found.static_sign(), None);
-    let modes = found.verdict.modes(found.fit.as_ref().expect("modes"));
-    assert!(modes.len() > 1);
-    assert!(modes.iter().all(|mode| mode.certain_sign() == '?'));
-    let found = identified(Some(kind), force, &record);
-    let modes = found.verdict.modes(found.fit.as_ref().expect("modes"));
-    assert!(modes.iter().all(|mode| mode.certain_sign() == '+'));
+    let mut with_modes = 0;
+    for seed in 32..40 {
+        let record = record(&STAGE, kind, force, 1e-3, &mut Random(seed));
+        let found = identified(None, force, &record);
+        assert_eq!(found.verdict.cnmp, Cnmp::Undecided);
+        assert_eq!(found.static_sign(), None);
+        if let Ok(fit) = &found.fit {
+            let modes = found.verdict.modes(fit);
+            assert!(modes.len() > 1);
+            assert!(modes.iter().all(|mode| mode.certain_sign() == '?'));
+            with_modes += 1;
+        }
+        let found = identified(Some(kind), force, &record);
+        let modes = found.verdict.modes(found.fit.as_ref().expect("modes"));
+        assert!(modes.iter().all(|mode| mode.certain_sign() == '+'));
+    }
+    assert!(with_modes > 0);
 }
 
 /// One to three modes, the first one with a positive residue.

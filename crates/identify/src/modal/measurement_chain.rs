@@ -230,6 +230,19 @@ impl Nodes {
         turn_rad > ALIAS_PHASE_RAD * ALIAS_PHASE_RATIO.powi(path.output.derivatives())
     }
 
+    /// Whether aliases change the derivatives of a mode at the nodes: those of a mode above them, seen through samples.
+    pub(super) fn show_aliases_of(&self, term: &ModalTerm) -> bool {
+        let last_rad_s = self.s.last().map_or(0.0, |s| s.im);
+        matches!(self.path, ChainResponses::Bench(_)) && term.omega_rad_s > last_rad_s
+    }
+
+    /// The distance of the pole of a mode above all nodes from them, as a ratio of its frequency: about max(zeta, 1 - w_end/w).
+    pub(super) fn relative_distance(&self, term: &ModalTerm) -> f64 {
+        let last_rad_s = self.s.last().map_or(0.0, |s| s.im);
+        let beyond = 1.0 - last_rad_s / term.omega_rad_s;
+        beyond.max(term.damping_ratio)
+    }
+
     /// The response of a mode of residue 1, its own excluded.
     pub(super) fn mode(&self, term: &ModalTerm) -> NodeResponse {
         let mode = self.chain.observed(term.omega_rad_s, term.damping_ratio);
@@ -435,7 +448,8 @@ fn is_advanced(path: &SignalPath) -> bool {
 }
 
 /// d ln G/d w and d ln G/d zeta of a mode at s = j w: those of the continuous mode, from which sampling deviates by a
-/// thousandth near the mode. Factors s^k of the output do not change them.
+/// thousandth near the mode. Factors s^k of the output do not change them. For a mode far from all data, see
+/// [`Nodes::show_aliases_of`].
 pub(super) fn log_derivatives(term: &ModalTerm, omega_rad_s: f64) -> [Complex<f64>; 2] {
     let (s, w, zeta) = (
         Complex::new(0.0, omega_rad_s),

@@ -15,6 +15,7 @@
 //! The noise is that of the estimator first, and then the residual of the fit around each datum: where the model does not
 //! describe the data, the standard deviations grow accordingly.
 
+mod above_band;
 mod candidates;
 mod clusters;
 mod determined_delay;
@@ -48,7 +49,6 @@ pub use one_more_mode::OneMoreMode;
 pub use parameters::{ModalParameters, Parameter, Residues};
 pub(crate) use search::CoarseFit;
 pub use search::ModelOrder;
-use search::Starts;
 
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
@@ -121,8 +121,7 @@ pub(crate) fn rising_orders(
     let nodes = &chain.nodes(data, 0.0);
     let problem = Problem { chain, data, nodes };
     let progress = &mut |_| ControlFlow::Continue(());
-    let starts = Starts::Peaks;
-    let found = search::orders(problem, &Residues::Real, max_modes, starts, progress)?;
+    let found = search::orders(problem, &Residues::Real, max_modes, progress)?;
     Ok(found.parameters())
 }
 
@@ -152,13 +151,12 @@ fn fit_up_to(
     let band_hz = (first.frequency_hz, last.frequency_hz);
     let mut used = UsedData::all(data);
     let mut searched = 0.0_f64;
-    let mut starts = Starts::Peaks;
     loop {
         let data = &used.data;
         let nodes = &chain.nodes(data, 0.0);
         let problem = Problem { chain, data, nodes };
         // A search that is repeated makes no progress until it is farther than the one before.
-        let found = search::orders(problem, residues, max_modes, starts, &mut |done| {
+        let found = search::orders(problem, residues, max_modes, &mut |done| {
             searched = searched.max(SEARCH_PROGRESS * done);
             progress(searched)
         })?;
@@ -169,13 +167,7 @@ fn fit_up_to(
             continue;
         }
         report(progress, SEARCH_PROGRESS)?;
-        let fit = match final_fit(problem, best.parameters.clone()) {
-            Err(FitError::Undetermined { .. }) if starts == Starts::Peaks => {
-                starts = Starts::PeaksWithModeAbove;
-                continue;
-            }
-            result => result?,
-        };
+        let fit = final_fit(problem, best.parameters.clone())?;
         let lone = lone_data(problem, &fit.parameters);
         if used.can_leave_out(&lone) {
             used.leave_out(&lone);
@@ -281,9 +273,9 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
     let by_estimator = Solution::new(problem, start.clone());
     let freedom = 2 * data.len() - free;
     let chi2_per_freedom = by_estimator.chi2 / freedom as f64;
-    let fit = |solution: &Solution, data: &[FrfDatum]| {
+    let fit = |solution: &Solution, problem: Problem<'_>| {
         Some(ModalFit {
-            covariance: solution.covariance(data)?,
+            covariance: solution.covariance(problem)?,
             chi2_per_freedom,
             freedom,
             orders: Vec::new(),
@@ -293,7 +285,7 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
             left_out_hz: Vec::new(),
         })
     };
-    let Some(first) = fit(&by_estimator, data) else {
+    let Some(first) = fit(&by_estimator, problem) else {
         return Err(undetermined);
     };
     let noisy = &with_residual_noise(problem, &first, &by_estimator.residual);
@@ -304,5 +296,5 @@ fn with_covariance(problem: Problem<'_>, start: ModalParameters) -> Result<Modal
     // A mode may have moved past its neighbours.
     let refined = refine(problem, start, 0.0).parameters;
     let in_order = Solution::new(problem, refined.by_rising_frequency());
-    fit(&in_order, noisy).ok_or(undetermined)
+    fit(&in_order, problem).ok_or(undetermined)
 }

@@ -82,7 +82,7 @@ fn combined<'a>(below: impl Iterator<Item = &'a ModalTerm>, low_rad_s: f64) -> M
 /// the parameters, the mode of smallest residue, and 0.
 fn least_certain(problem: Problem<'_>, solution: &Solution) -> Option<(usize, f64)> {
     let parameters = &solution.parameters;
-    let Some(covariance) = solution.covariance(problem.data) else {
+    let Some(covariance) = solution.covariance(problem) else {
         let residues = parameters.complex_residues();
         let sizes: Vec<f64> = residues.iter().map(|residue| residue.norm()).collect();
         return index_of_smallest(&sizes).map(|index| (index, 0.0));

@@ -87,7 +87,7 @@ impl<'a> Iteration<'a> {
         let mut free = start.free();
         free.retain(|parameter| moving.includes(*parameter));
         let best = Solution::with_best_residues(problem, start);
-        let normal = best.normal_equations(problem.data, &moving);
+        let normal = best.normal_equations(problem, &moving);
         Self {
             problem,
             moving,
@@ -136,7 +136,7 @@ impl<'a> Iteration<'a> {
             return ControlFlow::Break(());
         }
         self.damping.decrease(decrease / predicted);
-        self.normal = self.best.normal_equations(self.problem.data, &self.moving);
+        self.normal = self.best.normal_equations(self.problem, &self.moving);
         ControlFlow::Continue(())
     }
 }

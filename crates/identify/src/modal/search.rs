@@ -8,6 +8,7 @@ use core::ops::ControlFlow;
 
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
+use super::above_band::{mode_above, with_last_mode_above};
 use super::candidates::{FREE_BODY, TRIALS, candidates, first_mode_starts};
 use super::clusters::cancelling;
 use super::error::{FitError, Progress, report};
@@ -16,7 +17,7 @@ use super::one_more_mode::OneMoreMode;
 use super::parameters::{ModalParameters, Residues};
 use super::peaks::peak_starts;
 use super::refine::{moves_all, refine, refine_near};
-use super::solution::{Problem, Solution};
+use super::solution::{Problem, Solution, better};
 use crate::FrfDatum;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
 use bench_plant::zeros::ModalTerm;
@@ -26,20 +27,6 @@ pub(super) const MAX_MODES: usize = 24;
 
 /// No data are left out below this number of data, as of the lines of a multisine.
 const MIN_DATA: usize = 400;
-
-/// Frequencies of a mode above the band, as multiples of its end, and its damping ratio.
-const ABOVE_BAND: [f64; 2] = [1.3, 2.0];
-const ABOVE_BAND_DAMPING: f64 = 0.01;
-
-/// Where the first pass begins, beside no mode.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Starts {
-    /// One mode at each peak of the response.
-    Peaks,
-    /// The same with one mode above the band. Modes are added within the band only, and many of them take its place, which the data do
-    /// not determine.
-    PeaksWithModeAbove,
-}
 
 /// One pass of the search.
 struct Pass {
@@ -129,7 +116,6 @@ pub(super) fn orders(
     problem: Problem<'_>,
     residues: &Residues,
     max_modes: usize,
-    starts: Starts,
     progress: &mut Progress<'_>,
 ) -> Result<Found, FitError> {
     let mut search = Search {
@@ -142,7 +128,7 @@ pub(super) fn orders(
         progress,
     };
     let [coarse, finer @ ..] = &PASSES;
-    search.run_from_best_start(coarse, problem, starts)?;
+    search.run_from_best_start(coarse, problem)?;
     for pass in finer {
         search.run(pass, problem)?;
     }
@@ -187,7 +173,7 @@ pub(super) fn coarse(problem: Problem<'_>, max_modes: usize) -> Result<CoarseFit
         done: 0.0,
         progress: &mut |_| ControlFlow::Continue(()),
     };
-    let cost = search.run_from_best_start(&PASSES[0], problem, Starts::Peaks)?;
+    let cost = search.run_from_best_start(&PASSES[0], problem)?;
     Ok(CoarseFit {
         cost,
         parameters: search.parameters,
@@ -220,20 +206,11 @@ struct Search<'a, 'p> {
 
 impl Search<'_, '_> {
     /// A pass from each start: the result with the fewest and most significant modes, and its cost.
-    fn run_from_best_start(
-        &mut self,
-        pass: &Pass,
-        problem: Problem<'_>,
-        starts: Starts,
-    ) -> Result<f64, FitError> {
+    fn run_from_best_start(&mut self, pass: &Pass, problem: Problem<'_>) -> Result<f64, FitError> {
         let data = &pass.data(problem.data, &self.parameters);
         let nodes = &problem.chain.nodes(data, self.parameters.delay_s);
         let chain = problem.chain;
-        let peaks = peak_starts(Problem { chain, data, nodes }, self.residues);
-        let starts = match starts {
-            Starts::Peaks => peaks,
-            Starts::PeaksWithModeAbove => with_mode_above(problem, &peaks),
-        };
+        let starts = peak_starts(Problem { chain, data, nodes }, self.residues);
         let by_one = self.cost_of_run(pass, problem)?;
         let first = (by_one, self.parameters.clone(), self.orders.clone());
         let mut best = first;
@@ -361,24 +338,6 @@ impl Pass {
     }
 }
 
-/// Each start with one mode above the band, in each place that samples can show.
-fn with_mode_above(problem: Problem<'_>, starts: &[ModalParameters]) -> Vec<ModalParameters> {
-    let end_rad_s = problem.data.last().map_or(0.0, FrfDatum::omega_rad_s);
-    let mut with_mode = Vec::new();
-    for omega_rad_s in ABOVE_BAND.map(|multiple| multiple * end_rad_s) {
-        if !problem.chain.is_below_nyquist(omega_rad_s) {
-            continue;
-        }
-        let mode = ModalTerm {
-            omega_rad_s,
-            damping_ratio: ABOVE_BAND_DAMPING,
-            residue_per_kg: 0.0,
-        };
-        with_mode.extend(starts.iter().map(|start| start.clone().with_mode(mode)));
-    }
-    with_mode
-}
-
 fn order(problem: Problem<'_>, solution: &Solution, evidence: f64) -> ModelOrder {
     let parameters = solution.parameters.clone();
     let freedom = (2 * problem.data.len())
@@ -409,10 +368,12 @@ fn with_another_mode(problem: Problem<'_>, solution: &Solution, tolerance: f64) 
     let mut best: Option<OneMoreMode> = None;
     for mode in candidates(problem, solution).into_iter().take(TRIALS) {
         let next = best_with(problem, &solution.parameters, mode, tolerance);
+        let next = with_last_mode_above(problem, solution, next, tolerance);
         if is_significant(&next) {
             return Another::Significant(next);
         }
-        let next = OneMoreMode::new(problem, solution, next, mode.omega_rad_s);
+        let near_rad_s = mode_above(problem, &next).unwrap_or(mode.omega_rad_s);
+        let next = OneMoreMode::new(problem, solution, next, near_rad_s);
         let is_better = |best: &OneMoreMode| next.probability > best.probability;
         if best.as_ref().is_none_or(is_better) {
             best = Some(next);
@@ -451,10 +412,6 @@ fn with_other_pairs(problem: Problem<'_>, solution: Solution, tolerance: f64) ->
     let starts = pairs.flat_map(|pair| parameters.with_pair_in_place(pair));
     let other = starts.map(|start| refine(problem, start, tolerance));
     other.fold(solution, better)
-}
-
-fn better(a: Solution, b: Solution) -> Solution {
-    if b.chi2 < a.chi2 { b } else { a }
 }
 
 /// The best solution with one mode, a free body included. All others build on it, so that all candidates are fitted.

@@ -8,11 +8,15 @@
 
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn};
 
-use super::measurement_chain::{MeasurementChain, NodeResponse, Nodes, log_derivatives};
+use super::measurement_chain::{Delays, MeasurementChain, NodeResponse, Nodes, log_derivatives};
 use super::normal_equations::{NormalEquations, WeightedColumns};
 use super::parameters::{ModalParameters, Moving, Parameter, Residues};
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
+
+/// Step of a quotient of differences in the pole of a mode, as a ratio of its distance to the data. The quotient deviates from the derivative
+/// by about as much, far less than a search needs, and by rounding of 1e-16/1e-4.
+const QUOTIENT_STEP: f64 = 1e-4;
 
 /// The data of a fit and the chain through which they were measured.
 #[derive(Clone, Copy)]
@@ -35,6 +39,12 @@ impl Problem<'_> {
     pub(super) fn significant_decrease(&self, residues: &Residues) -> f64 {
         let n = self.data.len() as f64;
         residues.parameters_per_mode() * (2.0 * n).ln() + 2.0 * n.ln()
+    }
+
+    /// By how much a preferred solution with as many parameters may exceed the chi^2 of another one: 2 ln N times the misfit, by which the best
+    /// of as many places as there are data gains by noise.
+    pub(super) fn choice_decrease(&self, chi2: f64) -> f64 {
+        2.0 * (self.data.len() as f64).ln() * self.misfit(chi2)
     }
 
     /// The decrease of chi^2 by the last mode of `next`, over the smallest significant one.
@@ -189,11 +199,21 @@ impl Solution {
 
     /// The normal equations of a step in those of ln w, ln zeta, r, q, R and, unless it is fixed, tau that move, in the order of
     /// [`ModalParameters::free`].
-    pub(super) fn normal_equations(&self, data: &[FrfDatum], moving: &Moving) -> NormalEquations {
+    pub(super) fn normal_equations(
+        &self,
+        problem: Problem<'_>,
+        moving: &Moving,
+    ) -> NormalEquations {
+        let data = problem.data;
+        let delays = problem.nodes.delays(self.parameters.delay_s);
         let mut columns = WeightedColumns::new(data);
         for (k, mode) in self.parameters.modes.iter().enumerate() {
             if mode.omega_rad_s != 0.0 && moving.includes(Parameter::Frequency(k)) {
-                let (by_omega, by_damping) = self.logarithm_columns(k, data);
+                let (by_omega, by_damping) = if self.needs_quotients(mode, problem.nodes) {
+                    self.logarithm_quotients(k, problem.nodes, &delays)
+                } else {
+                    self.logarithm_columns(k, data)
+                };
                 columns.add(by_omega.into_iter());
                 columns.add(by_damping.into_iter());
             }
@@ -213,6 +233,52 @@ impl Solution {
         });
         columns.add(by_delay);
         columns.normal_equations(self.residual.iter().copied())
+    }
+
+    /// Whether the derivatives of a continuous mode lead astray: of a mode above the data that is seen through samples. With complex
+    /// residues such a mode stands for a filter or a lag, which has no frequency to be found.
+    fn needs_quotients(&self, mode: &ModalTerm, nodes: &Nodes) -> bool {
+        self.rates.is_empty() && nodes.show_aliases_of(mode)
+    }
+
+    /// As [`Solution::logarithm_columns`] for a real residue, with the aliases of the mode: quotients of differences.
+    fn logarithm_quotients(
+        &self,
+        k: usize,
+        nodes: &Nodes,
+        delays: &Delays,
+    ) -> (Vec<Complex<f64>>, Vec<Complex<f64>>) {
+        let mode = self.parameters.modes[k];
+        // Both steps in proportion to the distance of the pole from the data: a step in ln zeta of a light mode changes nothing but rounding.
+        let step = QUOTIENT_STEP * nodes.relative_distance(&mode);
+        let faster = ModalTerm {
+            omega_rad_s: mode.omega_rad_s * (1.0 + step),
+            ..mode
+        };
+        let more_damped = ModalTerm {
+            damping_ratio: mode.damping_ratio + step,
+            ..mode
+        };
+        let step_of_logarithm = step / mode.damping_ratio;
+        (
+            self.difference_quotient(k, &faster, step, nodes, delays),
+            self.difference_quotient(k, &more_damped, step_of_logarithm, nodes, delays),
+        )
+    }
+
+    /// The change of the response of mode `k` with its real residue when it is moved to `moved`, divided by the step.
+    fn difference_quotient(
+        &self,
+        k: usize,
+        moved: &ModalTerm,
+        step: f64,
+        nodes: &Nodes,
+        delays: &Delays,
+    ) -> Vec<Complex<f64>> {
+        let factor = moved.residue_per_kg / step;
+        let responses = nodes.mean(&nodes.mode(moved), delays);
+        let pairs = responses.iter().zip(&self.modes[k]);
+        pairs.map(|(moved, mode)| (moved - mode) * factor).collect()
     }
 
     /// The derivatives of a mode's response to its ln w and ln zeta.
@@ -235,9 +301,9 @@ impl Solution {
 
     /// The covariance of w (rad/s), zeta, r (1/kg), q (s/kg) if residues are complex, of each mode, R (m/N) and tau (s) unless it is fixed, in the order of
     /// [`ModalParameters::free`]; `None` where the data do not determine them.
-    pub(super) fn covariance(&self, data: &[FrfDatum]) -> Option<DMatrix<f64>> {
+    pub(super) fn covariance(&self, problem: Problem<'_>) -> Option<DMatrix<f64>> {
         let free = self.parameters.free();
-        let (scale, unit) = self.normal_equations(data, &Moving::All).scaled()?;
+        let (scale, unit) = self.normal_equations(problem, &Moving::All).scaled()?;
         let inverse = Cholesky::<f64, Dyn>::new(unit)?.inverse();
         let factors = free.iter().zip(scale.iter());
         let factors: Vec<f64> = factors
@@ -256,6 +322,11 @@ impl Solution {
             _ => 1.0,
         }
     }
+}
+
+/// The solution of smaller chi^2.
+pub(super) fn better(a: Solution, b: Solution) -> Solution {
+    if b.chi2 < a.chi2 { b } else { a }
 }
 
 /// The responses of modes at the nodes of the data.
