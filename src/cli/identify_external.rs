@@ -19,6 +19,7 @@ use bench_identify::linearity::Linearity;
 use bench_identify::record_check::{Correction, Resolution};
 use bench_identify::{
     ClockSkew, Distortion, DistortionSource, InputKind, OutputKind, ReadingsFit, StaticSign,
+    SweepHarmonic,
 };
 use bench_order::ExternalOptions;
 use bench_report::MagnitudeAxis;
@@ -65,6 +66,8 @@ struct Report {
     readings_fit: Option<ReadingsFit>,
     /// Spikes and steps of the output that were corrected, and samples that were left out.
     corrections: Vec<Correction>,
+    /// Harmonics of a sweep in the output.
+    harmonics: Vec<SweepHarmonic>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
     clock_skew_ppm: Option<f64>,
     clock_skew_ppm_sigma: Option<f64>,
@@ -177,6 +180,7 @@ impl Report {
                 .and_then(|fit| fit.noise_before_rounding()),
             readings_fit: analysis.readings_fit,
             corrections: analysis.corrections.clone(),
+            harmonics: analysis.harmonics.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
             clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),
             clock_skew: analysis.clock_skew,

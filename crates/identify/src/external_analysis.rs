@@ -12,6 +12,7 @@ use crate::periodic_part::PeriodicPart;
 use crate::prepared::Prepared;
 use crate::record_check::{Correction, Resolution};
 use crate::static_sign::StaticSign;
+use crate::sweep_harmonics::SweepHarmonic;
 use crate::verdict::{Cnmp, Verdict};
 use bench_plant::{InputKind, OutputKind};
 
@@ -48,6 +49,8 @@ pub struct ExternalAnalysis {
     pub readings_fit: Option<ReadingsFit>,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
+    /// Harmonics of a sweep in the output, which a linear plant does not have.
+    pub harmonics: Vec<SweepHarmonic>,
     /// Where the signals come from.
     pub(super) source: Source,
     /// Whether it is known why modes do not describe the response: a defect, a cut, or another kind of output.
@@ -88,6 +91,7 @@ impl ExternalAnalysis {
             resolution: prepared.resolution,
             readings_fit: None,
             clock_skew: None,
+            harmonics: prepared.harmonics.clone(),
             source,
             is_explained: false,
             is_plausible: judged.is_plausible,

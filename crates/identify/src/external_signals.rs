@@ -6,6 +6,7 @@ use crate::periodic::Repetition;
 use crate::record_check::{self, Checked, Corrected, Defect, Ends, Resolution, StrayLine};
 use crate::remedies::{OF_LOOP, OF_SIGNALS, Remedies};
 use crate::steady_input::is_steady;
+use crate::sweep_harmonics::{SweepHarmonic, harmonics};
 use crate::{
     EstimatorSettings, Frf, IdentifyError, IdentifySettings, Signals, excited_band_hz, joint,
 };
@@ -129,6 +130,11 @@ impl<'a> ExternalSignals<'a> {
             input: Resolution::of(self.signals).input,
             ..Resolution::of(&self.excited())
         }
+    }
+
+    /// The harmonics of the excitation in the output.
+    pub(super) fn harmonics(&self) -> Vec<SweepHarmonic> {
+        harmonics(&self.excited())
     }
 
     /// The first defect of each kind, and the readings that are left; `cleaned` is the record without its stray lines.

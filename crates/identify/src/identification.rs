@@ -14,11 +14,12 @@ use crate::other_kind::clear_kind;
 use crate::part::Part;
 use crate::periodic::Repetition;
 use crate::plausibility::{
-    OtherModel, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
-    undescribed_steps, unless_undetermined,
+    OtherModel, clipped, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
+    nonlinear, undescribed_steps, unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
 use crate::record_check::{Correction, Ends};
+use crate::sweep_harmonics::SweepHarmonic;
 use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
@@ -244,6 +245,9 @@ impl Identification {
         // Many modes would be fitted to the turn of two clocks in vain.
         let compares_first =
             !prepared.few_modes_describe() && !prepared.complex_residues_describe();
+        if compares_first && prepared.is_nonlinear() {
+            return self.analysed(prepared, None);
+        }
         if compares_first && let Some(analysis) = self.with_one_clock(prepared)? {
             return Ok(analysis);
         }
@@ -436,7 +440,10 @@ impl Identification {
         let lost = prepared.why_readings_fail().into_iter();
         let defects = prepared.defects.iter().map(ToString::to_string);
         let known: Vec<String> = defects.chain(lost.map(str::to_owned)).collect();
-        let known = listed(&known).or_else(|| known_cause(&observation));
+        let known = listed(&known)
+            .or_else(|| clipped(&observation, &cleaned.signals.input))
+            .or_else(|| known_cause(&observation))
+            .or_else(|| nonlinear(&observation, &prepared.harmonics));
         // What is missing of a record that is cut is easily taken for another model.
         let is_explained = known.is_some() || prepared.cut.is_some();
         let why = known.or_else(|| implausible(&observation));
@@ -449,7 +456,9 @@ impl Identification {
             Some(cut) if prepared.defects.is_empty() => due_to_cut(verdict, cut),
             _ => verdict,
         };
-        let cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
+        let mut cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
+        let harmonics = prepared.harmonics.iter().map(SweepHarmonic::description);
+        cautions.extend(harmonics.filter(|text| !verdict.why.contains(text)));
         let input_path = self.input_path;
         let found = Judged {
             frf: frf.clone(),

@@ -73,6 +73,7 @@ mod settings;
 mod signals;
 mod static_sign;
 mod steady_input;
+mod sweep_harmonics;
 mod timing;
 pub mod verdict;
 pub mod welch;
@@ -97,6 +98,7 @@ pub use periodic_part::{Distortion, DistortionSource, PeriodicPart};
 pub use settings::{Estimator, EstimatorSettings, IdentifySettings, LocalModel, ResolutionPoint};
 pub use signals::Signals;
 pub use static_sign::StaticSign;
+pub use sweep_harmonics::SweepHarmonic;
 pub use timing::{resampling, setpoint_timing};
 
 /// The frequency response by the estimator that the configuration selects, with its data for a fit.

@@ -10,6 +10,7 @@ use crate::modal::{FitError, MeasurementChain, ModalFit, ModeGroup};
 use crate::observation::{Observation, describes};
 use crate::other_kind::{better_kind, explained_by_kind, swapped, vanishes_at_rest};
 use crate::record_check::{Ends, Resolution};
+use crate::sweep_harmonics::SweepHarmonic;
 use crate::verdict::{Cnmp, Verdict};
 use crate::{Frf, record_check};
 
@@ -34,6 +35,9 @@ const MANY_MODES: usize = 8;
 const CLOSED_LOOP: &str =
     "if the record was taken in closed loop, give the column of its reference (--reference)";
 
+/// What to do about a plant that is not linear.
+const HALF_AMPLITUDE: &str = "compare a record with half of the amplitude: if its harmonics are a smaller part, lower the amplitude (a limit, or a stiffness that depends on the amplitude), or else increase it (friction, play)";
+
 /// Why modes do not describe the data, if that is known: little of the output is that of the input, or it is of another kind.
 pub(super) fn known_cause(seen: &Observation<'_>) -> Option<String> {
     let of = seen.remedies;
@@ -47,6 +51,21 @@ pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
         .or_else(|| vanishes_at_rest(seen))
         .or_else(|| grows_with_frequency(seen))
         .or_else(|| with_remedy(early(seen), seen.remedies.early))
+}
+
+/// An input that seems clipped, if modes do not describe the response. (A drive at its limit, whose input is measured, is linear.)
+pub(super) fn clipped(seen: &Observation<'_>, input: &[f64]) -> Option<String> {
+    let is_misfit = !seen.fit.as_ref().is_ok_and(describes);
+    let limit = record_check::limit_of_input(input).filter(|_| is_misfit);
+    limit.map(clipped_input)
+}
+
+/// Harmonics that are too large for a linear plant, if modes do not describe the response.
+pub(super) fn nonlinear(seen: &Observation<'_>, harmonics: &[SweepHarmonic]) -> Option<String> {
+    let is_misfit = !seen.fit.as_ref().is_ok_and(describes);
+    let are_large = harmonics.iter().any(SweepHarmonic::is_large);
+    let found: Vec<String> = harmonics.iter().map(SweepHarmonic::description).collect();
+    (is_misfit && are_large).then(|| format!("{}; {HALF_AMPLITUDE}", found.join("; ")))
 }
 
 fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {

@@ -12,8 +12,9 @@ use crate::periodic::Repetition;
 use crate::periodic_part::{PeriodicPart, fit_of_periods};
 use crate::plausibility::cut_within_excitation;
 use crate::record_check::{
-    Checked, Correction, Defect, Ends, LostReadings, Reading, Resolution, StrayLine,
+    Checked, Correction, Defect, Ends, LostReadings, Reading, Resolution, StrayLine, limit_of_input,
 };
+use crate::sweep_harmonics::SweepHarmonic;
 use crate::{Frf, IdentifyError, Signals};
 use bench_plant::{OutputKind, SignalPath};
 
@@ -49,6 +50,8 @@ pub(super) struct Prepared<'a> {
     pub(super) defects: Vec<Defect>,
     /// The readings that are left, if the defects are lost ones.
     lost: Option<LostReadings>,
+    /// Harmonics of a sweep in an output without defects.
+    pub(super) harmonics: Vec<SweepHarmonic>,
     /// What is missing of a record that is cut within its excitation.
     pub(super) cut: Option<String>,
     pub(super) frf: Frf,
@@ -93,8 +96,16 @@ impl<'a> Prepared<'a> {
         };
         let assumed = source.chain(stated.output_kind.unwrap_or_default(), &frf.data);
         let Checked { defects, lost } = record.checked(&cleaned);
+        let resolution = record.resolution();
+        // Steps and defects have harmonics of their own.
+        let harmonics = if defects.is_empty() && resolution.output.is_none() {
+            cleaned.harmonics()
+        } else {
+            Vec::new()
+        };
         Ok(Prepared {
-            resolution: record.resolution(),
+            resolution,
+            harmonics,
             defects,
             lost,
             cut: cut_within_excitation(cleaned),
@@ -214,6 +225,12 @@ impl<'a> Prepared<'a> {
             ..self.record
         };
         record.response(self.band_hz)
+    }
+
+    /// Whether the output has large harmonics of the input, or the input is clipped: no linear model describes that, nor do two clocks.
+    pub(super) fn is_nonlinear(&self) -> bool {
+        let has_large = self.harmonics.iter().any(SweepHarmonic::is_large);
+        has_large || limit_of_input(&self.record.signals.input).is_some()
     }
 
     /// Whether a few modes describe a part of the response.
