@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bench_experiment::{ExperimentError, MotorError, MotorHandling, Runner, Setup};
 use bench_rig::motor::{Moment, MotorOrigin};
 use bench_rt::thread::Pace;
-use bench_test_support::program::catches_interrupt;
+use bench_test_support::program::waits_for_signals;
 
 use crate::motor::common::{LIMIT_A, hot, memory, refusal, run};
 
@@ -111,7 +111,7 @@ fn in_a_child_a_wait() {
 fn signal_ends_the_wait_without_a_run() {
     let folder = tempfile::tempdir().expect("a folder");
     let mut child = child("in_a_child_a_wait", folder.path());
-    until("the wait", || catches_interrupt(child.id()));
+    until("the wait", || waits_for_signals(child.id()));
     signal(&child, libc::SIGINT);
     assert!(child.wait().expect("it ends").success());
     assert!(!folder.path().join("recordings").exists());

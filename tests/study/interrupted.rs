@@ -5,7 +5,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::study::figures::XY;
-use crate::study::program::{Bench, catches_interrupt};
+use crate::study::program::{Bench, waits_for_signals};
 
 /// More draws than a test lets the program complete.
 const LONG: &str = "--draws 3000000 --threads 2";
@@ -116,7 +116,7 @@ fn signals_leave_a_complete_file_and_report_how_to_continue() {
     let bench = Bench::new();
     let mut running = start(&bench, &format!("{XY} {LONG} --csv draws.csv"));
     until(&mut running, "the program handles signals", |child| {
-        catches_interrupt(child.id())
+        waits_for_signals(child.id())
     });
     running.signal(libc::SIGINT);
     let output = running.end();

@@ -174,13 +174,15 @@ impl Answer {
     }
 }
 
-/// Whether a process catches SIGINT: bit 1 of `SigCgt` [Linux, proc_pid_status(5)].
-pub fn catches_interrupt(process: u32) -> bool {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status"));
-    let status = status.unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
-    let mask = mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok());
-    mask.is_some_and(|mask| mask & 0b10 != 0)
+/// Whether a process works until a stop signal: it has the thread of that work, which begins after the process waits for signals. (Its
+/// handlers alone do not tell that. A signal that arrives between them and the wait ends the process.)
+pub fn waits_for_signals(process: u32) -> bool {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task"));
+    let mut threads = threads.into_iter().flatten().flatten();
+    threads.any(|thread| {
+        let name = std::fs::read_to_string(thread.path().join("comm"));
+        name.is_ok_and(|name| name.trim_end() == "bench-analysis")
+    })
 }
 
 /// Waits until every thread of a process that got SIGSTOP is stopped or has ended. The signal returns before they are, and a thread that
