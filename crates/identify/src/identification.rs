@@ -441,7 +441,7 @@ impl Identification {
         let defects = prepared.defects.iter().map(ToString::to_string);
         let known: Vec<String> = defects.chain(lost.map(str::to_owned)).collect();
         let known = listed(&known)
-            .or_else(|| clipped(&observation, &cleaned.signals.input))
+            .or_else(|| clipped(&observation, prepared.input_limit()))
             .or_else(|| known_cause(&observation))
             .or_else(|| nonlinear(&observation, &prepared.harmonics));
         // What is missing of a record that is cut is easily taken for another model.

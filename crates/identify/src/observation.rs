@@ -66,6 +66,13 @@ pub(super) struct Observation<'a> {
     pub(super) remedies: &'a Remedies,
 }
 
+impl Observation<'_> {
+    /// Whether the fit describes the response.
+    pub(super) fn is_described(&self) -> bool {
+        self.fit.as_ref().is_ok_and(describes)
+    }
+}
+
 /// Whether the fit describes the data.
 pub(super) fn describes(fit: &ModalFit) -> bool {
     fit.chi2_per_freedom <= MAX_CHI2_PER_FREEDOM

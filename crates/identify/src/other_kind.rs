@@ -40,7 +40,7 @@ pub(super) fn clear_kind(seen: &Observation<'_>) -> Option<OutputKind> {
         Err(FitError::Undetermined { modes }) => *modes,
         Err(_) => return None,
     };
-    let is_described = few.as_ref().is_ok_and(describes);
+    let is_described = seen.is_described();
     if is_described && !few.as_ref().is_ok_and(|few| is_suspect(few, seen)) {
         return None;
     }
@@ -91,7 +91,7 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
 
 /// Exchanged columns: modes describe the inverse of a response that they do not describe.
 pub(super) fn swapped(seen: &Observation<'_>) -> Option<String> {
-    let is_described = seen.fit.as_ref().is_ok_and(describes);
+    let is_described = seen.is_described();
     let is_known = seen.output_step.is_none();
     (!is_described && is_known && inverse_fits(seen))
         .then(|| format!("{SWAPPED}; {}", seen.remedies.swapped))

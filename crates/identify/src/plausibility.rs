@@ -54,18 +54,16 @@ pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
 }
 
 /// An input that seems clipped, if modes do not describe the response. (A drive at its limit, whose input is measured, is linear.)
-pub(super) fn clipped(seen: &Observation<'_>, input: &[f64]) -> Option<String> {
-    let is_misfit = !seen.fit.as_ref().is_ok_and(describes);
-    let limit = record_check::limit_of_input(input).filter(|_| is_misfit);
+pub(super) fn clipped(seen: &Observation<'_>, input_limit: Option<f64>) -> Option<String> {
+    let limit = input_limit.filter(|_| !seen.is_described());
     limit.map(clipped_input)
 }
 
 /// Harmonics that are too large for a linear plant, if modes do not describe the response.
 pub(super) fn nonlinear(seen: &Observation<'_>, harmonics: &[SweepHarmonic]) -> Option<String> {
-    let is_misfit = !seen.fit.as_ref().is_ok_and(describes);
     let are_large = harmonics.iter().any(SweepHarmonic::is_large);
     let found: Vec<String> = harmonics.iter().map(SweepHarmonic::description).collect();
-    (is_misfit && are_large).then(|| format!("{}; {HALF_AMPLITUDE}", found.join("; ")))
+    (!seen.is_described() && are_large).then(|| format!("{}; {HALF_AMPLITUDE}", found.join("; ")))
 }
 
 fn with_remedy(what: Option<String>, remedy: &str) -> Option<String> {

@@ -229,8 +229,12 @@ impl<'a> Prepared<'a> {
 
     /// Whether the output has large harmonics of the input, or the input is clipped: no linear model describes that, nor do two clocks.
     pub(super) fn is_nonlinear(&self) -> bool {
-        let has_large = self.harmonics.iter().any(SweepHarmonic::is_large);
-        has_large || limit_of_input(&self.record.signals.input).is_some()
+        self.harmonics.iter().any(SweepHarmonic::is_large) || self.input_limit().is_some()
+    }
+
+    /// The limit of the recorded input, if that is clipped. (Without its stray lines it would not stay at a limit.)
+    pub(super) fn input_limit(&self) -> Option<f64> {
+        limit_of_input(&self.record.signals.input)
     }
 
     /// Whether a few modes describe a part of the response.
