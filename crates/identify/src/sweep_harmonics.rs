@@ -36,15 +36,18 @@ const BESIDE: [isize; 4] = [-2, -1, 1, 2];
 /// A harmonic counts where it exceeds the largest of these by this factor. Noise of equal power does so in 1 of 4845 windows: with
 /// exponential squares, E[exp(-16 max)] = 4 B(17, 4).
 const MIN_RATIO_TO_NOISE: f64 = 4.0;
-/// A harmonic is found if it counts in this many windows, and in this part of all: noise does not in a million records.
+/// A harmonic is found if it counts in this many windows, and in this part of all. Noise does so in less than one of 10^5 records: most
+/// likely in one of 250 windows, which overlap by half, so that it has to in 3 of 125 independent ones: C(125, 3)/4845^3 = 3e-6.
 const MIN_WINDOWS: usize = 5;
 const MIN_PART: f64 = 0.02;
-/// The plant responds to a harmonic of the input as well. One that is smaller than this part of that of the output does not cause it, unless
-/// it lies at a resonance ...
+/// The plant responds to a harmonic of the input as well, in proportion to |H(k f)/H(f)|: up to 100 at a resonance of a damping ratio of
+/// 0.5 %. One that is smaller than this part of that of the output does not cause it.
 const MAX_INPUT_RATIO: f64 = 0.01;
-/// ... and with a larger harmonic, as of an input that is clipped, the phase is none of a sweep.
+/// Input harmonics above this part of the fundamental turn its phase by as many radians, which gives harmonics in the output of a linear plant
+/// of up to half of [`LARGE_RATIO`] together with those passed on: those of an input that is clipped do not count.
 const MAX_INPUT_HARMONIC: f64 = 0.003;
-/// A linear model describes the rest of a response with smaller harmonics: they deviate from it like noise.
+/// A larger harmonic shows that no linear model describes the response: q + c q^3 changes the fundamental by three times as much as it has
+/// of the third harmonic (3/4 and 1/4 of c), so by 3 %, which a fit does not take for noise.
 const LARGE_RATIO: f64 = 0.01;
 /// The input is a sweep where its envelope exceeds this ratio of the largest.
 const ACTIVE_RATIO: f64 = 0.1;

@@ -59,14 +59,12 @@ impl Samples {
                 *file = place;
                 break;
             }
-            if has_ended {
-                return Err(place.damaged("a line with a number for each channel"));
-            }
             if lines.is_multiple_of(BLOCK) {
                 budget.take(BLOCK, 8 * places.cells() as u64)?;
             }
-            let read = samples.push(&row, lines, of_file, &places);
-            read.ok_or_else(|| place.damaged("a line with a number for each channel"))?;
+            let read = (!has_ended).then(|| samples.push(&row, lines, of_file, &places));
+            read.flatten()
+                .ok_or_else(|| place.damaged("a line with a number for each channel"))?;
             lines += 1;
         }
         for (k, channel) in samples.channels.iter().enumerate() {
