@@ -272,15 +272,31 @@ def print_row(truth, result):
     print(line((*cells, f"{result['seconds']:.2f}", result["by_hand"])), flush=True)
 
 
+def of_program(results, program):
+    """The results of one program, in the order of the stages."""
+    return [result for result in results if result["program"] == program]
+
+
+def wrong_signs(result):
+    """Number of wrong signs, without the uncertain ones."""
+    return int(result["signs"].split()[0])
+
+
 def print_summary(results):
     for program in ("bench", "sdypy-EMA", "vector fitting"):
-        own = [result for result in results if result["program"] == program]
-        frequency, damping, residue = (f"{100 * part:.3g} %" for part in np.nanmedian([result["errors"] for result in own], axis=0))
+        own = of_program(results, program)
+        errors = np.array([result["errors"] for result in own])
+        frequency, damping, residue = (f"{100 * part:.3g} %" for part in np.nanmedian(errors, axis=0))
         verdicts = [result["verdict"] for result in own]
         counts = ", ".join(f"{verdicts.count(word)} {word}" for word in ("right", "undecided", "WRONG"))
         seconds = np.median([result["seconds"] for result in own])
         medians = f"{frequency} frequency, {damping} damping, {residue} residue, {seconds:.2f} s"
         print(f"{program}, {len(own)} stages: medians {medians}; verdicts: {counts}")
+        ratios = errors / [result["errors"] for result in of_program(results, "bench")]
+        frequency, damping, residue = (f"{ratio:.3g}" for ratio in np.nanmedian(ratios, axis=0))
+        complete = sum(len(set(result["found"].split("/"))) == 1 for result in own)
+        print(f"    errors over those of bench on the same stage, medians: {frequency} frequency, {damping} damping, {residue} residue")
+        print(f"    all modes found: {complete} stages; wrong signs: {sum(wrong_signs(result) for result in own)}")
 
 
 def random_stage(k, chosen, folder):
