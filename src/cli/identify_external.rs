@@ -66,6 +66,8 @@ struct Report {
     readings_fit: Option<ReadingsFit>,
     /// Spikes and steps of the output that were corrected, and samples that were left out.
     corrections: Vec<Correction>,
+    /// Standard deviation of the times of the readings, if they are irregular and not stated.
+    jitter_s: Option<f64>,
     /// Harmonics of a sweep in the output.
     harmonics: Vec<SweepHarmonic>,
     /// By how much the clock of the output is slower than that of the input, with its standard deviation; `null` for one clock.
@@ -180,6 +182,7 @@ impl Report {
                 .and_then(|fit| fit.noise_before_rounding()),
             readings_fit: analysis.readings_fit,
             corrections: analysis.corrections.clone(),
+            jitter_s: analysis.jitter_s,
             harmonics: analysis.harmonics.clone(),
             clock_skew_ppm: analysis.clock_skew.map(|skew| skew.ppm().value),
             clock_skew_ppm_sigma: analysis.clock_skew.map(|skew| skew.ppm().sigma),

@@ -52,6 +52,7 @@ CAUSES = {
     "few modes": r"fewer than two modes",
     "gap": r"fill the gap",
     "unit": r"--time-unit",
+    "jitter": r"times scatter",
     "times": r"only the times are inaccurate|not rising|earlier than",
     "opposite": r"no two neighbouring modes",
     "reference": r"--reference",
@@ -734,7 +735,7 @@ def blow(rng):
 def hidden_jitter(rng):
     b = Bench(rng)
     times = b.t + rng.uniform(0.005, 0.05) / b.rate * rng.standard_normal(len(b.u)).clip(-3, 3)
-    return b.record(b.noisy(b.at(b.motion(), np.clip(times, 0, b.t[-1]))))
+    return b.record(b.noisy(b.at(b.motion(), np.clip(times, 0, b.t[-1]))), causes=["jitter"])
 
 
 @kind("times rounded by their format")

@@ -49,6 +49,8 @@ pub struct ExternalAnalysis {
     pub readings_fit: Option<ReadingsFit>,
     /// By how much the clocks of input and output differ, if the output was resampled for that.
     pub clock_skew: Option<ClockSkew>,
+    /// Standard deviation of the times of the readings in seconds, if they are irregular and the record does not state them.
+    pub jitter_s: Option<f64>,
     /// Harmonics of a sweep in the output, which a linear plant does not have.
     pub harmonics: Vec<SweepHarmonic>,
     /// Where the signals come from.
@@ -91,6 +93,7 @@ impl ExternalAnalysis {
             resolution: prepared.resolution,
             readings_fit: None,
             clock_skew: None,
+            jitter_s: prepared.jitter_s,
             harmonics: prepared.harmonics.clone(),
             source,
             is_explained: false,

@@ -14,8 +14,8 @@ use crate::other_kind::clear_kind;
 use crate::part::Part;
 use crate::periodic::Repetition;
 use crate::plausibility::{
-    OtherModel, clipped, complex_model, due_to_cut, hint, implausible, known_cause, lag_model,
-    nonlinear, undescribed_steps, unless_undetermined,
+    OtherModel, clipped, complex_model, due_to_cut, hint, implausible, irregular,
+    irregular_readings, known_cause, lag_model, nonlinear, undescribed_steps, unless_undetermined,
 };
 use crate::prepared::{Prepared, Stated};
 use crate::record_check::{Correction, Ends};
@@ -442,6 +442,7 @@ impl Identification {
         let known: Vec<String> = defects.chain(lost.map(str::to_owned)).collect();
         let known = listed(&known)
             .or_else(|| clipped(&observation, prepared.input_limit()))
+            .or_else(|| irregular(&observation, prepared.jitter_s))
             .or_else(|| known_cause(&observation))
             .or_else(|| nonlinear(&observation, &prepared.harmonics));
         // What is missing of a record that is cut is easily taken for another model.
@@ -458,7 +459,9 @@ impl Identification {
         };
         let mut cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
         let harmonics = prepared.harmonics.iter().map(SweepHarmonic::description);
-        cautions.extend(harmonics.filter(|text| !verdict.why.contains(text)));
+        let jitter = prepared.jitter_s.map(irregular_readings);
+        let found = harmonics.chain(jitter);
+        cautions.extend(found.filter(|text| !verdict.why.contains(text)));
         let input_path = self.input_path;
         let found = Judged {
             frf: frf.clone(),

@@ -35,6 +35,9 @@ const MANY_MODES: usize = 8;
 const CLOSED_LOOP: &str =
     "if the record was taken in closed loop, give the column of its reference (--reference)";
 
+/// What to do about irregular readings.
+const TRUE_TIMES: &str = "record the true time of each reading, or let the clock that samples the input also sample the output";
+
 /// What to do about a plant that is not linear.
 const HALF_AMPLITUDE: &str = "compare a record with half of the amplitude: if its harmonics are a smaller part, lower the amplitude (a limit, or a stiffness that depends on the amplitude), or else increase it (friction, play)";
 
@@ -57,6 +60,20 @@ pub(super) fn implausible(seen: &Observation<'_>) -> Option<String> {
 pub(super) fn clipped(seen: &Observation<'_>, input_limit: Option<f64>) -> Option<String> {
     let limit = input_limit.filter(|_| !seen.is_described());
     limit.map(clipped_input)
+}
+
+/// Readings at irregular times, if modes do not describe the response.
+pub(super) fn irregular(seen: &Observation<'_>, jitter_s: Option<f64>) -> Option<String> {
+    let jitter_s = jitter_s.filter(|_| !seen.is_described())?;
+    Some(format!("{}; {TRUE_TIMES}", irregular_readings(jitter_s)))
+}
+
+/// What irregular readings are.
+pub(super) fn irregular_readings(jitter_s: f64) -> String {
+    format!(
+        "the errors of the output grow with its speed, as those of readings whose times scatter by {:.4} ms (standard deviation), which the record does not state",
+        1e3 * jitter_s
+    )
 }
 
 /// Harmonics that are too large for a linear plant, if modes do not describe the response.

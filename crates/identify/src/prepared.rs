@@ -50,6 +50,8 @@ pub(super) struct Prepared<'a> {
     pub(super) defects: Vec<Defect>,
     /// The readings that are left, if the defects are lost ones.
     lost: Option<LostReadings>,
+    /// Standard deviation of the times of the readings in seconds, if they are irregular and not stated.
+    pub(super) jitter_s: Option<f64>,
     /// Harmonics of a sweep in an output without defects.
     pub(super) harmonics: Vec<SweepHarmonic>,
     /// What is missing of a record that is cut within its excitation.
@@ -95,7 +97,11 @@ impl<'a> Prepared<'a> {
             requested_hz
         };
         let assumed = source.chain(stated.output_kind.unwrap_or_default(), &frf.data);
-        let Checked { defects, lost } = record.checked(&cleaned);
+        let Checked {
+            defects,
+            lost,
+            jitter_s,
+        } = record.checked(&cleaned);
         let resolution = record.resolution();
         // Steps and defects have harmonics of their own.
         let harmonics = if defects.is_empty() && resolution.output.is_none() {
@@ -106,6 +112,7 @@ impl<'a> Prepared<'a> {
         Ok(Prepared {
             resolution,
             harmonics,
+            jitter_s,
             defects,
             lost,
             cut: cut_within_excitation(cleaned),

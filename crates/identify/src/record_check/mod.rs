@@ -39,6 +39,8 @@ pub struct Checked {
     pub defects: Vec<Defect>,
     /// The readings that are left, if the defects are lost ones.
     pub lost: Option<LostReadings>,
+    /// Standard deviation of the times of the readings in seconds, if they are irregular and the record does not state them.
+    pub jitter_s: Option<f64>,
 }
 
 impl Checked {
@@ -46,6 +48,7 @@ impl Checked {
         Checked {
             defects,
             lost: None,
+            jitter_s: None,
         }
     }
 }
@@ -67,7 +70,10 @@ pub fn check(recorded: &Signals, cleaned: &Signals, ends: Ends) -> Checked {
     if ends == Ends::Rest {
         found.extend(motion_at_ends(cleaned, prediction.median_sigma()));
     }
-    Checked::of(found)
+    Checked {
+        jitter_s: prediction.jitter_s(),
+        ..Checked::of(found)
+    }
 }
 
 /// The samples of an output that are no readings.
@@ -112,5 +118,6 @@ fn lasting(recorded: &Signals, step: f64, quantisation: Option<Quantisation>) ->
     Some(Checked {
         defects: vec![defect],
         lost: lost.flatten(),
+        jitter_s: None,
     })
 }

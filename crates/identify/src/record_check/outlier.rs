@@ -70,6 +70,12 @@ impl Patterns {
         self.single.iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 
+    /// The correlation of two errors this many samples apart, for white noise in the output: sum c_i c_(i + lag)/sum c_i^2.
+    pub(super) fn correlation(&self, lag: usize) -> f64 {
+        let pairs = self.single.iter().zip(self.single.iter().skip(lag));
+        pairs.map(|(a, b)| a * b).sum::<f64>() / self.gain().powi(2)
+    }
+
     /// The spike or the step that describes the errors from sample `at` on: of the spikes the shortest one that explains them.
     pub(super) fn outlier(&self, errors: &[f64], at: usize) -> Option<Outlier> {
         let total: f64 = errors.iter().map(|e| e * e).sum();

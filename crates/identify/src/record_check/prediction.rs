@@ -11,6 +11,8 @@
 //! excites more than the prediction describes, do not count. In a periodic record such defects differ from period to period and count
 //! as noise.
 
+mod jitter;
+
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::defect::Defect;
@@ -141,7 +143,7 @@ impl<'a> Prediction<'a> {
     /// The noise with the errors in proportion to the speed of the output.
     fn noise_by_speed(&self) -> NoiseBySpeed {
         let output = &self.signals.output;
-        let ratio = variance_by_speed(output, &self.error);
+        let ratio = variance_by_speed(&speed_classes(output, &self.error));
         let sigma = |k: usize| {
             let by_speed = (ratio * speed_squared_before(output, k)).sqrt();
             by_speed.max(self.sigma[k / BLOCK])
@@ -253,15 +255,32 @@ fn coefficients(signals: &Signals, scale: &Scale) -> Option<DVector<f64>> {
     Some(Cholesky::<f64, Dyn>::new(matrix)?.solve(&right))
 }
 
+/// Samples of about the same speed.
+struct SpeedClass {
+    largest_speed_squared: f64,
+    /// The median.
+    typical_speed_squared: f64,
+    /// Of the errors, from their median magnitude.
+    variance: f64,
+}
+
 /// Errors in proportion to the speed v of the output have the variance b v^2,
 ///
 /// ```text
-/// b = min over classes of samples of about the same speed of sigma^2/v^2, v the largest speed of the class
+/// b = min over the classes of sigma^2/v^2, v the largest speed of the class
 /// ```
 ///
 /// With white noise alone, b is that of the fastest class, so that b v^2 is no more than the variance of the noise. Spikes raise the ratio of a
-/// class and do not count. 0 if fewer samples move than a class has.
-fn variance_by_speed(output: &[f64], error: &[f64]) -> f64 {
+/// class and do not count. 0 without a class.
+fn variance_by_speed(classes: &[SpeedClass]) -> f64 {
+    let ratios = classes
+        .iter()
+        .map(|class| class.variance / class.largest_speed_squared);
+    ratios.reduce(f64::min).unwrap_or(0.0)
+}
+
+/// The samples that move, in classes of rising speed; the slowest samples that fill none are left out.
+fn speed_classes(output: &[f64], error: &[f64]) -> Vec<SpeedClass> {
     let every = (error.len() / MAX_EQUATIONS).max(1);
     let samples = (0..error.len()).step_by(every);
     let mut by_speed: Vec<(f64, f64)> = samples
@@ -269,13 +288,16 @@ fn variance_by_speed(output: &[f64], error: &[f64]) -> f64 {
         .collect();
     by_speed.sort_unstable_by(|(a, _), (b, _)| a.total_cmp(b));
     let moving = by_speed.partition_point(|(speed_squared, _)| *speed_squared == 0.0);
-    let ratio = |alike: &[(f64, f64)]| {
+    let class = |alike: &[(f64, f64)]| {
         let errors: Vec<f64> = alike.iter().map(|(_, error)| *error).collect();
-        let (speed_squared, _) = alike[CLASS - 1];
-        sigma_by_median(&errors).powi(2) / speed_squared
+        SpeedClass {
+            largest_speed_squared: alike[CLASS - 1].0,
+            typical_speed_squared: alike[CLASS / 2].0,
+            variance: sigma_by_median(&errors).powi(2),
+        }
     };
-    let ratios = by_speed[moving..].rchunks_exact(CLASS).map(ratio);
-    ratios.reduce(f64::min).unwrap_or(0.0)
+    let classes = by_speed[moving..].rchunks_exact(CLASS).rev().map(class);
+    classes.collect()
 }
 
 /// The mean square of the changes of the output before a sample, of as many as the prediction uses: the change to a spike is not one of

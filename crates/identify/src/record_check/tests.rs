@@ -1,6 +1,7 @@
 //! Defects of records with known ones, and none of sound records.
 
 mod corrections;
+mod jitter;
 
 use super::ends::start;
 use super::*;
@@ -62,6 +63,16 @@ fn spoiled(change: impl Fn(usize, f64) -> f64) -> Vec<Defect> {
     found_in(&signals, Ends::Rest)
 }
 
+/// Readings that are early or late by so many samples (standard deviation), with noise of 1e-5.
+fn read_at_irregular_times(motion: &[f64], samples: f64) -> Vec<f64> {
+    let (mut noise, mut jitter) = (noise(3), noise(11));
+    let reading = |k: usize| {
+        let change = motion[k] - motion[k.saturating_sub(1)];
+        motion[k] + samples * jitter() * change + 1e-5 * noise()
+    };
+    (0..motion.len()).map(reading).collect()
+}
+
 #[test]
 fn sound_record_has_no_defect() {
     assert_eq!(found_in(&signals(), Ends::Rest), []);
@@ -76,17 +87,10 @@ fn errors_of_irregular_readings_are_no_spikes() {
         *force = (std::f64::consts::TAU * 30.0 * k as f64 / RATE_HZ).sin();
     }
     let motion = motion(&input);
-    let (mut noise, mut jitter) = (noise(3), noise(11));
-    let output: Vec<f64> = (0..input.len())
-        .map(|k| {
-            let change = motion[k] - motion[k.saturating_sub(1)];
-            motion[k] + 0.05 * jitter() * change + 1e-5 * noise()
-        })
-        .collect();
     let mut signals = Signals {
         rate_hz: RATE_HZ,
+        output: read_at_irregular_times(&motion, 0.05),
         input,
-        output,
     };
     assert_eq!(found_in(&signals, Ends::Rest), []);
     // A spike of the size of the motion is found all the same.
