@@ -888,6 +888,14 @@ class Totals:
     def add(self, counts, name):
         counts[name] = counts.get(name, 0) + 1
 
+    def add_all(self, other):
+        for own, counts in ((self.verdicts, other.verdicts), (self.causes, other.causes)):
+            for name, number in counts.items():
+                own[name] = own.get(name, 0) + number
+        self.rows += other.rows
+        self.wrong_signs += other.wrong_signs
+        self.seconds += other.seconds
+
     def line(self, name):
         verdicts = " ".join(f"{v} {n}" for v, n in sorted(self.verdicts.items()))
         causes = " ".join(f"{c} {n}" for c, n in sorted(self.causes.items()))
@@ -902,7 +910,7 @@ def main():
     numbers = sys.argv[4] == "numbers"
     bench, *selected = sys.argv[5:] if numbers else sys.argv[4:]
     folder.mkdir(parents=True, exist_ok=True)
-    table = []
+    table, all_kinds = [], Totals()
     for index, name in enumerate(KINDS):
         if selected and name not in selected:
             continue
@@ -932,8 +940,9 @@ def main():
             else:
                 print(f"{name} {k}: {verdict} {stated} {seconds:.2f} s: {text[:230]}", flush=True)
         table.append(totals.line(name))
+        all_kinds.add_all(totals)
     if not numbers:
-        print("\n".join(table))
+        print("\n".join([*table, all_kinds.line("all kinds")]))
 
 
 if __name__ == "__main__":
