@@ -206,14 +206,62 @@ impl DiscreteMode {
         z: Complex<f64>,
         current: Complex<f64>,
     ) -> Complex<f64> {
+        self.along(row).at(z, current)
+    }
+
+    /// The response of row . [q, q'/w], to be evaluated at many z.
+    pub(super) fn along(&self, row: [f64; 2]) -> RowResponse {
         let [[a11, a12], [a21, a22]] = self.a;
-        let first = current * self.current[0] + self.setpoint[0];
-        let second = current * self.current[1] + self.setpoint[1];
-        let determinant = (z - a11) * (z - a22) - a12 * a21;
-        let along = ((z - a22) * first + second * a12) * row[0]
-            + ((z - a11) * second + first * a21) * row[1];
+        // row . adj(z - A) b, for the effect b of the current or of the set-point.
+        let numerator = |[first, second]: [f64; 2]| Linear {
+            constant: first * (row[1] * a21 - row[0] * a22)
+                + second * (row[0] * a12 - row[1] * a11),
+            slope: row[0] * first + row[1] * second,
+        };
+        RowResponse {
+            of_current: numerator(self.current),
+            of_setpoint: numerator(self.setpoint),
+            diagonal: [a11, a22],
+            off_diagonal: a12 * a21,
+        }
+    }
+}
+
+/// row (z - A)^-1 (current I(z) + setpoint), with numerator and denominator as functions of z:
+///
+/// ```text
+/// (I(z) (c0 + c1 z) + s0 + s1 z)/((z - a11) (z - a22) - a12 a21)
+/// ```
+///
+/// The denominator is not multiplied out: at low frequencies that would be a difference of nearly equal numbers.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RowResponse {
+    of_current: Linear,
+    of_setpoint: Linear,
+    diagonal: [f64; 2],
+    off_diagonal: f64,
+}
+
+/// constant + slope z.
+#[derive(Clone, Copy, Debug)]
+struct Linear {
+    constant: f64,
+    slope: f64,
+}
+
+impl Linear {
+    fn at(&self, z: Complex<f64>) -> Complex<f64> {
+        z * self.slope + self.constant
+    }
+}
+
+impl RowResponse {
+    /// As [`DiscreteMode::state_response`].
+    pub(super) fn at(&self, z: Complex<f64>, current: Complex<f64>) -> Complex<f64> {
+        let numerator = current * self.of_current.at(z) + self.of_setpoint.at(z);
+        let denominator = (z - self.diagonal[0]) * (z - self.diagonal[1]) - self.off_diagonal;
         // One division in place of two.
-        along * determinant.conj() * (1.0 / determinant.norm_sqr())
+        numerator * denominator.conj() * (1.0 / denominator.norm_sqr())
     }
 }
 

@@ -26,7 +26,7 @@
 
 use nalgebra::{Complex, DMatrix};
 
-use super::discrete::zero_system;
+use super::discrete::{RowResponse, zero_system};
 use super::lifted::{BLOCK, LiftedMode, Output};
 use super::{DiscretePlant, Mode, OutputKind, PlantState};
 
@@ -210,7 +210,7 @@ impl LoopPlant {
     pub fn response_at(&self, z: Complex<f64>) -> Complex<f64> {
         let current = self.held.current_response(z);
         let taps = self.taps.iter();
-        taps.map(|tap| tap.response(&self.held, z, current) * tap.arrival(z))
+        taps.map(|tap| tap.response(tap.along_modes(&self.held), z, current) * tap.arrival(z))
             .sum()
     }
 
@@ -228,9 +228,10 @@ impl LoopPlant {
     pub fn responses_along(&self, path: &PathResponses) -> Vec<Complex<f64>> {
         let mut sums = vec![Complex::new(0.0, 0.0); path.z.len()];
         for (tap, arrivals) in self.taps.iter().zip(&path.arrivals) {
+            let modes: Vec<RowResponse> = tap.along_modes(&self.held).collect();
             let points = path.z.iter().zip(&path.currents).zip(arrivals);
             for (sum, ((z, current), arrival)) in sums.iter_mut().zip(points) {
-                *sum += tap.response(&self.held, *z, *current) * arrival;
+                *sum += tap.response(modes.iter().copied(), *z, *current) * arrival;
             }
         }
         sums
@@ -352,17 +353,21 @@ impl Tap {
         }
     }
 
-    /// The response at z without the whole periods of the delay, with the [`DiscretePlant::current_response`] there.
+    /// The response of each mode along its row.
+    fn along_modes(&self, held: &DiscretePlant) -> impl Iterator<Item = RowResponse> {
+        let rows = self.rows.iter().zip(&held.modes);
+        rows.map(|(row, mode)| mode.along(*row))
+    }
+
+    /// The response at z without the whole periods of the delay, with its [`Tap::along_modes`] and the
+    /// [`DiscretePlant::current_response`] there.
     fn response(
         &self,
-        held: &DiscretePlant,
+        modes: impl Iterator<Item = RowResponse>,
         z: Complex<f64>,
         current: Complex<f64>,
     ) -> Complex<f64> {
-        let rows = self.rows.iter().zip(&held.modes);
-        let moved: Complex<f64> = rows
-            .map(|(row, mode)| mode.state_response(*row, z, current))
-            .sum();
+        let moved: Complex<f64> = modes.map(|mode| mode.at(z, current)).sum();
         moved + current * self.current + self.setpoint
     }
 
