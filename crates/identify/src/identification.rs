@@ -5,30 +5,28 @@ use core::f64::consts::TAU;
 use crate::ClockSkew;
 use crate::external_analysis::{ExternalAnalysis, Judged};
 use crate::external_signals::ExternalSignals;
+use crate::external_verdict::{cautions, judged, listed, scope};
 use crate::first_fit::FirstFit;
-use crate::fitted_lag::FittedLag;
 use crate::in_time::TimeFit;
-use crate::modal::{FitError, InputPath, MeasurementChain, ModalFit};
+use crate::modal::{InputPath, ModalFit};
 use crate::observation::{Observation, Source};
 use crate::other_kind::clear_kind;
 use crate::part::Part;
 use crate::periodic::Repetition;
 use crate::plausibility::{
     OtherModel, clipped, complex_model, due_to_cut, hint, implausible, irregular,
-    irregular_readings, known_cause, lag_model, nonlinear, undescribed_steps, unless_undetermined,
+    irregular_readings, known_cause, lag_model, nonlinear, undescribed_steps,
 };
 use crate::prepared::{Prepared, Stated};
-use crate::record_check::{Correction, Ends};
+use crate::record_check::Correction;
 use crate::sweep_harmonics::SweepHarmonic;
-use crate::verdict::{Cnmp, Verdict, VerdictScope, judge};
-use crate::{Frf, IdentifyError, Signals};
+use crate::verdict::Cnmp;
+use crate::{IdentifyError, Signals};
 use bench_plant::{InputKind, OutputKind, PlantError};
 
 /// Least angle in radians by which the delay between two clocks turns the response at the end of the band. Clocks of two instruments differ
 /// by some 20 ppm, which is 0.25 rad at 100 Hz after 20 s. A filter may seem to be a difference of 1 or 2 ppm.
 const LEAST_TURN_RAD: f64 = 0.15;
-/// The caution of a verdict from a record in motion.
-const IN_MOTION: &str = "the record begins or ends within its excitation; the transient of the plant was estimated and subtracted";
 
 /// Why signals cannot be identified.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -491,51 +489,4 @@ impl Identification {
             fits_lag: !self.has_stated_lag,
         }
     }
-}
-
-/// What was done with a record beyond averaging, in the order in which it is told.
-fn cautions(
-    prepared: &Prepared<'_>,
-    clock_skew: Option<&ClockSkew>,
-    lag: Option<&FittedLag>,
-) -> Vec<String> {
-    let motion = (prepared.record.ends == Ends::Motion).then(|| IN_MOTION.to_owned());
-    let stray_lines = prepared.stray_lines.iter().map(ToString::to_string);
-    stray_lines
-        .chain(motion)
-        .chain(clock_skew.map(ClockSkew::description))
-        .chain(lag.map(FittedLag::description))
-        .collect()
-}
-
-/// The scope of the verdict of a record, which states how long a record must be.
-fn scope(record: ExternalSignals<'_>, up_to_rad_s: f64) -> VerdictScope {
-    VerdictScope {
-        // The set-point of a loop may rest at another value than before its motion.
-        duration_s: record.reference.is_none().then(|| record.excitation_s()),
-        ..VerdictScope::up_to(up_to_rad_s)
-    }
-}
-
-/// The verdict of a fit, with what else may be the cause of an undecided one; undecided for a reason that is already known.
-pub(super) fn judged(
-    why: Option<String>,
-    frf: &Frf,
-    fit: &Result<ModalFit, FitError>,
-    chain: &MeasurementChain,
-    scope: VerdictScope,
-    hint: impl Fn(&Verdict) -> Option<String>,
-) -> Result<Verdict, PlantError> {
-    if let Some(why) = why {
-        return Ok(Verdict::undecided(why));
-    }
-    let verdict = judge(fit, &frf.data, chain, scope)?;
-    let verdict = unless_undetermined(verdict, fit);
-    let hint = hint(&verdict).filter(|hint| !verdict.why.contains(hint));
-    Ok(verdict.with(hint))
-}
-
-fn listed(items: &[impl ToString]) -> Option<String> {
-    let texts: Vec<String> = items.iter().map(ToString::to_string).collect();
-    (!texts.is_empty()).then(|| texts.join("; "))
 }

@@ -5,9 +5,9 @@ use bench_plant::{InputKind, OutputKind, PlantError};
 
 use crate::Frf;
 use crate::chi2_limits::MAX_CHI2_PER_FREEDOM;
+use crate::external_verdict::judged;
 use crate::first_fit::FirstFit;
 use crate::fitted_lag::FittedLag;
-use crate::identification::judged;
 use crate::independent::independent;
 use crate::modal::{self, FitError, InputPath, MeasurementChain, ModalFit};
 use crate::observation::{Observation, Source};

@@ -42,6 +42,7 @@ mod estimator;
 mod excited_band;
 mod external_analysis;
 mod external_signals;
+mod external_verdict;
 mod fft;
 mod first_fit;
 mod fitted_lag;
