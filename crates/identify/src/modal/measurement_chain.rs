@@ -326,6 +326,14 @@ impl MeasurementChain {
         !is_bench || self.output() != OutputKind::Acceleration
     }
 
+    /// The period in seconds of samples by a held input, if the chain is that of samples.
+    pub(super) fn period_s(&self) -> Option<f64> {
+        match self {
+            MeasurementChain::Bench(path) => Some(path.period_s),
+            MeasurementChain::Direct | MeasurementChain::Input(..) => None,
+        }
+    }
+
     /// What is measured.
     pub fn output(&self) -> OutputKind {
         match self {
