@@ -23,6 +23,7 @@ mod decisive;
 mod information;
 mod input;
 mod longer;
+mod observed_zero;
 mod phase_check;
 mod phase_drop;
 mod sign_groups;
@@ -37,6 +38,7 @@ pub use zeros::{UncertainZero, zeros};
 
 use decisive::{decisive_mode_more, decisive_uncertain_mode};
 use longer::Longer;
+use observed_zero::as_observed;
 use phase_check::phase_drop_over;
 use serde::{Deserialize, Serialize};
 use sign_groups::signs_of;
@@ -160,12 +162,18 @@ pub fn judge(
 /// # Errors
 /// When the zeros of the fit cannot be computed.
 pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
+    let is_complex = !input.fit.parameters.has_real_residues();
     let mut zeros = zeros(input.fit)?;
+    if is_complex {
+        let observed = zeros.into_iter();
+        zeros = observed
+            .map(|zero| as_observed(zero, input.fit, input.chain))
+            .collect();
+    }
     let mut modes = input.fit.modes();
     modes.retain(|mode| input.covers(mode.omega_rad_s.value));
     let phase_drop = phase_drop_over(input, &modes, &zeros)?;
     zeros.retain(|zero| input.covers(zero.s.norm()));
-    let is_complex = !input.fit.parameters.has_real_residues();
     let of_stage = if is_complex {
         zeros_of_the_stage(&zeros)
     } else {
@@ -311,6 +319,12 @@ fn uncertain_mode_reason(more: &OneMoreMode, input: &VerdictInput<'_>) -> String
 
 /// How long a record must be for the side of a zero. None decides that of one closer to the axis than a fit is accurate.
 fn longer_for_side(zero: &UncertainZero, input: &VerdictInput<'_>) -> String {
+    if zero.is_uncertain_by_model() {
+        return format!(
+            "response and modes disagree about it by {:.3} rad/s, as with a filter between input and output: record signals without a filter, or state its lag",
+            zero.difference.norm()
+        );
+    }
     if is_on_axis(zero) {
         return "increase the amplitude there, or the duration".into();
     }

@@ -26,6 +26,8 @@ pub struct UncertainZero {
     pub rhp_probability: f64,
     /// Its kind at its estimated location.
     pub kind: ZeroKind,
+    /// How far in rad/s the fitted response has it from where the modes have it, which is part of its covariance; 0 of real residues.
+    pub difference: Complex<f64>,
 }
 
 impl UncertainZero {
@@ -34,6 +36,44 @@ impl UncertainZero {
         Estimate {
             value: self.s.re,
             sigma: self.covariance[0][0].sqrt(),
+        }
+    }
+
+    /// Whether the error of its real part is rather that of the model than that of the noise.
+    pub(super) fn is_uncertain_by_model(&self) -> bool {
+        self.difference.re.powi(2) > 0.5 * self.covariance[0][0]
+    }
+}
+
+impl UncertainZero {
+    /// A complex zero at another place, with the difference added to its covariance.
+    pub(super) fn moved_to(self, s: Complex<f64>) -> UncertainZero {
+        let moved = s - self.s;
+        let moved = [moved.re, moved.im];
+        let covariance =
+            [0, 1].map(|i| [0, 1].map(|j| self.covariance[i][j] + moved[i] * moved[j]));
+        let kind = match (s.re > 0.0, self.kind) {
+            (true, _) => ZeroKind::Cnmp,
+            (false, ZeroKind::Cnmp) => ZeroKind::Mmp,
+            (false, kind) => kind,
+        };
+        UncertainZero {
+            difference: s - self.s,
+            ..UncertainZero::new(s, covariance, kind)
+        }
+    }
+
+    fn new(s: Complex<f64>, covariance: [[f64; 2]; 2], kind: ZeroKind) -> UncertainZero {
+        let mirrored = Estimate {
+            value: -s.re,
+            sigma: covariance[0][0].sqrt(),
+        };
+        UncertainZero {
+            s,
+            covariance,
+            rhp_probability: mirrored.below_zero_probability(),
+            kind,
+            difference: Complex::new(0.0, 0.0),
         }
     }
 }
@@ -61,22 +101,8 @@ pub fn zeros(fit: &ModalFit) -> Result<Vec<UncertainZero>, PlantError> {
         .into_iter()
         .filter(|zero| zero.s.im >= 0.0);
     Ok(above
-        .map(|zero| uncertain_zero(fit, zero.s, zero.kind))
+        .map(|zero| UncertainZero::new(zero.s, zero_covariance(fit, zero.s), zero.kind))
         .collect())
-}
-
-fn uncertain_zero(fit: &ModalFit, s: Complex<f64>, kind: ZeroKind) -> UncertainZero {
-    let covariance = zero_covariance(fit, s);
-    let mirrored = Estimate {
-        value: -s.re,
-        sigma: covariance[0][0].sqrt(),
-    };
-    UncertainZero {
-        s,
-        covariance,
-        rhp_probability: mirrored.below_zero_probability(),
-        kind,
-    }
 }
 
 /// J cov(theta) J^T; a real zero has no imaginary part.

@@ -173,6 +173,7 @@ mod tests {
             kind: bench_plant::zeros::ZeroKind::Mmp,
             covariance: [[1e-6, 0.0], [0.0, 1e-6]],
             rhp_probability,
+            difference: nalgebra::Complex::new(0.0, 0.0),
         };
         let zeros = [
             zero(10.0, 9e-5),

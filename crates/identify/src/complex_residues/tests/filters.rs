@@ -73,6 +73,13 @@ fn a_filter_in_the_channel_leaves_poles_and_verdict_as_they_are() {
             light.retain(|mode| mode.damping_ratio.value < 0.1);
             let truth = stage.partial_fractions();
             assert_eq!(light.len(), truth.len(), "{corner_hz} Hz: {light:?}");
+            for zero in stage.zeros() {
+                let zeros = found.verdict.zeros.iter();
+                let distance = zeros.map(|found| (found.s - zero).norm());
+                let distance = distance.reduce(f64::min).expect("zeros");
+                // The samples show the zeros; those of the modes and R alone are some rad/s away.
+                assert!(distance < 0.5, "{corner_hz} Hz: {zero}, {distance}");
+            }
             for (mode, (pole, _)) in light.iter().zip(truth) {
                 assert_near(mode.omega_rad_s, pole.norm());
                 assert_near(mode.damping_ratio, -pole.re / pole.norm());

@@ -20,6 +20,7 @@ fn cnmp_zero(sigma: f64) -> UncertainZero {
         covariance: [[sigma * sigma, 0.0], [0.0, 0.0]],
         rhp_probability: 1.0,
         kind: ZeroKind::Cnmp,
+        difference: Complex::new(0.0, 0.0),
     }
 }
 
@@ -110,6 +111,31 @@ fn reasons_have_no_negative_zero() {
         certain.contains("a longer record does not decide"),
         "{certain}"
     );
+}
+
+#[test]
+fn longer_record_is_no_remedy_for_a_zero_that_response_and_modes_have_at_other_places() {
+    let case = Case::of(&Stage::with_pair(2.0));
+    let why_of = |sigma, shift| {
+        let shift = Complex::new(shift, 0.0);
+        uncertain_side(
+            &[cnmp_zero(sigma).moved_to(shift + cnmp_zero(sigma).s)],
+            &case.input(),
+        )
+        .expect("on no side")
+    };
+    let by_noise = why_of(3.0, 0.1);
+    assert!(
+        by_noise.contains("or the duration to more than"),
+        "{by_noise}"
+    );
+    let by_model = why_of(0.1, -1.5);
+    assert!(by_model.contains("the zero -0.500 ± 2.946"), "{by_model}");
+    assert!(
+        by_model.contains("disagree about it by 1.500 rad/s"),
+        "{by_model}"
+    );
+    assert!(!by_model.contains("duration"), "{by_model}");
 }
 
 /// From 50 rad/s to 100 + d the zero at 1 + 100 j turns the phase by 2 (atan(d) + atan(50)) + 2 (atan(200 + d) - atan(150)): 180 degrees with
@@ -321,6 +347,7 @@ fn the_lowest_certain_real_zero_is_stated_before_an_uncertain_one() {
         covariance: [[sigma * sigma, 0.0], [0.0, 0.0]],
         kind: ZeroKind::Rnmp,
         rhp_probability,
+        difference: Complex::new(0.0, 0.0),
     };
     let why = |zeros: &[UncertainZero]| evaluate(zeros, Some(&[1.0, 1.0]), phase_drop(0.0, 0.0)).1;
     let (certain, higher) = (real(47.123_889_8, 1.0, 1.0), real(100.0, 1.0, 1.0));
