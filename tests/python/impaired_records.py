@@ -46,7 +46,7 @@ CAUSES = {
     "mains": r"mains",
     "misfit": r"not the fitted sum of modes|no sum of modes",
     "complex": r"complex residues",
-    "nonlinear": r"nonlinear",
+    "nonlinear": r"nonlinear|friction or play",
     "lag": r"a first-order lag of",
     "uncertain": r"is uncertain|may lie on either side|lies on the imaginary axis|not significant|response is noise|increase the amplitude",
     "few modes": r"fewer than two modes",

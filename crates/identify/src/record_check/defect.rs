@@ -20,6 +20,11 @@ pub enum Defect {
         /// By how much.
         height: f64,
     },
+    /// The output changes abruptly, but not by a jump: with friction or play, or after a force that is not in the input.
+    Abrupt {
+        /// Time of the first sample of the change.
+        time_s: f64,
+    },
     /// The output keeps its value for some samples.
     Repeated {
         /// Time of the first one.
@@ -86,6 +91,10 @@ impl fmt::Display for Defect {
             Defect::Step { time_s, height } => write!(
                 f,
                 "the output jumps by {height:.3e} at {time_s:.4} s; subtract the jump from the samples after it, or repeat the record"
+            ),
+            Defect::Abrupt { time_s } => write!(
+                f,
+                "the output changes abruptly at {time_s:.4} s, which neither the input nor a jump of the reading explains, as with friction or play, or after a blow; remove the cause, or repeat the record"
             ),
             Defect::Repeated { time_s, samples } => write!(
                 f,

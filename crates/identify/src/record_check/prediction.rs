@@ -103,7 +103,7 @@ impl<'a> Prediction<'a> {
         median(self.sigma.clone())
     }
 
-    /// The first spike and the first step.
+    /// The first spike, the first step, and the first abrupt change.
     pub(super) fn jumps(&self) -> Vec<Defect> {
         let mut found: Vec<Defect> = Vec::new();
         for outlier in self.outliers() {
@@ -182,11 +182,16 @@ impl<'a> Prediction<'a> {
     }
 
     fn defect(&self, outlier: Outlier) -> Defect {
-        let Outlier { place, height, .. } = outlier;
+        let Outlier {
+            place,
+            height,
+            is_explained,
+        } = outlier;
         let time_s = place.at as f64 / self.signals.rate_hz;
         match place.shape {
             Shape::Spike { .. } => Defect::Spike { time_s, height },
-            Shape::Step => Defect::Step { time_s, height },
+            Shape::Step if is_explained => Defect::Step { time_s, height },
+            Shape::Step => Defect::Abrupt { time_s },
         }
     }
 }

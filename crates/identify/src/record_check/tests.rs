@@ -177,6 +177,16 @@ fn step_is_found_with_its_time_and_height() {
     assert!(time_s == 15.0 && (height + 0.5).abs() < 0.05, "{found:?}");
 }
 
+/// Against a stop, or by a blow, the speed changes from one sample to the next, and the output does not jump.
+#[test]
+fn change_of_the_speed_is_no_jump() {
+    let found = spoiled(|k, y| y + 0.3 * 100_usize.saturating_sub(k.abs_diff(15_100)) as f64);
+    let [Defect::Abrupt { time_s }] = found[..] else {
+        panic!("{found:?}")
+    };
+    assert!((time_s - 15.0).abs() < 0.01, "{found:?}");
+}
+
 /// Six modes after a pulse of 1.4 ms: the prediction from eight samples has errors far above the noise of 8e-11, and none of them is a jump
 /// of the output. Of a held force u, q[k + 1] = exp(p T) q[k] + (exp(p T) - 1)/p u[k], and the position is the sum of r Im q/Im p.
 #[test]
