@@ -239,7 +239,6 @@ impl Identification {
             let analysis = self.analysed(prepared, None)?;
             return Ok(analysis.undecided_by(undescribed_steps(step)));
         }
-        let record = prepared.record;
         // Many modes would be fitted to the turn of two clocks in vain.
         let compares_first =
             !prepared.few_modes_describe() && !prepared.complex_residues_describe();
@@ -250,8 +249,8 @@ impl Identification {
             return Ok(analysis);
         }
         let analysis = self.analysed(prepared, None)?;
-        let analysis = self.with_other_model(record, analysis, lag_model)?;
-        let analysis = self.with_other_model(record, analysis, complex_model)?;
+        let analysis = self.with_other_model(prepared, analysis, lag_model)?;
+        let analysis = self.with_other_model(prepared, analysis, complex_model)?;
         // Complex residues are tried first: a small difference of the clocks easily takes their place.
         let is_open = analysis.verdict.cnmp == Cnmp::Undecided
             && !analysis.is_explained
@@ -319,7 +318,7 @@ impl Identification {
     /// the response, and nothing else explains that.
     fn with_other_model(
         &self,
-        record: ExternalSignals<'_>,
+        prepared: &Prepared<'_>,
         analysis: ExternalAnalysis,
         model: fn(&Observation<'_>) -> Option<OtherModel>,
     ) -> Result<ExternalAnalysis, IdentificationError> {
@@ -327,6 +326,7 @@ impl Identification {
         if analysis.is_explained || has_other_model {
             return Ok(analysis);
         }
+        let record = prepared.record;
         let ExternalAnalysis { frf, chain, .. } = &analysis;
         let observation = Observation {
             source: analysis.source,
@@ -345,7 +345,8 @@ impl Identification {
         let fit = Ok(fit);
         let scope = scope(record, analysis.judged_up_to_rad_s);
         let verdict = judged(None, frf, &fit, &chain, scope, |verdict| {
-            hint(verdict, record, &fit, &analysis.resolution)
+            let input_limit = prepared.input_limit();
+            hint(verdict, record, &fit, &analysis.resolution, input_limit)
         })?;
         let path = self.input_path;
         let verdict = verdict.with(lag.map(|lag| lag.description()));
@@ -449,7 +450,8 @@ impl Identification {
         let is_plausible = why.is_none();
         let scope = scope(cleaned, TAU * prepared.band_hz.1);
         let verdict = judged(why, frf, &fit, &chain, scope, |verdict| {
-            hint(verdict, cleaned, &fit, &prepared.resolution)
+            let input_limit = prepared.input_limit();
+            hint(verdict, cleaned, &fit, &prepared.resolution, input_limit)
         })?;
         let verdict = match &prepared.cut {
             Some(cut) if prepared.defects.is_empty() => due_to_cut(verdict, cut),

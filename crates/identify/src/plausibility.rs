@@ -222,9 +222,11 @@ fn slope(points: Vec<(f64, f64)>) -> Option<f64> {
     (square > 0.0).then(|| product / square)
 }
 
-/// An output that precedes its input. The delay of modes that do not describe the response is none of the output.
+/// An output that precedes its input. The delay of modes that do not describe the response, or take the place of something else, is none of
+/// the output.
 fn early(seen: &Observation<'_>) -> Option<String> {
-    let fit = seen.fit.as_ref().ok().filter(|fit| describes(fit))?;
+    let is_sum = |fit: &&ModalFit| describes(fit) && fit.cancelling_modes().is_none();
+    let fit = seen.fit.as_ref().ok().filter(is_sum)?;
     let delay = fit.determined_delay_s()?;
     let limit_s = (EARLY_SAMPLES / seen.source.rate_hz).max(CERTAIN_SIGMAS * delay.sigma);
     (-delay.value > limit_s).then(|| {
@@ -247,6 +249,7 @@ pub(super) fn hint(
     record: ExternalSignals<'_>,
     fit: &Result<ModalFit, FitError>,
     resolution: &Resolution,
+    input_limit: Option<f64>,
 ) -> Option<String> {
     if verdict.cnmp != Cnmp::Undecided {
         return None;
@@ -262,9 +265,7 @@ pub(super) fn hint(
             why
         }
     });
-    let is_noise = fit.as_ref().is_ok_and(ModalFit::leaves_noise);
-    let limit = record_check::limit_of_input(&record.signals.input).filter(|_| !is_noise);
-    match (no_sum, limit.map(clipped_input)) {
+    match (no_sum, input_limit.map(clipped_input)) {
         (Some(no_sum), Some(clipped)) => Some(format!("{clipped}; {no_sum}")),
         (no_sum, clipped) => clipped.or(no_sum),
     }
@@ -316,7 +317,7 @@ fn cancelling(group: ModeGroup) -> String {
 /// Modes whose residues nearly cancel take the place of what is no sum of modes.
 fn not_a_sum_of_modes(fit: &Result<ModalFit, FitError>) -> Option<String> {
     let found = match fit {
-        Ok(fit) => cancelling(fit.cancelling_modes()?),
+        Ok(fit) => cancelling(fit.cancelling_modes().or_else(|| fit.undetermined_pair())?),
         Err(FitError::Undetermined { modes }) if *modes > MANY_MODES => {
             format!("{modes} modes are needed")
         }

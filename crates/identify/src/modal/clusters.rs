@@ -88,7 +88,8 @@ fn are_close(a: &ModalTerm, b: &ModalTerm) -> bool {
     (b.omega_rad_s - a.omega_rad_s).abs() < REACH * half_widths
 }
 
-fn cancels(residues: &[Complex<f64>]) -> bool {
+/// Whether residues nearly cancel.
+pub(super) fn cancels(residues: &[Complex<f64>]) -> bool {
     let sum: Complex<f64> = residues.iter().sum();
     let magnitudes: f64 = residues.iter().map(|residue| residue.norm()).sum();
     residues.len() > 1 && magnitudes > CANCELLATION * sum.norm()

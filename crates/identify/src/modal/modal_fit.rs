@@ -5,7 +5,7 @@ use core::ops::Range;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 
-use super::clusters::cancelling;
+use super::clusters::{cancelling, cancels};
 use super::{Estimate, MeasurementChain, ModalParameters, ModelOrder, OneMoreMode, Parameter};
 use crate::FrfDatum;
 use crate::chi2_limits::noise_limit;
@@ -262,18 +262,33 @@ impl ModalFit {
         self.cancelling_groups().into_iter().find(is_undetermined)
     }
 
-    /// The groups of neighbouring modes whose residues nearly cancel.
-    fn cancelling_groups(&self) -> Vec<ModeGroup> {
-        let modes = &self.parameters.modes;
-        let hz = |k: usize| modes[k].omega_rad_s / std::f64::consts::TAU;
-        let group = |indices: Range<usize>| ModeGroup {
+    /// Two neighbouring modes that are not determined, and whose residues nearly cancel. (Among other modes they are no group that cancels.)
+    pub(crate) fn undetermined_pair(&self) -> Option<ModeGroup> {
+        let modes = self.modes();
+        let residues = self.parameters.complex_residues();
+        let is_pair = |k: &usize| {
+            let pair = *k..*k + 2;
+            let is_uncertain = modes[pair.clone()].iter().all(|mode| !mode.is_determined());
+            is_uncertain && cancels(&residues[pair])
+        };
+        let first = (0..modes.len().saturating_sub(1)).find(is_pair)?;
+        Some(self.group(first..first + 2))
+    }
+
+    fn group(&self, indices: Range<usize>) -> ModeGroup {
+        let hz = |k: usize| self.parameters.modes[k].omega_rad_s / std::f64::consts::TAU;
+        ModeGroup {
             first: indices.start,
             count: indices.len(),
             band_hz: (hz(indices.start), hz(indices.end - 1)),
-        };
+        }
+    }
+
+    /// The groups of neighbouring modes whose residues nearly cancel.
+    fn cancelling_groups(&self) -> Vec<ModeGroup> {
         cancelling(&self.parameters)
             .into_iter()
-            .map(group)
+            .map(|indices| self.group(indices))
             .collect()
     }
 
@@ -365,4 +380,58 @@ fn real_pole(w: f64, zeta: f64, sign: f64) -> (Complex<f64>, [[f64; 2]; 2]) {
     let re_per_w = -zeta + sign * root;
     let derivatives = [[re_per_w, w * (-1.0 + sign * zeta / root)], [0.0, 0.0]];
     (Complex::new(w * re_per_w, 0.0), derivatives)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Modes of a damping ratio of 0.1, by frequency in rad/s, residue and its standard deviation in 1/kg.
+    fn fit(modes: &[(f64, f64, f64)]) -> ModalFit {
+        let term = |(omega_rad_s, residue_per_kg, _): &(f64, f64, f64)| ModalTerm {
+            omega_rad_s: *omega_rad_s,
+            damping_ratio: 0.1,
+            residue_per_kg: *residue_per_kg,
+        };
+        let parameters = ModalParameters {
+            modes: modes.iter().map(term).collect(),
+            ..ModalParameters::default()
+        };
+        let free = parameters.free();
+        let variance = |parameter: &Parameter| match *parameter {
+            Parameter::Residue(k) => modes[k].2 * modes[k].2,
+            _ => 1e-6,
+        };
+        let variances = DVector::from_iterator(free.len(), free.iter().map(variance));
+        ModalFit {
+            parameters,
+            covariance: DMatrix::from_diagonal(&variances),
+            orders: Vec::new(),
+            one_more_mode: None,
+            chi2_per_freedom: 1.0,
+            freedom: 1000,
+            band_hz: (1.0, 100.0),
+            left_out_hz: Vec::new(),
+        }
+    }
+
+    /// The four modes are near enough to each other for one group, whose residues do not cancel.
+    #[test]
+    fn pair_that_cancels_is_found_beside_other_modes() {
+        let with_pair = |first: (f64, f64, f64), second| {
+            fit(&[(90.0, -5.0, 0.01), first, second, (115.0, -9.0, 0.01)])
+        };
+        let found = with_pair((100.0, -0.76, 77.0), (101.0, 0.77, 77.0));
+        assert_eq!(found.cancelling_modes(), None);
+        let pair = found.undetermined_pair().expect("a pair");
+        assert_eq!((pair.first, pair.count), (1, 2));
+        // Modes that are certain, or do not cancel, are none.
+        for (first, second) in [
+            ((100.0, -0.76, 0.01), (101.0, 0.77, 0.01)),
+            ((100.0, -0.76, 77.0), (101.0, 0.77, 0.01)),
+            ((100.0, 0.76, 77.0), (101.0, 0.77, 77.0)),
+        ] {
+            assert_eq!(with_pair(first, second).undetermined_pair(), None);
+        }
+    }
 }
