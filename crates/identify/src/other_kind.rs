@@ -85,7 +85,10 @@ pub(super) fn explained_by_kind(seen: &Observation<'_>) -> Option<String> {
         return None;
     }
     let (kind, other) = other_kind(seen)?;
-    let is_simplest = !complex_residues_are_better(seen.part, other);
+    // What is no sum of modes may be described a little better by those of another kind.
+    let is_far_better = |fit: &ModalFit| fit.chi2_per_freedom > FAR_BETTER * other.chi2_per_freedom;
+    let is_clear = other.leaves_noise() || seen.fit.as_ref().is_ok_and(is_far_better);
+    let is_simplest = is_clear && !complex_residues_are_better(seen.part, other);
     is_simplest.then(|| give_kind(assumed, *kind))
 }
 
