@@ -57,6 +57,7 @@ CAUSES = {
     "opposite": r"no two neighbouring modes",
     "reference": r"--reference",
     "beyond": r"extend --band",
+    "changes": r"changes during the record",
 }
 KINDS = {}
 
@@ -569,7 +570,7 @@ def moving(rng):
     changed[:, 0] *= 1 + change
     part = np.arange(len(b.u)) / len(b.u)
     y = (1 - part) * b.motion() + part * b.motion(modes=changed)
-    return b.record(b.noisy(y), causes=["misfit", "complex", "nonlinear"], model_holds=False)
+    return b.record(b.noisy(y), causes=["misfit", "complex", "nonlinear", "changes"], model_holds=False)
 
 
 @kind("lag of the drive that is not given")

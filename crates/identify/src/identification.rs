@@ -3,6 +3,7 @@
 use core::f64::consts::TAU;
 
 use crate::ClockSkew;
+use crate::changed_modes::ChangedModes;
 use crate::external_analysis::{ExternalAnalysis, Judged};
 use crate::external_signals::ExternalSignals;
 use crate::external_verdict::{cautions, judged, listed, scope};
@@ -14,8 +15,8 @@ use crate::other_kind::clear_kind;
 use crate::part::Part;
 use crate::periodic::Repetition;
 use crate::plausibility::{
-    OtherModel, clipped, complex_model, due_to_cut, hint, implausible, irregular,
-    irregular_readings, known_cause, lag_model, nonlinear, undescribed_steps,
+    OtherModel, clipped, complex_model, due_to, hint, implausible, irregular, irregular_readings,
+    known_cause, lag_model, nonlinear, undescribed_steps,
 };
 use crate::prepared::{Prepared, Stated};
 use crate::record_check::Correction;
@@ -454,13 +455,20 @@ impl Identification {
             hint(verdict, cleaned, &fit, &prepared.resolution, input_limit)
         })?;
         let verdict = match &prepared.cut {
-            Some(cut) if prepared.defects.is_empty() => due_to_cut(verdict, cut),
+            Some(cut) if prepared.defects.is_empty() => due_to(verdict, cut),
             _ => verdict,
+        };
+        let fit_of_stage = fit.as_ref().ok().filter(|_| is_plausible);
+        let changed = fit_of_stage.and_then(ChangedModes::of);
+        let changed = changed.map(|changed| changed.description());
+        let verdict = match &changed {
+            Some(changed) => due_to(verdict, changed),
+            None => verdict,
         };
         let mut cautions = cautions(prepared, clock_skew.as_ref(), lag.as_ref());
         let harmonics = prepared.harmonics.iter().map(SweepHarmonic::description);
         let jitter = prepared.jitter_s.map(irregular_readings);
-        let found = harmonics.chain(jitter);
+        let found = harmonics.chain(jitter).chain(changed);
         cautions.extend(found.filter(|text| !verdict.why.contains(text)));
         let input_path = self.input_path;
         let found = Judged {

@@ -33,6 +33,7 @@
 #![deny(unsafe_code)]
 
 mod band;
+mod changed_modes;
 mod chi2_limits;
 mod clock_skew;
 mod complex_residues;

@@ -103,11 +103,11 @@ fn grows_with_frequency(seen: &Observation<'_>) -> Option<String> {
     better_kind(seen).or_else(|| with_remedy(Some(what), seen.remedies.growing))
 }
 
-/// An undecided verdict of a record that is cut within its excitation is due to that.
-pub(super) fn due_to_cut(verdict: Verdict, cut: &str) -> Verdict {
+/// An undecided verdict of a record with a known cause, as one that is cut within its excitation, is due to that.
+pub(super) fn due_to(verdict: Verdict, cause: &str) -> Verdict {
     match verdict.cnmp {
         Cnmp::Undecided => Verdict {
-            why: format!("{cut} (it seems that {})", verdict.why),
+            why: format!("{cause} (it seems that {})", verdict.why),
             is_of_stage: false,
             ..verdict
         },
