@@ -10,7 +10,8 @@
 //!
 //! A mode that is lower than the response around it has its zeros beside its pole, left of the imaginary axis. A higher one that is not seen
 //! has no effect on the verdict if the number of CNMP pairs in the band is the same with it, of either sign, and with any residue up to
-//! 5 sigma_r: a large hidden mode may have none where a smaller one has a pair.
+//! 5 sigma_r: a large hidden mode may have none where a smaller one has a pair. That is known of one hidden mode below all others. Above the
+//! first one several may be hidden, which may have a pair where each of them alone has none.
 
 use nalgebra::Complex;
 
@@ -59,7 +60,7 @@ impl TimeRecord<'_> {
             let around = largest_around(&sum, trial_rad_s);
             let is_seen = peak < around;
             let least = LEAST_HIDDEN * around / peak;
-            if !is_seen && !keeps_pairs(&sum, hidden, least, to_rad_s) {
+            if !is_seen && !has_no_effect(&sum, hidden, least, to_rad_s) {
                 return Some(from_rad_s.max(BELOW_UNSEEN * seen_rad_s));
             }
             seen_rad_s = trial_rad_s;
@@ -77,6 +78,13 @@ fn information(output: &[f64], of_readings: &[f64]) -> f64 {
     near_resonance
         .map(|(y, information)| y * y * information)
         .sum()
+}
+
+/// Whether a mode below all others, if it is hidden, leaves the number of CNMP pairs up to a frequency as it is.
+fn has_no_effect(sum: &ModalSum, hidden: ModalTerm, least: f64, to_rad_s: f64) -> bool {
+    let mut others = sum.terms().iter();
+    let is_below = others.all(|mode| hidden.omega_rad_s < mode.omega_rad_s);
+    is_below && keeps_pairs(sum, hidden, least, to_rad_s)
 }
 
 /// Whether a mode of either sign, with any residue from a ratio `least` of that of `hidden` up to it, leaves the number of CNMP pairs up to
@@ -145,5 +153,28 @@ mod tests {
         }
         // The same mode may not be known at all.
         assert!(!keeps_pairs(&sum, hidden, 1e-7, 1e3));
+    }
+
+    /// With damping ratios of 0.01 and modes at 100 and 300 rad/s of residue 1: by numpy.roots, modes at 150 and 160 rad/s of residues -0.1 and
+    /// 0.1 have a CNMP pair at 4.09 +- 154.4 j together, and each of them alone has none.
+    #[test]
+    fn several_hidden_modes_may_have_a_pair_where_one_has_none() {
+        let mode = |omega_rad_s, residue_per_kg| ModalTerm {
+            omega_rad_s,
+            damping_ratio: 0.01,
+            residue_per_kg,
+        };
+        let sum = ModalSum::new(vec![mode(100.0, 1.0), mode(300.0, 1.0)], 0.0).expect("modes");
+        let hidden = [mode(150.0, -0.1), mode(160.0, 0.1)];
+        for alone in hidden {
+            assert!(keeps_pairs(&sum, alone, 0.5, 1e3));
+            assert!(!has_no_effect(&sum, alone, 0.5, 1e3));
+        }
+        let [lower, upper] = hidden;
+        let with_lower = [sum.terms(), &[lower]].concat();
+        let with_lower = ModalSum::new(with_lower, 0.0).expect("modes");
+        assert_eq!(pairs_with(&with_lower, upper, 1e3), Some(1));
+        // Below all others.
+        assert!(has_no_effect(&sum, mode(50.0, 1e-3), 0.5, 1e3));
     }
 }
