@@ -285,14 +285,14 @@ def wrong_signs(result):
 def print_summary(results):
     for program in ("bench", "sdypy-EMA", "vector fitting"):
         own = of_program(results, program)
-        errors = np.array([result["errors"] for result in own])
-        frequency, damping, residue = (f"{100 * part:.3g} %" for part in np.nanmedian(errors, axis=0))
+        all_errors = np.array([result["errors"] for result in own])
+        frequency, damping, residue = (f"{100 * part:.3g} %" for part in np.nanmedian(all_errors, axis=0))
         verdicts = [result["verdict"] for result in own]
         counts = ", ".join(f"{verdicts.count(word)} {word}" for word in ("right", "undecided", "WRONG"))
         seconds = np.median([result["seconds"] for result in own])
         medians = f"{frequency} frequency, {damping} damping, {residue} residue, {seconds:.2f} s"
         print(f"{program}, {len(own)} stages: medians {medians}; verdicts: {counts}")
-        ratios = errors / [result["errors"] for result in of_program(results, "bench")]
+        ratios = all_errors / [result["errors"] for result in of_program(results, "bench")]
         frequency, damping, residue = (f"{ratio:.3g}" for ratio in np.nanmedian(ratios, axis=0))
         complete = sum(len(set(result["found"].split("/"))) == 1 for result in own)
         print(f"    errors over those of bench on the same stage, medians: {frequency} frequency, {damping} damping, {residue} residue")

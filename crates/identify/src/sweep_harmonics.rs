@@ -43,8 +43,9 @@ const MIN_PART: f64 = 0.02;
 /// The plant responds to a harmonic of the input as well, in proportion to |H(k f)/H(f)|: up to 100 at a resonance of a damping ratio of
 /// 0.5 %. One that is smaller than this part of that of the output does not cause it.
 const MAX_INPUT_RATIO: f64 = 0.01;
-/// Input harmonics above this part of the fundamental turn its phase by as many radians, which gives harmonics in the output of a linear plant
-/// of up to half of [`LARGE_RATIO`] together with those passed on: those of an input that is clipped do not count.
+/// Harmonics are not looked for where those of the input are above this part of the fundamental, as those of a clipped input. They turn the
+/// phase of the fundamental by as many radians. The harmonics that this adds to the output of a linear plant, together with those that the
+/// plant passes on, are at most half of [`LARGE_RATIO`].
 const MAX_INPUT_HARMONIC: f64 = 0.003;
 /// A larger harmonic shows that no linear model describes the response: q + c q^3 changes the fundamental by three times as much as it has
 /// of the third harmonic (3/4 and 1/4 of c), so by 3 %, which a fit does not take for noise.

@@ -177,12 +177,8 @@ impl Answer {
 /// Whether a process works until a stop signal: it has the thread of that work, which begins after the process waits for signals. (Its
 /// handlers alone do not tell that. A signal that arrives between them and the wait ends the process.)
 pub fn waits_for_signals(process: u32) -> bool {
-    let threads = std::fs::read_dir(format!("/proc/{process}/task"));
-    let mut threads = threads.into_iter().flatten().flatten();
-    threads.any(|thread| {
-        let name = std::fs::read_to_string(thread.path().join("comm"));
-        name.is_ok_and(|name| name.trim_end() == "bench-analysis")
-    })
+    let mut threads = threads_of(process);
+    threads.any(|(name, _)| name == "bench-analysis")
 }
 
 /// Waits until every thread of a process that got SIGSTOP is stopped or has ended. The signal returns before they are, and a thread that
@@ -205,16 +201,20 @@ pub fn until_frozen(process: u32) {
 
 /// Name and state of each thread of a process that is neither stopped (`T`) nor ended (`Z`, `X`) [Linux, proc_pid_stat(5)].
 fn running_threads(process: u32) -> Vec<String> {
+    threads_of(process)
+        .filter(|(_, state)| !matches!(state, 'T' | 'Z' | 'X'))
+        .map(|(name, state)| format!("{name} ({state})"))
+        .collect()
+}
+
+/// Name and state of each thread of a process.
+fn threads_of(process: u32) -> impl Iterator<Item = (String, char)> {
     let threads = std::fs::read_dir(format!("/proc/{process}/task"));
     let threads = threads.into_iter().flatten().flatten();
     // A thread whose file is missing has ended.
     let stats =
         threads.filter_map(|thread| std::fs::read_to_string(thread.path().join("stat")).ok());
-    let states = stats.filter_map(|stat| thread_state(&stat));
-    states
-        .filter(|(_, state)| !matches!(state, 'T' | 'Z' | 'X'))
-        .map(|(name, state)| format!("{name} ({state})"))
-        .collect()
+    stats.filter_map(|stat| thread_state(&stat))
 }
 
 /// The name in parentheses, which may contain any character, and the state behind it.
