@@ -24,12 +24,15 @@ const MIN_CLASSES: usize = 4;
 /// Of eight in ten of the fast classes, the variance over v^2 agrees within this factor. That of a class of 256 is known within 13 % (standard
 /// deviation of a squared median), which gives a factor of 1.4, and v^2 is that of some samples before: within a period it varies.
 const MAX_SPREAD: f64 = 2.5;
-/// The same of all classes that count: the prediction error of slow motion adds to theirs. Irregular readings had factors of up to 19 (66
-/// records), noise in proportion to the output has 59, if not all of the motion is at one frequency.
-const MAX_SPREAD_OF_ALL: f64 = 30.0;
+/// The same of all classes that count: the prediction error of slow motion adds to theirs. Most irregular readings had factors of up to
+/// 19 (66 records), play had 28, and noise in proportion to the output has 59, if not all of the motion is at one frequency.
+const MAX_SPREAD_OF_ALL: f64 = 20.0;
 /// Largest deviation of a correlation: that of some hundred samples is known within 0.05, noise beside the errors changes it by a twentieth,
 /// and so does the error of the prediction.
 const MAX_DEVIATION: f64 = 0.2;
+/// Largest deviation from the correlation of independent errors, by the choice of the coefficients: up to 0.57 in 33 records with irregular
+/// readings. Errors of play deviate by 0.86 and more.
+const MAX_LOSS: f64 = 0.7;
 /// Errors of more standard deviations count as this many: a spike has no weight.
 const MAX_SIGMAS: f64 = 4.0;
 
@@ -67,7 +70,7 @@ impl Prediction<'_> {
             let found = correlation(&errors, lag);
             let of_independent = self.patterns.correlation(lag);
             let nearest = found.clamp(of_independent.min(0.0), of_independent.max(0.0));
-            (found - nearest).abs() < MAX_DEVIATION
+            (found - nearest).abs() < MAX_DEVIATION && (found - of_independent).abs() < MAX_LOSS
         })
     }
 }
