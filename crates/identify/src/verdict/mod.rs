@@ -103,8 +103,8 @@ pub struct Verdict {
     pub zeros: Vec<UncertainZero>,
     /// The phase drop over the modes of the band, if there are two or more.
     pub phase_drop: Option<PhaseDrop>,
-    /// Whether the modes may be those of the stage. Otherwise, as with a defect of the record, another kind of output, or modes that do not
-    /// describe the response, none of their signs is certain.
+    /// Whether the modes may be those of the stage. Otherwise, as with a defect of the record or another kind of output, none of their signs
+    /// is certain.
     pub is_of_stage: bool,
 }
 
@@ -198,7 +198,7 @@ pub fn verdict(input: &VerdictInput<'_>) -> Result<Verdict, PlantError> {
         why,
         zeros,
         phase_drop,
-        is_of_stage: poor_fit(input.fit.chi2_per_freedom).is_none(),
+        is_of_stage: true,
     };
     let verdict = verdict
         .with(is_complex.then(|| COMPLEX_RESIDUES.into()))
