@@ -236,17 +236,19 @@ impl DiscreteMode {
 /// The denominator is not multiplied out: at low frequencies that would be a difference of nearly equal numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowResponse {
-    of_current: Linear,
-    of_setpoint: Linear,
-    diagonal: [f64; 2],
-    off_diagonal: f64,
+    pub(super) of_current: Linear,
+    pub(super) of_setpoint: Linear,
+    /// a11 and a22.
+    pub(super) diagonal: [f64; 2],
+    /// a12 a21.
+    pub(super) off_diagonal: f64,
 }
 
 /// constant + slope z.
 #[derive(Clone, Copy, Debug)]
-struct Linear {
-    constant: f64,
-    slope: f64,
+pub(super) struct Linear {
+    pub(super) constant: f64,
+    pub(super) slope: f64,
 }
 
 impl Linear {

@@ -28,6 +28,7 @@ use nalgebra::{Complex, DMatrix};
 
 use super::discrete::{RowResponse, zero_system};
 use super::lifted::{BLOCK, LiftedMode, Output};
+use super::path_responses::{Parts, PathResponses, TapResponse, add_response};
 use super::{DiscretePlant, Mode, OutputKind, PlantState};
 
 /// Nodes of the mean over a probe's period. The midpoint rule with n nodes errs by (w Tp)^2/(24 n^2): 1e-5 at w Tp = 1.
@@ -137,16 +138,6 @@ struct Tap {
     setpoint: f64,
 }
 
-/// The part of the responses at some z = exp(j w T) that does not depend on the modes: that of the amplifier and of the delays.
-#[derive(Clone, Debug)]
-pub struct PathResponses {
-    z: Vec<Complex<f64>>,
-    /// Of the amplifier, as [`DiscretePlant::current_response`].
-    currents: Vec<Complex<f64>>,
-    /// z^-periods of each tap.
-    arrivals: Vec<Vec<Complex<f64>>>,
-}
-
 /// State of a [`LoopPlant`]: the state of the plant, and the delayed readings, indexed by the tick of their arrival.
 #[derive(Clone, Debug)]
 pub struct LoopPlantState {
@@ -215,23 +206,24 @@ impl LoopPlant {
     }
 
     /// The part of the responses at these z = exp(j w T) that all plants at the end of this signal path have in common.
-    pub fn path_responses(&self, z: Vec<Complex<f64>>) -> PathResponses {
-        let arrivals = |tap: &Tap| z.iter().map(|z| tap.arrival(*z)).collect();
-        PathResponses {
-            currents: z.iter().map(|z| self.held.current_response(*z)).collect(),
-            arrivals: self.taps.iter().map(arrivals).collect(),
-            z,
-        }
+    pub fn path_responses(&self, z: &[Complex<f64>]) -> PathResponses {
+        let arrivals = |tap: &Tap| Parts::of(z.iter().map(|z| tap.arrival(*z)));
+        let arrivals = self.taps.iter().map(arrivals).collect();
+        PathResponses::new(z, |z| self.held.current_response(z), arrivals)
     }
 
     /// As [`LoopPlant::response_at`] at each z, with the [`LoopPlant::path_responses`] of any plant at the end of the same signal path.
     pub fn responses_along(&self, path: &PathResponses) -> Vec<Complex<f64>> {
-        let mut sums = vec![Complex::new(0.0, 0.0); path.z.len()];
+        let mut sums = vec![Complex::new(0.0, 0.0); path.len()];
         for (tap, arrivals) in self.taps.iter().zip(&path.arrivals) {
-            let modes: Vec<RowResponse> = tap.along_modes(&self.held).collect();
-            let points = path.z.iter().zip(&path.currents).zip(arrivals);
-            for (sum, ((z, current), arrival)) in sums.iter_mut().zip(points) {
-                *sum += tap.response(modes.iter().copied(), *z, *current) * arrival;
+            for (index, mode) in tap.along_modes(&self.held).enumerate() {
+                let (current, setpoint) = tap.direct_of_mode(index);
+                let tap = TapResponse {
+                    mode,
+                    current,
+                    setpoint,
+                };
+                add_response(&mut sums, tap, path, arrivals);
             }
         }
         sums
@@ -382,12 +374,17 @@ impl Tap {
         moved + self.current * state.current_a + self.setpoint * setpoint_a
     }
 
-    /// The part of one mode. The current and the set-point, which are those of all modes, are added to that of the first one.
-    fn of_mode(&self, index: usize) -> Output {
-        let (current, setpoint) = match index {
+    /// The parts of the current and of the set-point, which are those of all modes, with the first one.
+    fn direct_of_mode(&self, index: usize) -> (f64, f64) {
+        match index {
             0 => (self.current, self.setpoint),
             _ => (0.0, 0.0),
-        };
+        }
+    }
+
+    /// The part of one mode, see [`Tap::direct_of_mode`].
+    fn of_mode(&self, index: usize) -> Output {
+        let (current, setpoint) = self.direct_of_mode(index);
         Output {
             periods: self.periods,
             row: self.rows[index],

@@ -154,7 +154,8 @@ impl ChainResponses {
         match (chain, &far.plant) {
             (MeasurementChain::Bench(path), Some(plant)) => {
                 let z = s.iter().map(|s| unit_phasor(s.im * path.period_s));
-                ChainResponses::Bench(plant.path_responses(z.collect()))
+                let z: Vec<Complex<f64>> = z.collect();
+                ChainResponses::Bench(plant.path_responses(&z))
             }
             (MeasurementChain::Input(path, output), _) => {
                 let at = |s: &Complex<f64>| path.response(*s) * output.factor(*s);

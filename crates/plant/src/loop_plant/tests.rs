@@ -296,3 +296,30 @@ fn sequence_that_ends_before_the_first_arrival_has_readings_of_rest() {
     assert_eq!(plant.readings_m(&[1.0; 3]), [0.0; 3]);
     assert!(plant.readings_m(&[]).is_empty());
 }
+
+/// Responses at many frequencies are those at one of them, and have the same bits however many are computed side by side.
+#[test]
+fn responses_along_a_path_are_those_at_each_frequency() {
+    let outputs = [
+        OutputKind::Position,
+        OutputKind::Velocity,
+        OutputKind::Acceleration,
+    ];
+    let z: Vec<Complex<f64>> = (1..=37).map(|k| z_at(75.0 * f64::from(k))).collect();
+    for output in outputs {
+        let path = SignalPath {
+            delays_s: vec![0.3 * PERIOD_S, 1.7 * PERIOD_S],
+            ..path(output, 600.0)
+        };
+        let plant = LoopPlant::of(&path, &several_modes());
+        let found = plant.responses_along(&plant.path_responses(&z));
+        assert_eq!(found.len(), z.len());
+        for (found, z) in found.iter().zip(&z) {
+            let exact = plant.response_at(*z);
+            // Some ten roundings of parts that nearly cancel between the modes.
+            assert!((found - exact).norm() < 1e-12 * exact.norm(), "{output:?}");
+            let alone = plant.responses_along(&plant.path_responses(&[*z]));
+            assert_eq!(*found, alone[0], "{output:?}");
+        }
+    }
+}
