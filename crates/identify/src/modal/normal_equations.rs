@@ -1,11 +1,14 @@
 //! Normal equations of weighted complex data with real parameters.
 
+use multiversion::multiversion;
 use nalgebra::{Cholesky, Complex, DMatrix, DVector, Dyn, Matrix2};
 
 use crate::FrfDatum;
 
-/// Number of partial sums of a product, which the processor adds up side by side.
-const LANES: usize = 8;
+/// Number of partial sums of a product, which the processor adds up side by side: so many that compilers make a loop of vectors of them.
+const LANES: usize = 16;
+/// Number of values of a column of which four products each are added to the partial sums.
+const STEP: usize = 4 * LANES;
 /// Number of values of each column that are multiplied at a time: those of all columns fit into the cache of a processor.
 const BLOCK: usize = 512;
 
@@ -59,7 +62,8 @@ impl WeightedColumns {
 }
 
 /// The sums of the products of each two of an even number of columns of the same length, in the lower triangle. The order of the sums is the
-/// same on every processor.
+/// same on every processor, whether or not it has instructions for more of the [`LANES`] at a time.
+#[multiversion(targets("x86_64+avx2"))]
 fn products(columns: &[&[f64]]) -> DMatrix<f64> {
     let n = columns.len();
     let length = columns.first().map_or(0, |column| column.len());
@@ -78,26 +82,52 @@ fn products(columns: &[&[f64]]) -> DMatrix<f64> {
 }
 
 /// The sums of the products of each of two columns with each of two others: four products for four values that are read.
+#[inline(always)]
 fn products_of_pairs(rows: [&[f64]; 2], columns: [&[f64]; 2]) -> Matrix2<f64> {
-    let mut lanes = [[[0.0; LANES]; 2]; 2];
-    for ((a0, a1), (b0, b1)) in lanes_of(rows).zip(lanes_of(columns)) {
+    let [mut l00, mut l01, mut l10, mut l11] = [[0.0; LANES]; 4];
+    for ((a0, a1), (b0, b1)) in steps_of(rows).zip(steps_of(columns)) {
         for lane in 0..LANES {
-            lanes[0][0][lane] += a0[lane] * b0[lane];
-            lanes[0][1][lane] += a0[lane] * b1[lane];
-            lanes[1][0][lane] += a1[lane] * b0[lane];
-            lanes[1][1][lane] += a1[lane] * b1[lane];
+            l00[lane] += product_in_lane(a0, b0, lane);
+            l01[lane] += product_in_lane(a0, b1, lane);
+            l10[lane] += product_in_lane(a1, b0, lane);
+            l11[lane] += product_in_lane(a1, b1, lane);
         }
     }
-    let rest = rows[0].len() - rows[0].len() % LANES;
-    Matrix2::from_fn(|i, j| {
-        let rest = rows[i][rest..].iter().zip(&columns[j][rest..]);
-        lanes[i][j].iter().sum::<f64>() + rest.map(|(a, b)| a * b).sum::<f64>()
-    })
+    let rest = rows[0].len() - rows[0].len() % STEP;
+    let mut sums = Matrix2::zeros();
+    for (i, lanes) in [[l00, l01], [l10, l11]].iter().enumerate() {
+        for (j, lanes) in lanes.iter().enumerate() {
+            let rest = rows[i][rest..].iter().zip(&columns[j][rest..]);
+            sums[(i, j)] = sum_of_lanes(*lanes) + rest.map(|(a, b)| a * b).sum::<f64>();
+        }
+    }
+    sums
+}
+
+/// The sum of the products of a step that belong to a partial sum.
+#[inline(always)]
+fn product_in_lane(a: &[f64], b: &[f64], lane: usize) -> f64 {
+    let product = |term: usize| a[lane + term * LANES] * b[lane + term * LANES];
+    (product(0) + product(1)) + (product(2) + product(3))
+}
+
+/// The sum of partial sums, by halves.
+#[inline(always)]
+fn sum_of_lanes(mut lanes: [f64; LANES]) -> f64 {
+    let mut count = LANES;
+    while count > 1 {
+        count /= 2;
+        for lane in 0..count {
+            lanes[lane] += lanes[lane + count];
+        }
+    }
+    lanes[0]
 }
 
 /// The values of two columns that are multiplied side by side.
-fn lanes_of([first, second]: [&[f64]; 2]) -> impl Iterator<Item = (&[f64], &[f64])> {
-    first.chunks_exact(LANES).zip(second.chunks_exact(LANES))
+#[inline(always)]
+fn steps_of([first, second]: [&[f64]; 2]) -> impl Iterator<Item = (&[f64], &[f64])> {
+    first.chunks_exact(STEP).zip(second.chunks_exact(STEP))
 }
 
 /// J^T W J and J^T W e; real and imaginary parts are separate data points.
@@ -175,6 +205,46 @@ mod tests {
                 for j in 0..=i {
                     let error = (found[(i, j)] - expected[(i, j)]).abs();
                     assert!(error < 1.3e-10, "{count} {length}: {error}");
+                }
+            }
+        }
+    }
+
+    /// One sum after the other, in the order of the documentation.
+    fn product_one_by_one(a: &[f64], b: &[f64]) -> f64 {
+        let blocks = a.chunks(BLOCK).zip(b.chunks(BLOCK));
+        blocks.fold(0.0, |sum, (a, b)| {
+            let whole = a.len() - a.len() % STEP;
+            let of_lane = |lane: usize| {
+                let steps = a[..whole].chunks(STEP).zip(b[..whole].chunks(STEP));
+                steps.fold(0.0, |sum, (a, b)| {
+                    let term = |k: usize| a[lane + k * LANES] * b[lane + k * LANES];
+                    sum + ((term(0) + term(1)) + (term(2) + term(3)))
+                })
+            };
+            let mut lanes: Vec<f64> = (0..LANES).map(of_lane).collect();
+            while lanes.len() > 1 {
+                let (low, high) = lanes.split_at(lanes.len() / 2);
+                lanes = low.iter().zip(high).map(|(low, high)| low + high).collect();
+            }
+            let rest = a[whole..].iter().zip(&b[whole..]);
+            sum + (lanes[0] + rest.map(|(a, b)| a * b).sum::<f64>())
+        })
+    }
+
+    #[test]
+    fn products_have_the_same_bits_whatever_instructions_compute_them() {
+        for length in [5, 64, 200, 512, 1100] {
+            let value = |k: usize, i: usize| 1.0 / (1.0 + (31 * k + 17 * i + k * i) as f64);
+            let columns: Vec<Vec<f64>> = (0..4)
+                .map(|i| (0..length).map(|k| value(k, i)).collect())
+                .collect();
+            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let found = products(&columns);
+            for i in 0..4 {
+                for j in 0..=i {
+                    let expected = product_one_by_one(columns[i], columns[j]);
+                    assert_eq!(found[(i, j)], expected, "{length} {i} {j}");
                 }
             }
         }
