@@ -16,7 +16,8 @@
 //! no mode: two numbers for w, zeta and r. It is left out, and the search is repeated.
 
 use super::parameters::ModalParameters;
-use super::refine::refine;
+use super::prune::sigmas_of_residues;
+use super::refine::refine_below;
 use super::solution::{Problem, Solution};
 use crate::FrfDatum;
 use bench_plant::zeros::ModalTerm;
@@ -29,7 +30,10 @@ const MIN_LEFT_OUT: usize = 4;
 const MAX_ROUNDS: usize = 3;
 /// Largest ratio of chi^2 to its expected value of modes that describe the data.
 const DESCRIBED: f64 = 4.0;
-/// See [`refine`]: the limit is some ten times larger than what is left of chi^2 with a thousand data.
+/// Where chi^2 increases by this multiple of the limit without a mode, to first order, no other places of the other modes are tried: the mode
+/// is there.
+const CLEAR: f64 = 10.0;
+/// See [`refine_below`]: the limit is some ten times larger than what is left of chi^2 with a thousand data.
 const TOLERANCE: f64 = 1e-3;
 
 /// The data of a fit, without those that were left out.
@@ -93,15 +97,26 @@ fn lone_datum(problem: Problem<'_>, parameters: &ModalParameters, mode: usize) -
         data: others,
         nodes: &problem.chain.nodes(others, parameters.delay_s),
     };
-    let (with_mode, without_mode) = (
-        Solution::new(beside, parameters.clone()),
-        refine(beside, fewer, TOLERANCE),
-    );
+    let with_mode = Solution::new(beside, parameters.clone());
     let limit = presence(others.len()) * beside.misfit(with_mode.chi2);
-    if without_mode.chi2 - with_mode.chi2 >= limit {
+    if increase_without(beside, &with_mode, mode) > CLEAR * limit {
+        return None;
+    }
+    let enough = with_mode.chi2 + limit;
+    let without_mode = refine_below(beside, fewer, TOLERANCE, enough);
+    if without_mode.chi2 >= enough {
         return None;
     }
     is_needed(problem, parameters, without_mode.parameters).then_some(nearest)
+}
+
+/// The increase of chi^2 without a mode, if it were quadratic in the residue: (r/sigma)^2, with all parameters free. 0 if the data do not
+/// determine them.
+fn increase_without(problem: Problem<'_>, solution: &Solution, mode: usize) -> f64 {
+    let Some(covariance) = solution.covariance(problem) else {
+        return 0.0;
+    };
+    sigmas_of_residues(&solution.parameters, &covariance)[mode].powi(2)
 }
 
 /// Whether all data together need the mode that parameters, a start without it, lack.
@@ -111,10 +126,9 @@ fn is_needed(
     without_mode: ModalParameters,
 ) -> bool {
     let with_mode = Solution::new(problem, parameters.clone());
-    let without_mode = refine(problem, without_mode, 0.0);
     let significant = problem.significant_decrease(&parameters.residues);
-    let limit = significant * problem.misfit(with_mode.chi2);
-    without_mode.chi2 - with_mode.chi2 > limit
+    let enough = with_mode.chi2 + significant * problem.misfit(with_mode.chi2);
+    refine_below(problem, without_mode, 0.0, enough).chi2 >= enough
 }
 
 /// By how much chi^2 must increase without a mode at a known place: 3 ln 2N.

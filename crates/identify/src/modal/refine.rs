@@ -29,7 +29,17 @@ const DAMPING_REDUCTION: f64 = 0.1;
 
 /// The solution of least chi^2 near `start`. The iteration ends when a step decreases chi^2 by less than `tolerance` of it.
 pub(super) fn refine(problem: Problem<'_>, start: ModalParameters, tolerance: f64) -> Solution {
-    refine_moving(problem, start, Moving::All, tolerance)
+    refine_moving(problem, start, Moving::All, tolerance, f64::NEG_INFINITY)
+}
+
+/// As [`refine`], until chi^2 is below `enough`: where only that is to be known.
+pub(super) fn refine_below(
+    problem: Problem<'_>,
+    start: ModalParameters,
+    tolerance: f64,
+    enough: f64,
+) -> Solution {
+    refine_moving(problem, start, Moving::All, tolerance, enough)
 }
 
 /// As [`refine`], with w and zeta of the [`MOVING_MODES`] nearest to a frequency only, all residues and R: at a fraction of the cost, how good
@@ -45,7 +55,7 @@ pub(super) fn refine_near(
     } else {
         Moving::Modes(start.nearest_modes(omega_rad_s, MOVING_MODES))
     };
-    refine_moving(problem, start, moving, tolerance)
+    refine_moving(problem, start, moving, tolerance, f64::NEG_INFINITY)
 }
 
 /// Whether [`refine_near`] moves all parameters: those of few modes, or of complex residues, which leave the delay open.
@@ -58,13 +68,14 @@ fn refine_moving(
     start: ModalParameters,
     moving: Moving,
     tolerance: f64,
+    enough: f64,
 ) -> Solution {
     if start.modes.is_empty() {
         return Solution::new(problem, start);
     }
     let mut iteration = Iteration::new(problem, start, moving, tolerance);
     for _ in 0..MAX_STEPS {
-        if iteration.step().is_break() {
+        if iteration.best.chi2 < enough || iteration.step().is_break() {
             break;
         }
     }
